@@ -6,7 +6,7 @@
         client.load(rtcf.component("rtcf_examples", "Mimo", name="H1", remaps=["in1:=/a"]))
         client.start()
 
-Requests and answers are the protobuf messages of rtcf.v1.
+Requests and results are the protobuf messages of rtcf.v1.
 """
 
 from importlib import import_module
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 __version__ = "0.1.0"
 
-# Imported when they are used first: a command is short, and few need them.
+# Imported at their first use, because imports dominate the time of a short command.
 _LATER = {
     "Recording": "rtcf.recording.reader",
     "RecordingError": "rtcf.recording.reader",

@@ -1,6 +1,6 @@
-"""Runs a component under RealtimeSanitizer, in a process of its own and without rtcfd.
+"""A check of a component under RealtimeSanitizer, in a separate process and without rtcfd.
 
-Uses the executor that is built with it (Debian package rtcf-check).
+It uses the executor built with RealtimeSanitizer (Debian package rtcf-check).
 """
 
 import os
@@ -21,25 +21,25 @@ from rtcf.watched import Watched
 INSTALLED = Path("/usr/lib/rtcf/rtcf-executor-rtsan")
 CONFIGURATION = Path("/etc/rtcfd/rtcfd.toml")
 _DESCRIBE_TIMEOUT_S = 30.0
-# The sanitizer knows by its name how to speak with each. The last is what rtcf-check depends on:
-# the others are faster, and come with all of LLVM.
+# The sanitizer selects the protocol by the program's name. rtcf-check depends on the last one; the
+# others are faster, but belong to LLVM packages.
 _SYMBOLIZERS = ("llvm-symbolizer-22", "llvm-symbolizer", "addr2line")
 
 
 @dataclass
 class Checked:
-    """What came of it."""
+    """The result of a check."""
 
     library: str
     violations: list[Violation] = field(default_factory=list)
-    not_finite: list[str] = field(default_factory=list)  # outputs that carried NaN or infinity
-    undeclared: list[str] = field(default_factory=list)  # members that change and are no State
-    ended: str = ""  # how the component ended its process, or did not end; empty = in order
-    log: list[str] = field(default_factory=list)  # what else was said
+    not_finite: list[str] = field(default_factory=list)  # outputs that had NaN or infinite values
+    undeclared: list[str] = field(default_factory=list)  # members that change but are not State
+    ended: str = ""  # a crash, an exit or a hang, in words; empty = a normal end
+    log: list[str] = field(default_factory=list)  # the component's log records
 
 
 def executor_of(build_tree: Path | None) -> Path:
-    """Return the executor with RealtimeSanitizer that belongs to this tree, or is installed."""
+    """Return the executor with RealtimeSanitizer of a build tree, or the installed one."""
     if build_tree is None:
         return INSTALLED
     return build_tree.with_name(f"{build_tree.name}-rtsan") / "bin" / "rtcf-executor"
@@ -54,11 +54,18 @@ def check(
     folders: Sequence[Path] = (),
     build_tree: Path | None = None,
 ) -> Checked:
-    """Run a component for some cycles; `parameters` are "name:=value".  Raises RtcfError."""
+    """Run a component for `cycles` cycles and return the violations of real-time rules.
+
+    executor    an executor built with RealtimeSanitizer, see executor_of()
+    parameters  "name:=value"
+    folders     searched for libraries first, before those of rtcfd.toml and of the build tree
+
+    Raises RtcfError if there is no such executor, package or type.
+    """
     if not os.access(executor, os.X_OK):
         how = "install rtcf-check"
         if build_tree is not None and executor == executor_of(build_tree):
-            how = f"`make -C {build_tree.parent} checker` builds it"
+            how = f"build it with `make -C {build_tree.parent} checker`"
         raise RtcfError(
             f"no executor with RealtimeSanitizer at {executor}: {how}, or name one with --executor"
         )
@@ -84,8 +91,8 @@ def check(
 
 
 def _find(executor: Path, folders: Sequence[Path], package: str, type_name: str) -> Path:
-    """Return the library that offers a type, as rtcfd would choose it."""
-    # Comes with the executor, other than the rest of this module.
+    """Return the library that provides a type, by the same rules as rtcfd."""
+    # Imported here because only this function needs the executor's protocol.
     from rtcf.executor.v1 import executor_pb2
 
     known = packages(folders)
@@ -106,13 +113,13 @@ def _find(executor: Path, folders: Sequence[Path], package: str, type_name: str)
                 check=False,
             )
         except subprocess.TimeoutExpired:
-            problems.append(f"{library}: loading it did not end")
+            problems.append(f"{library}: loading it timed out")
             continue
         description = executor_pb2.LibraryDescription()
         if done.returncode >= 0:
             description.ParseFromString(done.stdout)
         if done.returncode and not description.problem:
-            description.problem = f"{library}: the process that loaded it failed"
+            description.problem = f"{library}: the process to load it failed"
         if description.problem:
             problems.append(" ".join(str(description.problem).split()))
         offered = [str(each.type) for each in description.types]
@@ -131,7 +138,7 @@ def _find(executor: Path, folders: Sequence[Path], package: str, type_name: str)
 
 
 def sanitizer_options() -> str:
-    """Return the sanitizer's options: all reports, with source lines by what there is."""
+    """Return the sanitizer's options: report all violations, with an available symbolizer."""
     options = ["halt_on_error=false", "print_stats_on_exit=false"]
     symbolizer = next(filter(None, map(shutil.which, _SYMBOLIZERS)), None)
     if symbolizer:
@@ -140,14 +147,14 @@ def sanitizer_options() -> str:
 
 
 def _configured() -> list[Path]:
-    """Return the folders that the system's rtcfd searches besides."""
+    """Return the component folders of /etc/rtcfd/rtcfd.toml."""
     import tomllib
 
     try:
         document = tomllib.loads(CONFIGURATION.read_text(encoding="utf-8"))
         return [Path(folder) for folder in document["daemon"]["path"]]
     except (OSError, KeyError, TypeError, ValueError):
-        return []  # rtcfd itself says what is wrong with it
+        return []  # rtcfd reports an invalid file
 
 
 def _why(status: int, lines: Sequence[str], stage: str) -> str:

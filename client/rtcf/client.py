@@ -18,29 +18,28 @@ DEFAULT_RUNNER = "rt_runner"
 
 
 class Client(Incidents):
-    """A connection to rtcfd; opened with the first call, thread-safe.
+    """A connection to rtcfd, opened by the first call; thread-safe.
 
-    `runner` in the methods names one; empty is rt_runner.  All methods raise
-    RefusedError, DaemonUnreachableError (the constructor too, of a path that no
-    socket can have) or RtcfError; TypeError, before anything is asked, where a text
-    stands for several names.  `on_progress` is called with a line for each
-    step of a long call.
+    Methods with `runner` use rt_runner if it is empty.  All methods raise RefusedError,
+    DaemonUnreachableError or RtcfError, and TypeError if a single text is passed for a list of
+    names.  The constructor raises DaemonUnreachableError if the socket's path is too long.  Long
+    calls pass a line for each step to `on_progress`.
     """
 
     def get_status(
         self, runner: str = "", timeout_s: float = QUERY_TIMEOUT_S
     ) -> control_pb2.GetStatusResponse:
-        """Return the status of rtcfd and of all runners, or of the one named."""
+        """Return the status of rtcfd and of all runners, or of `runner` only."""
         request = control_pb2.GetStatusRequest(runner=runner)
         return self._ask(self._stub.GetStatus, request, timeout_s)  # type: ignore[no-any-return]
 
     def reload(self) -> list[str]:
-        """Make rtcfd read its settings and graphs.d again; return a line for each change."""
+        """Reload the settings of rtcfd and graphs.d; return a line for each change."""
         response = self._change(self._stub.Reload, control_pb2.ReloadRequest(), None)
         return list(response.result.notes)
 
     def list_runners(self) -> list[runner_pb2.RunnerStatus]:
-        """Return the status of all runners by name, however many there are."""
+        """Return the status of all runners, sorted by name."""
         return self._pages(self._stub.ListRunners, control_pb2.ListRunnersRequest(), "runners")
 
     def add_runner(
@@ -49,7 +48,7 @@ class Client(Incidents):
         settings: runner_pb2.RunnerSettings | None = None,
         on_progress: OnProgress | None = None,
     ) -> runner_pb2.RunnerStatus:
-        """Add a runner and start its executor; what `settings` leave open takes its default."""
+        """Add a runner and start its executor; unset `settings` have their defaults."""
         request = control_pb2.AddRunnerRequest(runner=runner, settings=settings)
         return self._change(self._stub.AddRunner, request, on_progress).runner  # type: ignore[no-any-return]
 
@@ -59,19 +58,19 @@ class Client(Incidents):
         runner: str = "",
         on_progress: OnProgress | None = None,
     ) -> runner_pb2.RunnerStatus:
-        """Change settings; what `settings` leave open stays."""
+        """Change settings of a runner; unset `settings` keep their values."""
         request = control_pb2.SetRunnerRequest(runner=runner, settings=settings)
         return self._change(self._stub.SetRunner, request, on_progress).runner  # type: ignore[no-any-return]
 
     def remove_runner(self, runner: str, on_progress: OnProgress | None = None) -> None:
-        """Stop a runner's loop, end its executor and forget it."""
+        """Stop a runner's loop, end its executor and remove the runner."""
         request = control_pb2.RemoveRunnerRequest(runner=runner)
         self._change(self._stub.RemoveRunner, request, on_progress)
 
     def restart_runner(
         self, runner: str, on_progress: OnProgress | None = None
     ) -> runner_pb2.RunnerStatus:
-        """Begin anew with a fresh executor and the same graph, not started."""
+        """Replace the executor by a new one with the same graph; the loop is not started."""
         request = control_pb2.RestartRunnerRequest(runner=runner)
         return self._change(self._stub.RestartRunner, request, on_progress).runner  # type: ignore[no-any-return]
 
@@ -83,10 +82,10 @@ class Client(Incidents):
         without: Iterable[str] = (),
         partial: bool = False,
     ) -> control_pb2.ChangeResult:
-        """Start the loop; one that runs is left alone.
+        """Start the loop; no effect if it runs.
 
-        Refused where components are left out of it that are not optional, unless they are
-        named in `without`, or `partial` says that it may be any.
+        If non-optional components have been left out of the loop after a fault, the call raises
+        ComponentLeftOutError unless `without` names them or `partial` is set.
         """
         request = control_pb2.StartRequest(
             runner=runner, without=several("without", without), partial=partial
@@ -96,11 +95,10 @@ class Client(Incidents):
     def stop(
         self, runner: str = "", on_progress: OnProgress | None = None
     ) -> control_pb2.ChangeResult:
-        """End the loop at the next cycle boundary.
+        """Stop the loop at the next cycle boundary.
 
-        Where rtcfd cannot be reached, has no place for another client, or does
-        not answer within half a second, the loop's executor is asked itself; a note
-        of the result says so.
+        If rtcfd is unreachable, has no free connection, or does not answer within half a second,
+        the call stops the loop directly at its executor.  A note in the result then says so.
         """
 
         request = control_pb2.StopRequest(runner=runner)
@@ -112,9 +110,9 @@ class Client(Incidents):
         )
 
     def stop_all(self) -> list[direct_stop.Stopped]:
-        """End all loops at once, at their executors; then tell rtcfd, if it answers soon.
+        """Stop all loops at once, directly at their executors, then inform rtcfd if it answers.
 
-        Raises nothing: what came of each loop is in the result, by runner.
+        Raises nothing.  Returns the result of each loop, sorted by runner.
         """
         trouble: RtcfError | None = None
         try:
@@ -127,13 +125,13 @@ class Client(Incidents):
             ]
         except RtcfError as error:
             if not stopped:
-                # Of who may neither look nor ask, rtcfd's door says how to mend it.
+                # Without access to the executors either, rtcfd's error names the remedy.
                 both = (
                     error if trouble is None else DaemonUnreachableError(str(trouble), str(error))
                 )
                 stopped[""] = direct_stop.Stopped("", both)
             runners = []
-        # A runner without an executor may be about to get one.
+        # Include runners without an executor: one may be starting.
         for runner in runners:
             request = control_pb2.StopRequest(runner=runner)
             try:
@@ -150,16 +148,16 @@ class Client(Incidents):
     def step(
         self, cycles: int, runner: str = "", on_progress: OnProgress | None = None
     ) -> control_pb2.ChangeResult:
-        """Run cycles of a stopped loop on a simulated clock, as fast as they go.
+        """Run cycles of a stopped loop on a simulated clock, as fast as possible.
 
-        Goes on where the last call paused, until the next stop or start; takes
-        as long as the cycles take.
+        The next call continues from this cycle, until the loop is stopped or started.  The call
+        returns after the last cycle and has no timeout.
         """
         request = control_pb2.StepRequest(runner=runner, cycles=cycles)
         return self._changed(self._stub.Step, request, on_progress, timeout_s=None)
 
     def replay(self) -> ReplayCall:
-        """Open a replay, which lasts as long as the call; see rtcf.replay for whole recordings."""
+        """Open a replay, which ends with the call; rtcf.replay replays whole recordings."""
         return ReplayCall(self._stub.Replay, self.socket)
 
     def load(
@@ -172,7 +170,7 @@ class Client(Incidents):
     ) -> control_pb2.ChangeResult:
         """Load a component (see rtcf.component); the loop misses no cycle.
 
-        With `wait`, one whose hooks need a ROS master waits for it as long as it takes.
+        With `wait`, a component whose hooks need a ROS master waits for it without a timeout.
         """
         request = control_pb2.LoadRequest(runner=runner, component=component, wait=wait)
         if not wait:
@@ -201,11 +199,12 @@ class Client(Incidents):
         reset_parameters: bool = False,
         given_before: graph_pb2.ComponentSpec | None = None,
     ) -> control_pb2.ChangeResult:
-        """Put a new component in the place of an old one; what is empty in it is the old one's.
+        """Replace a component; empty fields of `replacement` keep the old component's values.
 
-        So are parameters that it does not name, as the result's `kept` and `notes` tell; with
-        `reset_parameters` they begin with their defaults.  With `given_before`, what the old one
-        was loaded as, only those stay that were tuned since.
+        Parameters that `replacement` does not set keep their values, too; `kept` and `notes` of
+        the result list them.  With `reset_parameters` they have their defaults instead.  With
+        `given_before`, the specification used to load the old component, only parameters changed
+        since then keep their values.
         """
         request = control_pb2.ReplaceRequest(
             runner=runner,
@@ -227,12 +226,15 @@ class Client(Incidents):
         rebuilt: bool = False,
         given_before: Iterable[graph_pb2.ComponentSpec] = (),
     ) -> control_pb2.ChangeResult:
-        """Make the graph what `components` say, all at one cycle boundary.
+        """Change the graph to `components`, at one cycle boundary.
 
-        With `rebuilt`, components whose library has changed since they were loaded are
-        replaced, too.  With `given_before`, what the last call said, parameters that were tuned
-        since stay where they fit and `components` say nothing new.  The result's `differences`
-        tell what was changed, or would be.
+        settings      settings of the runner to change, too
+        dry_run       change nothing; only report the differences
+        rebuilt       also replace components whose libraries have changed since loading
+        given_before  the `components` of the last call: parameters changed since then keep their
+                      values if these are valid and `components` has no new value for them
+
+        `differences` of the result lists the changes.
         """
         request = control_pb2.ApplyRequest(
             runner=runner,
@@ -250,7 +252,7 @@ class Client(Incidents):
         runner: str = "",
         on_progress: OnProgress | None = None,
     ) -> control_pb2.ChangeResult:
-        """Load components anew that are left out of the loop, or that a fault has marked."""
+        """Reload components left out of the loop or marked as faulted."""
         request = control_pb2.ReleaseRequest(
             runner=runner, components=several("components", components)
         )
@@ -263,7 +265,7 @@ class Client(Incidents):
         runner: str = "",
         on_progress: OnProgress | None = None,
     ) -> control_pb2.ChangeResult:
-        """Set (or remove) loop breaks on inputs, all at one cycle boundary."""
+        """Set or remove loop breaks on inputs, all at one cycle boundary."""
         request = control_pb2.SetBreaksRequest(
             runner=runner, ports=several("ports", ports), broken=broken
         )
@@ -276,7 +278,7 @@ class Client(Incidents):
         runner: str = "",
         on_progress: OnProgress | None = None,
     ) -> control_pb2.ChangeResult:
-        """Change parameters of a component, all at one cycle boundary."""
+        """Set parameters of a component, all at one cycle boundary."""
         request = control_pb2.SetParametersRequest(
             runner=runner, component=component, parameters=several("parameters", parameters)
         )
@@ -285,14 +287,14 @@ class Client(Incidents):
     def undo_parameters(
         self, component: str, runner: str = "", on_progress: OnProgress | None = None
     ) -> control_pb2.ChangeResult:
-        """Take back what was changed last of a component's parameters; again, what was before."""
+        """Undo the last change of a component's parameters; a second call undoes the previous."""
         request = control_pb2.UndoParametersRequest(runner=runner, component=component)
         return self._changed(self._stub.UndoParameters, request, on_progress)
 
     def get_history(
         self, component: str = "", parameter: str = "", runner: str = "", most: int = 0
     ) -> list[control_pb2.ParameterChange]:
-        """Return who set which parameter to what, oldest first; `most`: the newest so many."""
+        """Return the parameter changes, oldest first; at most the last `most` (0: all)."""
         request = control_pb2.GetHistoryRequest(
             runner=runner, component=component, parameter=parameter, most=most
         )
@@ -301,7 +303,7 @@ class Client(Incidents):
     def reset_state(
         self, component: str, runner: str = "", on_progress: OnProgress | None = None
     ) -> control_pb2.ChangeResult:
-        """Take a component's declared state back to its initial values, at one cycle boundary."""
+        """Reset a component's declared state to its initial values, at one cycle boundary."""
         request = control_pb2.ResetStateRequest(runner=runner, component=component)
         return self._changed(self._stub.ResetState, request, on_progress)
 
@@ -312,7 +314,7 @@ class Client(Incidents):
         runner: str = "",
         on_progress: OnProgress | None = None,
     ) -> control_pb2.ChangeResult:
-        """Set values of a component's declared state, of a loop that does not run."""
+        """Set values of a component's declared state while the loop does not run."""
         request = control_pb2.SetStateRequest(
             runner=runner, component=component, states=several("states", states)
         )
@@ -325,13 +327,13 @@ class Client(Incidents):
         runner: str = "",
         on_progress: OnProgress | None = None,
     ) -> control_pb2.ChangeResult:
-        """Give the input "component.port" a value in the next cycle, as if it came from outside.
+        """Write a value to the input "component.port"; the component reads it in the next cycle.
 
-        A number, bool, list or NumPy array, fields of a message in a dict; a str is YAML, as in
-        `rtcfctl write`.  Refused where a component feeds it or a ROS node publishes its topic;
-        raises ValueError on a name that is no port's.
+        `value` is a number, bool, list, NumPy array, dict of message fields, or YAML text as in
+        `rtcfctl write`.  rtcfd rejects the call if an output is connected to the input or a ROS
+        node publishes its topic.  Raises ValueError if `port` is not a port name.
         """
-        # Few commands need it, and each import is time.
+        # Imported here to keep other commands fast.
         import json
 
         name = parse_port(port)
@@ -343,52 +345,51 @@ class Client(Incidents):
         return self._changed(self._stub.WritePort, request, on_progress)
 
     def take_snapshot(self, runner: str = "") -> control_pb2.TakeSnapshotResponse:
-        """Copy all that a runner's next cycle depends on, of one cycle boundary."""
+        """Take a snapshot of a runner at a cycle boundary."""
         request = control_pb2.TakeSnapshotRequest(runner=runner)
         return self._ask(self._stub.TakeSnapshot, request, CHANGE_TIMEOUT_S)  # type: ignore[no-any-return]
 
     def restore_snapshot(
         self, snapshot: bytes, runner: str = "", on_progress: OnProgress | None = None
     ) -> control_pb2.ChangeResult:
-        """Go on from a snapshot, at one cycle boundary; a loop that does not run is paused."""
+        """Restore a snapshot at a cycle boundary; a stopped loop is paused there."""
         request = control_pb2.RestoreSnapshotRequest(runner=runner, snapshot=snapshot)
         return self._changed(self._stub.RestoreSnapshot, request, on_progress)
 
     def hold_runner(self, opening: control_pb2.OpenHold) -> Tenancy:
-        """Take a runner for as long as the tenancy lasts; its messages are HoldRunnerResponse."""
+        """Hold a runner until the Tenancy ends; its messages are HoldRunnerResponse."""
         return Tenancy(self._stub.HoldRunner, control_pb2.HoldRunnerRequest, opening, self.socket)
 
     def lease_component(self, opening: control_pb2.OpenLease) -> Tenancy:
-        """Load a component for as long as the tenancy lasts; its messages are
-        LeaseComponentResponse."""
+        """Load a component until the Tenancy ends; its messages are LeaseComponentResponse."""
         return Tenancy(
             self._stub.LeaseComponent, control_pb2.LeaseComponentRequest, opening, self.socket
         )
 
     def list_components(self, runner: str = "") -> list[graph_pb2.ComponentInfo]:
-        """Return all components in order of the schedule, without values; then those left out."""
+        """Return all components in schedule order, without values, then the left-out ones."""
         request = control_pb2.ListComponentsRequest(runner=runner)
         return self._pages(self._stub.ListComponents, request, "components")
 
     def get_component(self, component: str, runner: str = "") -> graph_pb2.ComponentInfo:
-        """Return one component with the values of its ports and parameters."""
+        """Return a component with the values of its ports and parameters."""
         request = control_pb2.GetComponentRequest(runner=runner, component=component)
         return self._ask(self._stub.GetComponent, request).component  # type: ignore[no-any-return]
 
     def get_order(self, runner: str = "") -> list[str]:
-        """Return the full names of the components in order of the schedule."""
+        """Return the full names of the components in schedule order."""
         request = control_pb2.GetOrderRequest(runner=runner)
         return self._pages(self._stub.GetOrder, request, "components")
 
     def list_connections(self, runner: str = "") -> list[graph_pb2.Connection]:
-        """Return all connections by name."""
+        """Return all connections, sorted by name."""
         request = control_pb2.ListConnectionsRequest(runner=runner)
         return self._pages(self._stub.ListConnections, request, "connections")
 
     def list_types(self, package: str = "") -> control_pb2.ListTypesResponse:
-        """Return the component types of a package, or of all, and what does not load."""
+        """Return the component types of `package` or of all packages, and the load errors."""
         request = control_pb2.ListTypesRequest(package=package)
-        # Each library that rtcfd does not know yet is described in a process of its own.
+        # CHANGE_TIMEOUT_S: rtcfd starts a process for each library not described yet.
         found = control_pb2.ListTypesResponse()
         while True:
             response = self._ask(self._stub.ListTypes, request, CHANGE_TIMEOUT_S)
@@ -401,11 +402,10 @@ class Client(Incidents):
     def get_statistics(
         self, runner: str = "", buckets: bool = False, timeout_s: float = QUERY_TIMEOUT_S
     ) -> runner_pb2.RunnerStatistics:
-        """Return the figures of a runner's loop and of its components; with `buckets`, how often
-        the loop took how long, too."""
+        """Return the statistics of a loop and its components; with `buckets`, with histograms."""
         request = control_pb2.GetStatisticsRequest(runner=runner, buckets=buckets)
         return self._ask(self._stub.GetStatistics, request, timeout_s).statistics  # type: ignore[no-any-return]
 
     def reset_statistics(self, runner: str = "") -> None:
-        """Begin the figures anew."""
+        """Reset the statistics of a runner."""
         self._ask(self._stub.ResetStatistics, control_pb2.ResetStatisticsRequest(runner=runner))

@@ -1,4 +1,4 @@
-"""What has to be closed, as a context manager."""
+"""A base class of context managers with a close() method."""
 
 from abc import ABC, abstractmethod
 from types import TracebackType
@@ -6,11 +6,11 @@ from typing import Self
 
 
 class Closing(ABC):
-    """Closes itself at the end of a `with`, however that ends."""
+    """Calls close() at the end of a `with` statement, also after an exception."""
 
     @abstractmethod
     def close(self) -> None:
-        """Give back what it holds; a second time does nothing."""
+        """Release all resources; a second call does nothing."""
 
     def __enter__(self) -> Self:
         return self

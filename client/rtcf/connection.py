@@ -1,4 +1,4 @@
-"""A connection to rtcfd, and how its calls are made: patient at a crowded door, whole lists."""
+"""A connection to rtcfd: calls, their timeouts, retries and paging."""
 
 import os
 import time
@@ -14,22 +14,22 @@ from rtcf.v1 import control_pb2, control_pb2_grpc
 
 DEFAULT_SOCKET = "/run/rtcfd/control.sock"
 QUERY_TIMEOUT_S = 20.0
-# Above rtcfd's own limits, so that its better word arrives.
+# Above rtcfd's own timeouts, so that its more precise error arrives first.
 CHANGE_TIMEOUT_S = 120.0
-_CROWDED_S = 15.0  # for a place in the queue at the door
+_CROWDED_S = 15.0  # for a place in the listen queue of rtcfd's socket
 _RETRY_S = 0.05
 _LONGEST_PATH = 107  # unix(7)
 
 _OPTIONS = (
     ("grpc.max_receive_message_length", 64 * 1024 * 1024),
-    # A refusal travels as metadata, of which gRPC takes 8 KiB by default.
+    # rtcfd sends error details as metadata, which gRPC limits to 8 KiB by default.
     ("grpc.max_metadata_size", 1024 * 1024),
-    # A connection of its own: a shared one may belong to a rtcfd that has ended.
+    # A separate connection: a shared one may belong to an rtcfd that has ended.
     ("grpc.use_local_subchannel_pool", 1),
-    # After a restart of rtcfd a client is to be back soon, not in gRPC's 1 to 120 s.
+    # Reconnect soon after a restart of rtcfd, not after gRPC's 1 to 120 s.
     ("grpc.initial_reconnect_backoff_ms", 100),
-    # How long one attempt to connect may take: rtcfd may not be up yet when systemd takes the
-    # connection, or not have been scheduled on a busy machine.
+    # The timeout of one attempt to connect: systemd accepts connections before rtcfd has started,
+    # and a busy machine may schedule rtcfd late.
     ("grpc.min_reconnect_backoff_ms", 60_000),
     ("grpc.max_reconnect_backoff_ms", 1000),
 )
@@ -38,12 +38,12 @@ OnProgress = Callable[[str], None]
 
 
 def default_socket() -> str:
-    """Return $RTCF_SOCKET, or the system daemon's socket."""
+    """Return the path $RTCF_SOCKET, or the system daemon's socket."""
     return os.environ.get("RTCF_SOCKET") or DEFAULT_SOCKET
 
 
 class Connection(Closing):
-    """A connection to rtcfd, opened with the first call; thread-safe."""
+    """A connection to rtcfd, opened by the first call; thread-safe."""
 
     def __init__(self, socket: str | os.PathLike[str] | None = None) -> None:
         self.socket = os.path.abspath(socket if socket is not None else default_socket())
@@ -56,11 +56,11 @@ class Connection(Closing):
         self._stub: Any = control_pb2_grpc.ControlStub(self._channel)  # type: ignore[no-untyped-call]
 
     def close(self) -> None:
-        """End the connection."""
+        """Close the connection."""
         self._channel.close()
 
     def _pages(self, method: Any, request: Any, field: str) -> list[Any]:
-        """Return a whole list; one that changes between two pages is asked for again."""
+        """Return a whole list; start again if it changes between two pages."""
         found: list[Any] = []
         while True:
             try:
@@ -86,8 +86,10 @@ class Connection(Closing):
                     raise failures.from_grpc(error, self.socket) from None
 
     def _crowded(self, error: Any, until: float) -> bool:
-        """Tell whether to try again, after a moment: others were before us in the queue at the
-        door, for which gRPC does not wait."""
+        """Return whether to retry because the listen queue was full, after a short pause.
+
+        gRPC does not wait for a place in the queue.
+        """
         if time.monotonic() > until or not failures.is_crowded(error, self.socket):
             return False
         time.sleep(_RETRY_S)
@@ -114,7 +116,7 @@ class Connection(Closing):
         *,
         patient: bool = True,
     ) -> Any:
-        """Follow a long call; return its last message."""
+        """Make a call with progress messages; return its last message."""
         until = time.monotonic() + (_CROWDED_S if patient else 0.0)
         while True:
             try:
@@ -128,7 +130,8 @@ class Connection(Closing):
         method: Any, request: Any, on_progress: OnProgress | None, timeout_s: float | None
     ) -> Any:
         last: Any = None
-        # A rtcfd that was stopped may come to it after somebody has ended the loop elsewhere.
+        # With the time of the request, an rtcfd that was frozen can reject a request older than a
+        # stop at the executor.
         asked = (("rtcf-asked-ns", str(time.monotonic_ns())),)
         for last in method(request, timeout=timeout_s, metadata=asked):
             if on_progress is not None and last.WhichOneof("kind") == "progress":

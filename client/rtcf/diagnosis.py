@@ -1,7 +1,7 @@
-"""What stands between a machine and real time: read from /proc, /sys and /etc.
+"""Checks of a machine for real-time use, by /proc, /sys and /etc.
 
-Each check gives what was found, what it should be, and the command that mends
-it.  All reads go through a Host, whose root a test may choose.
+Each check returns the value found, the recommended value, and a command to change it.  All reads
+go through a Host with a configurable root.
 """
 
 import enum
@@ -14,61 +14,61 @@ from pathlib import Path
 
 
 class Grade(enum.IntEnum):
-    """How bad a finding is."""
+    """The severity of a finding."""
 
     GOOD = 0
-    UNKNOWN = 1  # it cannot be seen from here
-    WARNING = 2  # costs latency, or will under load
-    BAD = 3  # no real time with it
+    UNKNOWN = 1  # not visible to this process
+    WARNING = 2  # increases latency, at least under load
+    BAD = 3  # prevents real-time operation
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at."""
+    """The result of one check."""
 
     topic: str
     grade: Grade
     found: str
     wanted: str = ""
-    remedy: str = ""  # a command, or what to do; empty: nothing
+    remedy: str = ""  # a command or an advice; empty if none is needed
 
 
 class Host:
-    """The machine's files; `root` is where they are."""
+    """The files of the machine below `root`."""
 
     def __init__(self, root: Path = Path("/")) -> None:
         self.root = root
 
     def read(self, path: str) -> str | None:
-        """Return a file's text without the space around it, or None where it cannot be read."""
+        """Return the stripped text of a file; None if it is not readable."""
         try:
             return (self.root / path.lstrip("/")).read_text(errors="replace").strip()
         except OSError:
             return None
 
     def glob(self, pattern: str) -> list[Path]:
-        """Return the files of a pattern."""
+        """Return the files that match a pattern, sorted."""
         return sorted(self.root.glob(pattern.lstrip("/")))
 
 
 @dataclass(frozen=True)
 class Loop:
-    """The loop that the machine is judged for."""
+    """The loop for which the machine is checked."""
 
     cpu: int
     priority: int
-    pid: int = 0  # of its executor; 0: none runs, or we are not told
-    hidden: bool = False  # we are not told
+    pid: int = 0  # of its executor; 0: none runs, or unknown
+    hidden: bool = False  # rtcfd does not permit the caller to see the executor
     lock_memory: bool = True
 
 
 def diagnose(host: Host, loop: Loop) -> list[Finding]:
-    """Return all findings, in the order in which they are best mended."""
+    """Return all findings, in the recommended order of fixing them."""
     return [finding for check in _CHECKS for finding in check(host, loop)]
 
 
 def cpus(text: str) -> set[int]:
-    """Return the CPUs of a list as Linux writes it: "0-2,5"."""
+    """Return the CPUs of a Linux CPU list such as "0-2,5"."""
     found: set[int] = set()
     for part in filter(None, text.replace("\n", ",").split(",")):
         low, _, high = part.partition("-")
@@ -78,10 +78,10 @@ def cpus(text: str) -> set[int]:
 
 
 def cpu_of_next_loop(host: Host, pid: int, taken: Iterable[int] = ()) -> int | None:
-    """Return the CPU that a loop gets which may choose among those of a process: of those with
-    the fewest loops an isolated one, else the last.  As executors do (cpu_claim.cpp).
+    """Return the CPU that the next loop without a CPU setting gets, as in cpu_claim.cpp.
 
-    `taken`: the CPU of each loop of the daemon.
+    Among the allowed CPUs of process `pid`, those with the fewest loops are preferred, then
+    isolated ones, then the last one.  `taken` has the CPU of each loop of the daemon.
     """
     match = re.search(r"^Cpus_allowed_list:\s*(\S+)", host.read(f"/proc/{pid}/status") or "", re.M)
     if not match or not (allowed := cpus(match[1])):
@@ -103,7 +103,7 @@ def _kernel(host: Host, _: Loop) -> Iterator[Finding]:
         topic,
         Grade.BAD,
         model[0] if model else "no preemption",
-        "PREEMPT_RT: else latency has no bound",
+        "PREEMPT_RT: otherwise latency is unbounded",
         "apt install linux-image-rt-amd64, and boot it",
     )
 
@@ -120,8 +120,8 @@ def _throttling(host: Host, _: Loop) -> Iterator[Finding]:
         yield Finding(
             topic,
             Grade.WARNING,
-            f"loops stand still after {runtime} of {period} µs",
-            "off, if a loop with spin, or an overrun, may use a CPU for long",
+            f"real-time threads stop after {runtime} of {period} µs",
+            "off, if spinning or overruns can occupy a CPU for that long",
             "sysctl -w kernel.sched_rt_runtime_us=-1",
         )
 
@@ -144,8 +144,8 @@ def _group_scheduling(host: Host, loop: Loop) -> Iterator[Finding]:
     yield Finding(
         topic,
         Grade.BAD,
-        f"group {group} has no real-time run time: SCHED_FIFO is refused there",
-        "run time for rtcfd's group, or a kernel without it (Debian's)",
+        f"group {group} has no real-time run time: it cannot use SCHED_FIFO",
+        "run time for rtcfd's group, or a kernel without RT_GROUP_SCHED (Debian's)",
         f"echo 950000 > /sys/fs/cgroup/cpu{group}/cpu.rt_runtime_us",
     )
 
@@ -161,7 +161,7 @@ def _v1_cpu_group(host: Host, pid: int) -> str:
 def _rights(host: Host, loop: Loop) -> Iterator[Finding]:
     topic = "capabilities and limits"
     if loop.hidden:
-        yield Finding(topic, Grade.UNKNOWN, "rtcfd does not say which executor runs")
+        yield Finding(topic, Grade.UNKNOWN, "rtcfd does not report the executor")
         return
     if not loop.pid:
         yield Finding(topic, Grade.UNKNOWN, "no executor runs", "", "systemctl start rtcfd")
@@ -185,10 +185,10 @@ def _rights(host: Host, loop: Loop) -> Iterator[Finding]:
             Grade.BAD,
             f"executor {loop.pid} lacks {', '.join(missing)}",
             "both",
-            "run it by rtcfd.service, which gives them",
+            "use rtcfd.service, which grants both",
         )
     else:
-        yield Finding(topic, Grade.GOOD, "SCHED_FIFO and locked memory are allowed")
+        yield Finding(topic, Grade.GOOD, "SCHED_FIFO and locked memory are permitted")
 
 
 _CAP_IPC_LOCK, _CAP_SYS_NICE = 14, 23  # linux/capability.h
@@ -199,7 +199,7 @@ def _locked(host: Host, loop: Loop) -> Iterator[Finding]:
     status = host.read(f"/proc/{loop.pid}/status") if loop.pid else None
     found = re.search(r"^VmLck:\s*(\d+) kB", status or "", re.M)
     if loop.hidden:
-        yield Finding(topic, Grade.UNKNOWN, "rtcfd does not say which executor runs")
+        yield Finding(topic, Grade.UNKNOWN, "rtcfd does not report the executor")
     elif found is None:
         yield Finding(topic, Grade.UNKNOWN, "no executor runs")
     elif int(found[1]):
@@ -209,8 +209,8 @@ def _locked(host: Host, loop: Loop) -> Iterator[Finding]:
         yield Finding(
             topic,
             Grade.WARNING,
-            "nothing of the executor is locked (it is when its loop has started)",
-            "all of it: a page fault costs a cycle",
+            "the executor's memory is not locked (it is while its loop runs)",
+            "locked: a page fault delays a cycle",
             remedy or "rtcfctl start",
         )
 
@@ -228,12 +228,12 @@ def _governor(host: Host, loop: Loop) -> Iterator[Finding]:
             topic,
             Grade.WARNING,
             f"governor of CPU {loop.cpu} is {governor}",
-            "performance: a slow CPU makes a cycle long",
+            "performance: cycles take longer on a slow CPU",
             f"echo performance > {folder}/scaling_governor",
         )
 
 
-_DEEP_US = 20  # exit latency from which an idle state shows
+_DEEP_US = 20  # exit latency above which an idle state is reported
 
 
 def _idle_states(host: Host, loop: Loop) -> Iterator[Finding]:
@@ -248,14 +248,14 @@ def _idle_states(host: Host, loop: Loop) -> Iterator[Finding]:
     device = host.root / "dev/cpu_dma_latency"
     held = device.exists() and device.stat().st_mode & 0o060 == 0o060
     if not deep:
-        yield Finding(topic, Grade.GOOD, f"CPU {loop.cpu} has none that takes long to leave")
+        yield Finding(topic, Grade.GOOD, f"CPU {loop.cpu} has no deep idle states")
     elif held:
-        yield Finding(topic, Grade.GOOD, f"{', '.join(deep)}; loops that run keep the CPU awake")
+        yield Finding(topic, Grade.GOOD, f"{', '.join(deep)}; running loops keep the CPU awake")
     else:
         yield Finding(
             topic,
             Grade.WARNING,
-            f"CPU {loop.cpu} may go to {', '.join(deep)}, and loops may not keep it awake",
+            f"CPU {loop.cpu} can enter {', '.join(deep)}; loops are not permitted to prevent it",
             "/dev/cpu_dma_latency for group rtcf",
             "udevadm trigger /dev/cpu_dma_latency",
         )
@@ -268,16 +268,16 @@ def _isolation(host: Host, loop: Loop) -> Iterator[Finding]:
         if here:
             yield Finding(topic, Grade.GOOD, f"CPU {loop.cpu} is in {name} ({text})")
         elif len(cpus(host.read("/sys/devices/system/cpu/online") or "0")) < 2:
-            yield Finding(topic, Grade.GOOD, "there is one CPU only")
+            yield Finding(topic, Grade.GOOD, "the machine has only one CPU")
         else:
             option = "isolcpus=managed_irq,domain," if name == "isolated" else "nohz_full="
             yield Finding(
                 topic,
                 Grade.WARNING,
-                f"CPU {loop.cpu} is shared with all that runs"
+                f"CPU {loop.cpu} is shared with other processes"
                 if name == "isolated"
                 else f"CPU {loop.cpu} is interrupted by the scheduler's tick",
-                f"CPU {loop.cpu} for the loop alone",
+                f"CPU {loop.cpu} reserved for the loop",
                 f"add {option}{loop.cpu} to GRUB_CMDLINE_LINUX in /etc/default/grub; update-grub",
             )
 
@@ -290,23 +290,23 @@ def _interrupts(host: Host, loop: Loop) -> Iterator[Finding]:
         number = folder.name
         effective = host.read(f"/proc/irq/{number}/effective_affinity_list")
         text = effective or host.read(f"/proc/irq/{number}/smp_affinity_list") or ""
-        # One without a handler goes nowhere.
+        # Ignore interrupts without a handler.
         used = any(entry.is_dir() for entry in folder.iterdir())
         if used and loop.cpu in cpus(text):
             here.append(number)
     others = ",".join(str(cpu) for cpu in sorted(online - {loop.cpu}))
     if not here or not others:
-        found = "none" if not here else f"{len(here)}, and there is no other CPU"
+        found = "none" if not here else f"{len(here)}, but there is no other CPU"
         yield Finding(topic, Grade.GOOD, f"on CPU {loop.cpu}: {found}")
     else:
         yield Finding(
             topic,
             Grade.WARNING,
-            f"{len(here)} come to CPU {loop.cpu}: {', '.join(here[:8])}"
+            f"CPU {loop.cpu} handles {len(here)}: {', '.join(here[:8])}"
             + (" …" if len(here) > 8 else ""),
             "none on the loop's CPU",
-            f"add irqaffinity={others} to GRUB_CMDLINE_LINUX; now: for i in {' '.join(here)}; do "
-            f"echo {others} > /proc/irq/$i/smp_affinity_list; done",
+            f"add irqaffinity={others} to GRUB_CMDLINE_LINUX; until then: for i in "
+            f"{' '.join(here)}; do echo {others} > /proc/irq/$i/smp_affinity_list; done",
         )
 
 
@@ -323,7 +323,7 @@ def _competitors(host: Host, loop: Loop) -> Iterator[Finding]:
             continue
         if int(stat.parts[-4]) == loop.pid or _may_not_run(host, here, loop.cpu):
             continue
-        # The kernel's own, one on each CPU, which nobody can do without.
+        # Indispensable threads of the kernel, one on each CPU.
         if name.startswith(("migration/", "idle_inject/", "stopper/")):
             continue
         rivals.append(f"{name} ({rest[37]})")
@@ -335,7 +335,7 @@ def _competitors(host: Host, loop: Loop) -> Iterator[Finding]:
             Grade.WARNING,
             f"on CPU {loop.cpu} at {loop.priority} or above: {', '.join(sorted(set(rivals)))}",
             "none",
-            "give them another CPU (taskset), or the loop a higher --priority",
+            "move them to another CPU (taskset), or raise the loop's --priority",
         )
 
 
@@ -350,14 +350,14 @@ def _smt(host: Host, loop: Loop) -> Iterator[Finding]:
     text = host.read(f"/sys/devices/system/cpu/cpu{loop.cpu}/topology/thread_siblings_list")
     siblings = cpus(text or "") - {loop.cpu}
     if not siblings:
-        yield Finding(topic, Grade.GOOD, f"CPU {loop.cpu} has its core for itself")
+        yield Finding(topic, Grade.GOOD, f"CPU {loop.cpu} does not share its core")
         return
     others = ",".join(map(str, sorted(siblings)))
     yield Finding(
         topic,
         Grade.WARNING,
         f"CPU {loop.cpu} shares its core with CPU {others}",
-        "a core for itself",
+        "a separate core",
         f"echo 0 > /sys/devices/system/cpu/cpu{min(siblings)}/online",
     )
 
@@ -375,7 +375,7 @@ def _clock(host: Host, _: Loop) -> Iterator[Finding]:
             Grade.WARNING,
             f"{source}: reading the time is slow",
             "tsc",
-            "look for why in `dmesg | grep -i tsc`; the firmware may mend it",
+            "find the cause with `dmesg | grep -i tsc`; a firmware update can help",
         )
 
 
@@ -390,7 +390,7 @@ def _swap(host: Host, loop: Loop) -> Iterator[Finding]:
         yield Finding(
             topic,
             Grade.BAD,
-            f"{', '.join(areas)}, and the executor's memory is not to be locked",
+            f"{', '.join(areas)}, and memory locking is off for the executor",
             "locked memory, or no swap",
             "rtcfctl runner set --lock-memory; or swapoff -a",
         )
@@ -403,19 +403,19 @@ def _settings_of_memory(host: Host, _: Loop) -> Iterator[Finding]:
         yield Finding(
             "transparent huge pages",
             Grade.WARNING,
-            "always: memory is moved while loops run",
+            "always: the kernel moves memory while loops run",
             "madvise or never",
             "echo madvise > /sys/kernel/mm/transparent_hugepage/enabled",
         )
     else:
         yield Finding("transparent huge pages", Grade.GOOD, chosen[1] if chosen else "none")
     for name, topic, why in (
-        ("vm.compact_unevictable_allowed", "memory compaction", "locked pages are moved"),
-        ("kernel.numa_balancing", "NUMA balancing", "pages are unmapped to see who uses them"),
+        ("vm.compact_unevictable_allowed", "memory compaction", "the kernel moves locked pages"),
+        ("kernel.numa_balancing", "NUMA balancing", "the kernel unmaps pages to track accesses"),
     ):
         value = host.read("/proc/sys/" + name.replace(".", "/"))
         if value in (None, "0"):
-            yield Finding(topic, Grade.GOOD, "not there" if value is None else f"{name} = 0")
+            yield Finding(topic, Grade.GOOD, "not available" if value is None else f"{name} = 0")
         else:
             yield Finding(
                 topic,
@@ -448,7 +448,7 @@ def _journal(host: Host, _: Loop) -> Iterator[Finding]:
                 "journalctl --vacuum-size=100M",
             )
         return
-    yield Finding(topic, Grade.WARNING, "there is no journal", "one", "apt install systemd")
+    yield Finding(topic, Grade.WARNING, "no journal", "a journal", "apt install systemd")
 
 
 def _ros(host: Host, _: Loop) -> Iterator[Finding]:
@@ -458,7 +458,7 @@ def _ros(host: Host, _: Loop) -> Iterator[Finding]:
         yield Finding(
             topic,
             Grade.WARNING,
-            "/etc/hosts has no localhost: ROS nodes do not find each other",
+            "/etc/hosts has no localhost: ROS nodes cannot find each other",
             "127.0.0.1 localhost",
             "echo 127.0.0.1 localhost >> /etc/hosts",
         )
@@ -470,12 +470,12 @@ def _ros(host: Host, _: Loop) -> Iterator[Finding]:
         yield Finding(
             topic,
             Grade.WARNING,
-            f"the master is at {master[1] if master else ''}, and it is not told how to reach us",
+            f"the master at {master[1] if master else ''} does not know this machine's address",
             "ROS_IP or ROS_HOSTNAME",
             "echo ROS_IP=<this machine's address> >> /etc/default/rtcfd",
         )
     else:
-        yield Finding(topic, Grade.GOOD, f"master {master[1] if master else 'of each runner'}")
+        yield Finding(topic, Grade.GOOD, f"master: {master[1] if master else 'set by each runner'}")
 
 
 _CHECKS: tuple[Callable[[Host, Loop], Iterator[Finding]], ...] = (

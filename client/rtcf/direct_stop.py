@@ -1,7 +1,7 @@
-"""Stopping loops at their executors, without rtcfd: it may be dead, hung, or full of clients.
+"""Stops loops directly at their executors, when rtcfd is dead, hangs or has no free connection.
 
-Each executor has a socket for that in the folder `stop` beside rtcfd's own. It takes one line from
-whoever has the right `operate`: `echo stop | nc -U /run/rtcfd/stop/rt_runner` does the same.
+Each executor has a socket in the folder `stop` beside rtcfd's socket. It accepts one line from
+users with the right `operate`; `echo stop | nc -U /run/rtcfd/stop/rt_runner` does the same.
 """
 
 import contextlib
@@ -21,39 +21,38 @@ from rtcf.errors import DaemonUnreachableError, RefusedError
 from rtcf.failures import refused
 from rtcf.v1 import control_pb2
 
-PATIENCE_S = 0.5  # with rtcfd, until a loop's executor is asked instead
-TIMEOUT_S = 5.0  # above the executor's own for a component that does not return
-_VERDICT_S = 3.0  # for rtcfd to name the cause of an executor's death
+PATIENCE_S = 0.5  # for rtcfd to answer before the executor is asked directly
+TIMEOUT_S = 5.0  # longer than the executor's own timeout for a component that does not return
+_VERDICT_S = 3.0  # for rtcfd to report the cause of an executor's death
 _CREDENTIALS = struct.Struct("3i")  # struct ucred: pid, uid, gid
 
 
 @dataclass(frozen=True)
 class Stopped:
-    """What came of stopping one loop; `error` is None if it has ended."""
+    """The result of stopping one loop."""
 
     runner: str
-    error: RtcfError | None = None
-    notes: tuple[str, ...] = ()  # for the caller, a line each
-    died: bool = False  # ended with its executor, which died
+    error: RtcfError | None = None  # None: the loop has ended
+    notes: tuple[str, ...] = ()  # lines for the user
+    died: bool = False  # the executor died, and the loop with it
 
 
 def is_unsaved(note: str) -> bool:
-    """Tell whether a note says that a stop is not on disk."""
+    """Return whether a note reports that a stop was not saved on disk."""
     return note.startswith("not saved")
 
 
 def folders(socket: str) -> list[Path]:
-    """Return where the executors of the rtcfd that serves `socket` may have theirs."""
+    """Return the possible folders of the executors' sockets, for the rtcfd at `socket`."""
     path = Path(socket)
     return [path.with_name(path.name + ".d") / "stop", path.parent / "stop"]
 
 
 def stop(runner: str, socket: str) -> Stopped:
-    """Stop one loop; return when it has ended: in order, or with its executor's death.
+    """Stop one loop; return after its end, in order or by the death of its executor.
 
-    Raises RefusedError, also if a component does not return from its cycle,
-    and DaemonUnreachableError if there is no executor of that name, or the
-    caller may not reach it.
+    Raises RefusedError, also if a component does not return from its cycle, and
+    DaemonUnreachableError if the executor does not exist or the caller has no access to it.
     """
     problem: OSError | None = None
     for folder in folders(socket):
@@ -65,7 +64,7 @@ def stop(runner: str, socket: str) -> Stopped:
             problem = error
     why = f"{problem.strerror or problem}" if isinstance(problem, PermissionError) else ""
     raise DaemonUnreachableError(
-        f"no executor of runner {runner} can be stopped at {folders(socket)[-1]}", why
+        f"no executor of runner {runner} found in {folders(socket)[-1]}", why
     )
 
 
@@ -75,7 +74,10 @@ def where_rtcfd_does_not(
     socket: str,
     on_progress: Callable[[str], None] | None,
 ) -> control_pb2.ChangeResult:
-    """Ask rtcfd to stop a loop, by `ask`, and its executor if that does not answer in time."""
+    """Stop a loop by rtcfd, or directly at its executor if rtcfd does not answer in time.
+
+    `ask` calls rtcfd; its argument is called for each line of progress.
+    """
     answered = threading.Event()
     asked: Future[control_pb2.ChangeResult] = Future()
 
@@ -103,42 +105,41 @@ def where_rtcfd_does_not(
     try:
         stopped = stop(runner, socket)
     except DaemonUnreachableError:
-        return asked.result()  # what rtcfd says in the end
+        return asked.result()  # wait for rtcfd
     if stopped.died:
         return _after_a_death(asked)
-    told = f"the loop was stopped at its executor, as {problem}"
+    told = f"the loop was stopped at its executor, because {problem}"
     return control_pb2.ChangeResult(notes=[told, *stopped.notes])
 
 
 def _after_a_death(asked: "Future[control_pb2.ChangeResult]") -> control_pb2.ChangeResult:
-    """Return the result of a stop whose executor died: rtcfd knows the cause of death, if it
-    answers at all."""
+    """Return the result of a stop whose executor died, with the cause if rtcfd reports it."""
     why = "which died"
     try:
         return asked.result(_VERDICT_S)
     except (TimeoutError, DaemonUnreachableError):
         pass
     except RefusedError as error:
-        # rtcfd gave this answer before the death. A loop that did not become safe has not stopped,
-        # though.
+        # These errors were sent before the death and are obsolete. Errors of safe() are not: the
+        # loop has not ended safely.
         early = error.reason == "LOOP_STUCK" or error.code == "RESOURCE_EXHAUSTED"
         if not early or ".safe()" in str(error):
             raise
-        why = f"as {error}"
+        why = f"after an error of rtcfd: {error}"
     return control_pb2.ChangeResult(notes=[f"the loop has ended with its executor, {why}"])
 
 
 def _is_rtcfds_trouble(error: RtcfError) -> bool:
-    """Tell whether the loop's executor may do what rtcfd could not."""
+    """Return whether an error concerns rtcfd only, so that a direct stop is worth trying."""
     if isinstance(error, RefusedError):
         return error.code in ("RESOURCE_EXHAUSTED", "UNAVAILABLE")
     return True
 
 
 def stop_all(socket: str) -> list[Stopped]:
-    """Stop all loops at once; return what came of each, by runner.
+    """Stop all loops at once; return the results, sorted by runner.
 
-    Raises DaemonUnreachableError if there are folders, and none can be read.
+    Raises DaemonUnreachableError if none of the existing folders is readable.
     """
     runners: set[str] = set()
     problem: OSError | None = None
@@ -153,7 +154,7 @@ def stop_all(socket: str) -> list[Stopped]:
             problem = error
     if problem is not None and not read:
         raise DaemonUnreachableError(
-            f"cannot look for loops: {problem.filename}: {problem.strerror}"
+            f"cannot find the loops: {problem.filename}: {problem.strerror}"
         )
     names = sorted(runners)
     if not names:
@@ -166,7 +167,7 @@ def _stopped(runner: str, socket: str) -> Stopped:
     try:
         return stop(runner, socket)
     except RtcfError as error:
-        # One that has ended since has no loop any more.
+        # If the socket has disappeared, the executor and its loop have ended.
         gone = isinstance(error, DaemonUnreachableError) and not any(
             os.path.exists(folder / runner) for folder in folders(socket)
         )
@@ -174,16 +175,17 @@ def _stopped(runner: str, socket: str) -> Stopped:
 
 
 def _ask(path: Path, runner: str) -> Stopped:
-    """Say `stop` and take the answer; raises OSError or RefusedError."""
+    """Send `stop` and read the answer; raises OSError or RefusedError."""
     with sockets.socket(sockets.AF_UNIX, sockets.SOCK_STREAM) as connection:
-        # Not settimeout(): one that blocks in the kernel has its turn in a queue that is full.
+        # Not settimeout(): a non-blocking connect() fails if the listen queue is full, a blocking
+        # one waits in the kernel.
         limit = struct.pack("ll", int(TIMEOUT_S), 0)
         for option in (sockets.SO_SNDTIMEO, sockets.SO_RCVTIMEO):
             connection.setsockopt(sockets.SOL_SOCKET, option, limit)
         connection.connect(str(path))
         found = connection.getsockopt(sockets.SOL_SOCKET, sockets.SO_PEERCRED, _CREDENTIALS.size)
-        pid, _, _ = _CREDENTIALS.unpack(found)  # of the executor; 0: seen from a container
-        # Whoever may not is told so, and hung up on, before anything is read.
+        pid, _, _ = _CREDENTIALS.unpack(found)  # of the executor; 0 in another PID namespace
+        # Without the right, the executor answers and closes before it reads.
         with contextlib.suppress(BrokenPipeError, ConnectionResetError):
             connection.sendall(b"stop\n")
         answer = b""
@@ -207,16 +209,16 @@ def _ask(path: Path, runner: str) -> Stopped:
         raise refused(f"runner {runner}: {reason}", "PERMISSION_DENIED", "RIGHT_MISSING", about)
     if word == "late":
         raise refused(
-            f"runner {runner} is asked to stop, and {reason}", "UNAVAILABLE", "LOOP_STUCK", about
+            f"runner {runner} is stopping, but {reason}", "UNAVAILABLE", "LOOP_STUCK", about
         )
     if not hung_up and _state(pid) in ("T", "t"):
         problem = (
             f"the executor of runner {runner} (pid {pid}) is frozen, by a signal or a debugger: "
-            f"its loop stands still now, and goes on if somebody lets it; `rtcfctl runner restart "
-            f"{runner}` ends it, or `kill -KILL {pid}` where rtcfd does not answer"
+            f"its loop does not run now, but continues with the process; end it with `rtcfctl "
+            f"runner restart {runner}`, or with `kill -KILL {pid}` if rtcfd does not answer"
         )
     elif hung_up:
-        problem = f"the executor of runner {runner} (pid {pid}) hung up, and lives on"
+        problem = f"the executor of runner {runner} (pid {pid}) closed the connection but runs on"
     else:
         problem = (
             f"the executor of runner {runner} (pid {pid}) does not answer within {TIMEOUT_S:g} s"
@@ -225,7 +227,7 @@ def _ask(path: Path, runner: str) -> Stopped:
 
 
 def _wait_for_end(pid: int) -> bool:
-    """Wait for the end of a process that has closed its sockets; tell whether it came."""
+    """Return whether a process ends within TIMEOUT_S; false for pid 0 (unknown)."""
     if not pid:
         return False
     try:
@@ -241,7 +243,7 @@ def _wait_for_end(pid: int) -> bool:
 
 
 def _state(pid: int) -> str:
-    """Return the letter of a process's state, see proc(5); empty: there is none to be seen."""
+    """Return the letter of a process's state, see proc(5); empty if it is not visible."""
     try:
         text = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
     except OSError:

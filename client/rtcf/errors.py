@@ -1,4 +1,4 @@
-"""What can go wrong for a client, as exceptions."""
+"""The exceptions of the client library."""
 
 from collections.abc import Mapping
 
@@ -6,14 +6,14 @@ from rtcf_shared.errors import RtcfError as RtcfError
 
 
 class RefusedError(RtcfError):
-    """rtcfd refused the request; nothing has changed.
+    """rtcfd rejected the request; nothing has changed.
 
-    Each reason has a class of its own in rtcf.refusals, by the name of the reason:
-    RUNNER_NOT_FOUND is RunnerNotFoundError.
+    Each reason has a subclass in rtcf.refusals, named by the reason: RunnerNotFoundError for
+    RUNNER_NOT_FOUND.
 
-    reason   name of rtcf.v1.Reason without REASON_; empty: rtcfd gave none
+    reason   name in rtcf.v1.Reason without REASON_; empty if rtcfd sent none
     code     name of the gRPC status, e.g. "NOT_FOUND"
-    about    what it is about, e.g. {"runner": "arm", "suggestion": "arm_1"}
+    about    names in the error, e.g. {"runner": "arm", "suggestion": "arm_1"}
     """
 
     def __init__(
@@ -26,9 +26,10 @@ class RefusedError(RtcfError):
 
 
 class DaemonUnreachableError(RtcfError):
-    """rtcfd does not run, does not answer, or may not be asked.
+    """rtcfd does not run, does not answer, or denies access to its socket.
 
-    `what` is the message without how to mend it; `denied`: its socket is not ours to use.
+    what     the message without the remedy
+    denied   whether the caller has no access to the socket
     """
 
     def __init__(self, what: str, remedy: str = "", *, denied: bool = False) -> None:

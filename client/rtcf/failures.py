@@ -1,4 +1,4 @@
-"""The one place where gRPC's errors become exceptions of ours."""
+"""The mapping of gRPC errors to exceptions of this library."""
 
 import errno
 import os
@@ -9,7 +9,7 @@ from typing import Any
 
 from rtcf.errors import DaemonUnreachableError, RefusedError, RtcfError
 
-# In the metadata of rtcfd's own refusals; gRPC's word on a lost connection lacks it.
+# Metadata of errors from rtcfd; errors of gRPC itself, e.g. a lost connection, lack it.
 _DETAILS_KEY = "grpc-status-details-bin"
 _INFO_TYPE = "type.googleapis.com/google.rpc.ErrorInfo"
 _DOMAIN = "rtcf"
@@ -19,14 +19,14 @@ _PROBE_TIMEOUT_S = 1.0
 def refused(
     message: str, code: str, reason: str, about: Mapping[str, str] | None = None
 ) -> RefusedError:
-    """Return the exception of a reason."""
+    """Return the RefusedError for a reason; see RefusedError for the arguments."""
     from rtcf import refusals
 
     return refusals.BY_REASON.get(reason, RefusedError)(message, code, reason, about)
 
 
 def from_grpc(error: Any, socket: str) -> RtcfError:
-    """Return what a grpc.RpcError of a call through `socket` means."""
+    """Return the exception for a grpc.RpcError of a call through `socket`."""
     code = error.code().name
     text = error.details() or code
     if details := _details(error):
@@ -37,7 +37,7 @@ def from_grpc(error: Any, socket: str) -> RtcfError:
         return DaemonUnreachableError(f"rtcfd at {socket} does not answer in time")
     if code == "UNIMPLEMENTED":
         return RtcfError(f"rtcfd at {socket} is older than this client: {text}")
-    if code == "RESOURCE_EXHAUSTED":  # gRPC's only one
+    if code == "RESOURCE_EXHAUSTED":  # without details from rtcfd: gRPC's size limit
         return RtcfError(
             "the request is larger than rtcfd accepts: send less at a time, or raise message_kb "
             f"under [limits] in its settings ({text})"
@@ -46,7 +46,7 @@ def from_grpc(error: Any, socket: str) -> RtcfError:
 
 
 def _details(error: Any) -> bytes:
-    """Return rtcfd's own word on an error; empty: it is gRPC's."""
+    """Return rtcfd's details of an error; empty if the error is from gRPC."""
     for key, value in error.trailing_metadata() or ():
         if key == _DETAILS_KEY:
             return bytes(value)
@@ -70,19 +70,19 @@ def _from_details(text: str, code: str, details: bytes) -> RefusedError:
 
 
 def is_crowded(error: Any, socket: str) -> bool:
-    """Tell whether a call did not get through as the queue at the door is full."""
+    """Return whether a call failed because the listen queue of rtcfd's socket is full."""
     if error.code().name != "UNAVAILABLE" or _details(error):
         return False
     if "failed to connect" not in (error.details() or ""):
         return False
-    # What gRPC makes of a full queue is an invalid argument. Somebody listens there, though.
+    # gRPC does not report EAGAIN as such: check that a server listens.
     with sockets.socket(sockets.AF_UNIX, sockets.SOCK_STREAM) as probe:
         probe.setblocking(False)
         return probe.connect_ex(socket) in (0, errno.EAGAIN)
 
 
 def _unreachable(socket: str, text: str) -> DaemonUnreachableError:
-    """Say why, by trying once more by hand: gRPC's own words do not help people."""
+    """Return the cause by another attempt to connect; gRPC's message does not name it."""
     try:
         with sockets.socket(sockets.AF_UNIX, sockets.SOCK_STREAM) as probe:
             probe.settimeout(_PROBE_TIMEOUT_S)
@@ -114,7 +114,7 @@ def _user() -> str:
 
 
 def _who_may(socket: str) -> str:
-    """Say how to be let in, but for ways that give more than that."""
+    """Return how to get access to a socket, or why not; never suggest the group root."""
     import grp
     import pwd
 
@@ -125,5 +125,5 @@ def _who_may(socket: str) -> str:
             return f"join its group (`sudo adduser {_user()} {group}`) and log in again"
         owner = pwd.getpwuid(found.st_uid).pw_name
     except (KeyError, OSError):
-        return "its owner keeps it to himself"
-    return f"it is the own rtcfd of user {owner}"
+        return "only its owner has access"
+    return f"it belongs to the private rtcfd of user {owner}"

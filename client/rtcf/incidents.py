@@ -1,4 +1,4 @@
-"""The calls of a client about incidents: files with the last cycles before faults."""
+"""Calls about incidents: files with the last cycles before a fault."""
 
 from collections.abc import Iterable
 from typing import IO
@@ -13,21 +13,20 @@ from rtcf.v1 import incidents_pb2
 
 
 class Incidents(Watching):
-    """What of a Client looks at, keeps and removes them."""
+    """The part of Client that lists, takes, reads and removes incidents."""
 
     def list_incidents(self, runner: str = "") -> list[incidents_pb2.Incident]:
-        """Return the files with the last cycles before faults, in the order in which they were
-        kept; of all runners without one."""
+        """Return the incidents of `runner` or of all runners, oldest first."""
         request = incidents_pb2.ListIncidentsRequest(runner=runner)
         return self._pages(self._stub.ListIncidents, request, "incidents")
 
     def take_incident(self, runner: str = "", reason: str = "") -> incidents_pb2.Incident:
-        """Keep the last cycles now."""
+        """Save the last cycles of a runner as an incident."""
         request = incidents_pb2.TakeIncidentRequest(runner=runner, reason=reason)
         return self._ask(self._stub.TakeIncident, request, CHANGE_TIMEOUT_S).incident  # type: ignore[no-any-return]
 
     def get_incident(self, to: IO[bytes], name: str = "") -> incidents_pb2.Incident:
-        """Write the file of an incident, or of the newest, to an open file."""
+        """Write the content of an incident, by default the newest, to the open file `to`."""
         request = incidents_pb2.ReadIncidentRequest(name=name)
         incident = incidents_pb2.Incident()
         try:
@@ -40,6 +39,6 @@ class Incidents(Watching):
         return incident
 
     def remove_incidents(self, names: Iterable[str]) -> list[incidents_pb2.Incident]:
-        """Remove files of incidents, all of them or none; return what is gone."""
+        """Remove incidents, all of them or none; return the removed ones."""
         request = incidents_pb2.DeleteIncidentsRequest(names=several("names", names))
         return list(self._ask(self._stub.DeleteIncidents, request).incidents)

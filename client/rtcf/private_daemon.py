@@ -1,7 +1,7 @@
-"""A rtcfd of one's own: for the life of a launch or of a command, on a plain user's account.
+"""A private rtcfd for one launch or command, under an ordinary user account.
 
-It lives in a folder that only its user may enter, loads components from that
-user's folders, keeps no state, and ends with who started it, however that ends.
+Its folder is accessible only to its user.  It loads components from that user's folders, keeps no
+state, and ends with the process that started it, even if that process is killed.
 """
 
 import contextlib
@@ -18,7 +18,7 @@ from typing import IO
 
 from rtcf.errors import RtcfError
 
-# Where builds put libraries of components, seen from the folder of a package or a workspace.
+# Folders of component libraries below a package or a workspace.
 BUILT = ("build/lib/rtcf", "devel/lib/rtcf-components", "lib/rtcf")
 _START_S = 30.0
 _END_S = 3.5
@@ -28,13 +28,15 @@ _CREDENTIALS = struct.Struct("3i")  # struct ucred: pid, uid, gid
 
 
 def program(build_tree: Path | None) -> Path:
-    """Return the rtcfd of the build tree, or the one that is installed."""
+    """Return the path of the rtcfd of a build tree, or of the installed one."""
     return Path("/usr/bin/rtcfd") if build_tree is None else build_tree / "bin" / "rtcfd"
 
 
 def component_folders(given: Sequence[Path] = ()) -> list[Path]:
-    """Return the folders given, or those that a build has made here.  ValueError: there is none
-    of that name."""
+    """Return `given` as absolute paths, by default the build folders below the current folder.
+
+    Raises ValueError if one of `given` is not a folder.
+    """
     for path in given:
         if not path.is_dir():
             raise ValueError(f"{path}: no such folder")
@@ -48,7 +50,7 @@ def _sleep(seconds: float) -> bool:
 
 
 class PrivateDaemon:
-    """The process and its folder."""
+    """The process of a private rtcfd, and its folder."""
 
     def __init__(
         self,
@@ -57,11 +59,14 @@ class PrivateDaemon:
         options: Sequence[str] = (),
         socket: Path | None = None,
     ) -> None:
-        """Make the folder.  Without `log_file` it logs to our standard error; `socket`: elsewhere
-        than in the folder."""
+        """Create the folder.
+
+        Without `log_file`, rtcfd logs to this process's standard error.  `socket` is by default in
+        the folder.  `options` are further options of rtcfd.
+        """
         self._program = program
         self._options = options
-        # Of XDG_RUNTIME_DIR it is certain that no other user enters it; mkdtemp sees to the rest.
+        # Other users cannot access XDG_RUNTIME_DIR, nor a folder of mkdtemp.
         runtime = os.environ.get("XDG_RUNTIME_DIR")
         parent = runtime if runtime and os.access(runtime, os.W_OK) else None
         self._folder = Path(tempfile.mkdtemp(prefix="rtcf-", dir=parent))
@@ -70,10 +75,10 @@ class PrivateDaemon:
         self._process: subprocess.Popen[bytes] | None = None
 
     def start(self, pause: Callable[[float], bool] = _sleep) -> bool:
-        """Start it and wait until it serves; return whether it does.
+        """Start rtcfd and wait until it listens; return whether it does.
 
-        `pause` waits for some seconds, and returns true if we are asked to end.  Raises RtcfError,
-        also where another daemon serves the socket, which is left alone.
+        `pause` waits for some seconds and returns true to cancel.  Raises RtcfError, also if
+        another daemon listens on the socket; that daemon is not affected.
         """
         if not os.access(self._program, os.X_OK):
             raise RtcfError(f"no rtcfd at {self._program}: install it (apt install rtcfd)")
@@ -84,11 +89,11 @@ class PrivateDaemon:
                     *(str(self._program), "--foreground", "--end-with-stdin"),
                     *("--no-default-runner", "--socket", str(self.socket), *self._options),
                 ],
-                # It ends when this pipe does: with us.
+                # rtcfd ends at the end of this pipe, thus with this process.
                 stdin=subprocess.PIPE,
                 stdout=log,
                 stderr=log,
-                # Ctrl-C is for us; we end it in order.
+                # Ctrl-C reaches only this process, which then ends rtcfd in order.
                 start_new_session=True,
             )
         deadline = time.monotonic() + _START_S
@@ -96,30 +101,32 @@ class PrivateDaemon:
             if self.ended:
                 raise RtcfError(f"rtcfd did not start: {self.last_words()}")
             if time.monotonic() > deadline:
-                raise RtcfError(f"rtcfd does not serve {self.socket}")
+                raise RtcfError(f"rtcfd does not listen on {self.socket}")
             if pause(_POLL_S):
                 return False
         return True
 
     def _check_owner(self) -> None:
-        """Refuse the socket of another user, without connecting to it."""
+        """Raise RtcfError if another user owns the socket, without connecting to it."""
         try:
             owner = self.socket.lstat().st_uid
         except OSError:
-            return  # there is none, or rtcfd says why it cannot be made
+            return  # rtcfd creates it, or reports why it cannot
         if owner != os.geteuid():
             raise RtcfError(
                 f"{self.socket} belongs to another user (uid {owner}): choose another --socket"
             )
 
     def _listens(self) -> bool:
-        """Tell whether the process that we started listens.  Another daemon at its socket is asked
-        nothing: ours ends because of it, and says so."""
-        # The file is there a moment before anybody listens.
+        """Return whether the started process listens, and not another daemon.
+
+        If another daemon listens, the started process ends with an error.
+        """
+        # The socket exists slightly before rtcfd listens.
         with socket.socket(socket.AF_UNIX) as probe, contextlib.suppress(OSError):
             probe.connect(str(self.socket))
             found = probe.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
-            listener, _, _ = _CREDENTIALS.unpack(found)  # of the caller of listen(2), see unix(7)
+            listener, _, _ = _CREDENTIALS.unpack(found)  # the caller of listen(2), see unix(7)
             return self._process is not None and listener == self._process.pid
         return False
 
@@ -134,30 +141,30 @@ class PrivateDaemon:
 
     @property
     def ended(self) -> bool:
-        """Tell whether it runs no more."""
+        """Whether the process has ended, or was not started."""
         return self._process is None or self._process.poll() is not None
 
     def last_words(self) -> str:
-        """Return the end of its log."""
+        """Return the last lines of its log, for an error message."""
         if self.log_file is None:
-            return "its log says why"
+            return "see its log"
         with contextlib.suppress(OSError):
             lines = self.log_file.read_text(errors="replace").splitlines()
             return "; ".join(lines[-_TAIL:])
         return "it has no log"
 
     def end(self) -> None:
-        """End it, by force if it must be; remove its folder."""
+        """End the process, by SIGKILL after a timeout, and remove its folder."""
         process = self._process
         if process is not None:
-            # By its input alone: a signal would end one that has just begun without its own
-            # cleaning up, and who waits for it here may be killed.
+            # Not by a signal, which would end a starting rtcfd without its clean-up. Closing the
+            # pipe also works if this process is killed while it waits.
             if process.stdin is not None:
                 process.stdin.close()
             try:
                 process.wait(_END_S)
             except subprocess.TimeoutExpired:
-                # Its executors follow: they stop without a rtcfd.
+                # Its executors stop, too, without rtcfd.
                 process.kill()
                 process.wait()
         shutil.rmtree(self._folder, ignore_errors=True)

@@ -1,65 +1,66 @@
-"""The refusals of rtcfd as exceptions, one for each reason of rtcf.v1.Reason.
+"""The errors of rtcfd as exceptions, one for each reason of rtcf.v1.Reason.
 
-Each is a RefusedError, whose attributes say what it is about.  Imported with the first refusal.
+Each is a RefusedError; its attribute `about` has the names that the docstrings quote as `name`.
+This module is imported with the first error, to keep other commands fast.
 """
 
 from rtcf.errors import RefusedError
 
 
 class RequestMalformedError(RefusedError):
-    """No message of the type that belongs there, or not in its turn."""
+    """The request has the wrong type, or was sent in the wrong order."""
 
 
 class NameMissingError(RefusedError):
-    """Something has to be named and is not: see `field`."""
+    """A required name is missing: see `field`."""
 
 
 class NameInvalidError(RefusedError):
-    """No legal name."""
+    """A name is invalid."""
 
 
 class TextTooLongError(RefusedError):
-    """A name or a text: see `field`."""
+    """A name or a text is too long: see `field`."""
 
 
 class ValueInvalidError(RefusedError):
-    """Out of its range, or of the wrong type: see `parameter` or `setting`."""
+    """A value is out of range or of the wrong type: see `parameter` or `setting`."""
 
 
 class ExpressionInvalidError(RefusedError):
-    """No regular expression, or one that takes too long."""
+    """A regular expression is invalid, or its evaluation takes too long."""
 
 
 class ComponentTwiceError(RefusedError):
-    """One name stands twice in a graph."""
+    """A graph has two components of the same name."""
 
 
 class RatesConflictError(RefusedError):
-    """Two components run in every n-th and m-th cycle, and neither divides the other."""
+    """Two components run every n-th and m-th cycle, but neither n nor m divides the other."""
 
 
 class RecordingInvalidError(RefusedError):
-    """Messages of a replay do not fit their readers, or are out of order."""
+    """Messages of a replay do not match the types of their readers, or are out of order."""
 
 
 class SettingsFileInvalidError(RefusedError):
-    """Rtcfd's settings file."""
+    """The settings file of rtcfd is invalid."""
 
 
 class PageTokenInvalidError(RefusedError):
-    """Not of this list."""
+    """The page token does not belong to this list."""
 
 
 class RunnerNotFoundError(RefusedError):
-    """There is no such runner."""
+    """The runner does not exist."""
 
 
 class ComponentNotFoundError(RefusedError):
-    """Not in the runner."""
+    """The runner has no such component."""
 
 
 class ComponentNotLeftOutError(RefusedError):
-    """It is in the loop, and needs no release."""
+    """The component is in the loop and needs no release."""
 
 
 class PortNotFoundError(RefusedError):
@@ -71,135 +72,135 @@ class ParameterNotFoundError(RefusedError):
 
 
 class PackageNotFoundError(RefusedError):
-    """No folder of components has it."""
+    """No component folder has the package."""
 
 
 class TypeNotFoundError(RefusedError):
-    """In its package."""
+    """The package has no such type."""
 
 
 class LeaseNotFoundError(RefusedError):
-    """The component is kept for its holder no more."""
+    """The lease of the component has expired."""
 
 
 class IncidentNotFoundError(RefusedError):
-    """Of none that is kept."""
+    """The incident does not exist."""
 
 
 class HoldNotFoundError(RefusedError):
-    """The runner is kept for its holder no more."""
+    """The lease of the runner has expired."""
 
 
 class RunnerExistsError(RefusedError):
-    """A runner of that name is there already."""
+    """A runner of that name already exists."""
 
 
 class ComponentExistsError(RefusedError):
-    """A component of that name is there already."""
+    """A component of that name already exists."""
 
 
 class TypesDifferError(RefusedError):
-    """Two ports of one name carry different types."""
+    """Two ports of the same name have different types."""
 
 
 class ConnectionsFormLoopError(RefusedError):
-    """Without a loop break."""
+    """The connections form a cycle without a loop break."""
 
 
 class TwoWritersError(RefusedError):
-    """Of one connection."""
+    """Two outputs write to the same connection."""
 
 
 class TwoPacersError(RefusedError):
-    """Two components that pace the loop."""
+    """Two components of the graph pace the loop."""
 
 
 class LibraryRefusedError(RefusedError):
-    """It cannot be loaded, or is not trusted."""
+    """A library cannot be loaded, or is not trusted."""
 
 
 class HookFailedError(RefusedError):
-    """Of a component, e.g. configure()."""
+    """A hook of a component failed, e.g. configure()."""
 
 
 class NoMasterError(RefusedError):
-    """A hook needs a ROS master, and none answers."""
+    """A hook needs a ROS master, but none answers."""
 
 
 class NoRealtimeError(RefusedError):
-    """The machine gives no real-time thread."""
+    """The machine does not permit a real-time thread."""
 
 
 class NoStateError(RefusedError):
-    """The component declares none."""
+    """The component declares no state."""
 
 
 class LoopRunsError(RefusedError):
-    """And would have to be stopped."""
+    """The loop must be stopped first."""
 
 
 class LoopFailedError(RefusedError):
-    """It ended by a fault while this was under way."""
+    """The loop ended by a fault during the call."""
 
 
 class LoopStoppedError(RefusedError):
-    """A stop came after this was asked for."""
+    """The loop was stopped after this call was made."""
 
 
 class ReplayRunsError(RefusedError):
-    """Nothing else can be done meanwhile."""
+    """The loop is busy with a replay."""
 
 
 class NoReplayError(RefusedError):
-    """None is under way."""
+    """No replay is running."""
 
 
 class RunnerHeldError(RefusedError):
-    """By somebody else: see `holder`."""
+    """Another client holds the runner: see `holder`."""
 
 
 class RunnerNotEmptyError(RefusedError):
-    """It has components of its own."""
+    """The runner has components that are not leased."""
 
 
 class HolderGoneError(RefusedError):
-    """The runner is not held any more by whom the request names."""
+    """The client named in the request no longer holds the runner."""
 
 
 class ParameterTooFastError(RefusedError):
-    """It may change by so much a second only."""
+    """The change exceeds the permitted rate of change of the parameter."""
 
 
 class NothingToUndoError(RefusedError):
-    """No change of the parameter is known, or it was changed otherwise since."""
+    """The history has no change to undo, or the value was changed by other means since."""
 
 
 class ExecutorFailedError(RefusedError):
-    """The executor does not start."""
+    """The executor failed to start."""
 
 
 class ExecutorForeignError(RefusedError):
-    """The executor is of a version that this rtcfd does not work with."""
+    """The version of the executor is incompatible with rtcfd."""
 
 
 class ComponentLeftOutError(RefusedError):
-    """The loop would run without it, and the request does not say that it may."""
+    """The loop would run without a left-out component, and the request does not permit it."""
 
 
 class ComponentRefusedError(RefusedError):
-    """For another reason, which the line tells."""
+    """The component was rejected; the message has the reason."""
 
 
 class ListChangedError(RefusedError):
-    """Between two pages: begin with the first one again."""
+    """The list changed between two pages: start again with the first page."""
 
 
 class ExecutorDownError(RefusedError):
-    """The runner has no executor now."""
+    """The runner has no executor at present."""
 
 
 class ExecutorSilentError(RefusedError):
-    """It does not answer, or its connection was lost."""
+    """The executor does not answer, or its connection was lost."""
 
 
 class LoopStuckError(RefusedError):
@@ -207,7 +208,7 @@ class LoopStuckError(RefusedError):
 
 
 class BusyError(RefusedError):
-    """What was asked for has not begun, or is not done, in time."""
+    """The operation did not begin or end in time."""
 
 
 class RunnerEndingError(RefusedError):
@@ -215,11 +216,11 @@ class RunnerEndingError(RefusedError):
 
 
 class DaemonEndingError(RefusedError):
-    """Rtcfd is being ended or restarted."""
+    """rtcfd is being stopped or restarted."""
 
 
 class CallerGoneError(RefusedError):
-    """Whom this was for has left."""
+    """The client of this operation has disconnected."""
 
 
 class MachineSilentError(RefusedError):
@@ -227,38 +228,38 @@ class MachineSilentError(RefusedError):
 
 
 class RightMissingError(RefusedError):
-    """See `right`."""
+    """The caller lacks a right: see `right`."""
 
 
 class ParameterForbiddenError(RefusedError):
-    """The caller may set others only."""
+    """The caller has no permission to set this parameter."""
 
 
 class LimitReachedError(RefusedError):
-    """Of [limits] in rtcfd's settings: see `limit`."""
+    """A limit in [limits] of rtcfd's settings is reached: see `limit`."""
 
 
 class RequestTooLargeError(RefusedError):
-    """More bytes than this call takes."""
+    """The request has more bytes than the call permits."""
 
 
 class TooManyClientsError(RefusedError):
-    """Connections, of all or of one user."""
+    """Too many connections, in total or of one user."""
 
 
 class TooManyCallsError(RefusedError):
-    """Of one user at a time."""
+    """Too many simultaneous calls of one user."""
 
 
 class StateTooLargeError(RefusedError):
-    """Of declared state, for one boundary."""
+    """The declared state is too large for one cycle boundary."""
 
 
 class InternalError(RefusedError):
-    """A fault of rtcfd, whose log has more."""
+    """An internal error of rtcfd: see its log."""
 
 
-# By reason; a newer rtcfd may know others, which are RefusedError itself.
+# Reasons of a newer rtcfd that are missing here raise RefusedError.
 BY_REASON: dict[str, type[RefusedError]] = {
     "REQUEST_MALFORMED": RequestMalformedError,
     "NAME_MISSING": NameMissingError,

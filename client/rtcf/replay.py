@@ -1,8 +1,7 @@
-"""Replays of recordings: the messages of a bag through a loop, on the time at which they were
-recorded, as fast as its cycles go.
+"""Replay of bags: feeds recorded messages to a loop by their time stamps, as fast as possible.
 
-Each message is read by the first cycle whose time is not before its own. The loop's mapped
-outputs can be written to another bag; the same bag gives the same outputs, bit by bit.
+The first cycle at or after the time of a message reads it. The loop's mapped outputs can be
+written to another bag. The same bag always results in bit-identical outputs.
 """
 
 import contextlib
@@ -19,7 +18,7 @@ from rtcf.recording.reader import RecordingError
 from rtcf.replay_call import ReplayCall
 from rtcf.v1 import control_pb2
 
-# Of one request; far below what a frame takes.
+# Of one request; far below the maximum size of a message.
 _MAX_MESSAGES = 2000
 _MAX_BYTES = 2 * 1024 * 1024
 
@@ -28,15 +27,15 @@ OnProgress = Callable[[str], None]
 
 @dataclass
 class Summary:
-    """What came of a replay; times in ns since 1970."""
+    """The result of a replay; times in ns since 1970."""
 
     start_ns: int = 0
     end_ns: int = 0
     cycles: int = 0
-    injected: int = 0  # messages given to the loop
-    outputs: int = 0  # messages it wrote
+    injected: int = 0  # messages fed to the loop
+    outputs: int = 0  # messages written by the loop
     unread: list[str] = field(default_factory=list)  # topics of the bag that no component reads
-    missing: list[str] = field(default_factory=list)  # topics components read, not in the bag
+    missing: list[str] = field(default_factory=list)  # topics read by components, not in the bag
 
 
 def replay(
@@ -46,10 +45,13 @@ def replay(
     output: Path | None = None,
     on_progress: OnProgress | None = None,
 ) -> Summary:
-    """Run a bag through a stopped loop, whose components are made anew for it.
+    """Replay a bag in a stopped loop, with newly created components.
 
-    `output`: a bag to write, at the times of the cycles. Raises RefusedError,
-    and RecordingError for files.
+    recording    the bag to read
+    output       a bag for the outputs, stamped with the times of the cycles
+    on_progress  called from time to time with a line of progress
+
+    Raises RefusedError, and RecordingError for errors of the files.
     """
     if output is not None and output.resolve() == recording.resolve():
         raise RecordingError(f"{output} is the recording itself: write to another file")
@@ -61,7 +63,7 @@ def replay(
         messages = bag.read_messages(raw=True)
         first = next(messages, None)
         if first is None:
-            raise RecordingError(f"{recording} holds no message")
+            raise RecordingError(f"{recording} has no messages")
         start_ns = int(first.timestamp.to_nsec())
         begun = call.run(
             control_pb2.ReplayRequest(runner=runner, begin=True, start_ns=start_ns, topics=topics)
@@ -83,18 +85,18 @@ def replay(
 
 
 class _Session:
-    """A replay that is under way."""
+    """A running replay."""
 
     def __init__(self, call: ReplayCall, inputs: set[str]) -> None:
         self.inputs = inputs
         self.summary = Summary()
-        self.due = False  # cycles have just been run
+        self.due = False  # whether the last take() ran cycles
         self._call = call
         self._waiting: list[control_pb2.RecordedMessage] = []
         self._bytes = 0
 
     def take(self, message: Any, writer: "_Writer") -> None:
-        """Take the bag's next message; run cycles when there are enough."""
+        """Queue the bag's next message; run cycles if enough are queued."""
         self.due = False
         self.summary.end_ns = int(message.timestamp.to_nsec())
         if message.topic not in self.inputs:
@@ -119,7 +121,7 @@ class _Session:
 
 
 class _Writer:
-    """The bag of the outputs; none if nobody wants it."""
+    """The bag of the outputs; without a path, the outputs are discarded."""
 
     def __init__(self, path: Path | None, topics: Any) -> None:
         self._path = path
@@ -132,7 +134,7 @@ class _Writer:
     def __enter__(self) -> "_Writer":
         if self._path is not None:
             with contextlib.ExitStack() as opening, self._said():
-                # Half a bag would take the place of a whole one.
+                # The file gets its name only when it is complete.
                 part = opening.enter_context(whole_file(self._path, force=True))
                 self._bag = opening.enter_context(bags.rosbag().Bag(str(part), "w"))
                 self._open = opening.pop_all()
@@ -168,10 +170,10 @@ def _reader(path: Path) -> Iterator[Any]:
         bag = rosbag.Bag(str(path))
     except rosbag.ROSBagUnindexedException:
         raise RecordingError(
-            f"{path} has no index, its recording was cut off: rosbag reindex {path}"
+            f"{path} has no index because its recording was interrupted: rosbag reindex {path}"
         ) from None
     except rosbag.ROSBagException as error:
-        raise RecordingError(f"{path} is no bag: {error}") from None
+        raise RecordingError(f"{path} is not a bag: {error}") from None
     except OSError as error:
         raise RecordingError(f"{path} cannot be read: {error.strerror or error}") from None
     with bag:

@@ -1,4 +1,4 @@
-"""A replay that is under way: one request, one answer, for as long as the call lasts."""
+"""The bidirectional call of a replay: one response for each request."""
 
 from collections.abc import Iterator
 from queue import SimpleQueue
@@ -12,7 +12,7 @@ from rtcf.v1 import control_pb2
 
 
 class ReplayCall(Closing):
-    """Made by Client.replay; used by one thread.  Closing it before its end ends the replay."""
+    """A call of Client.replay, used by one thread; closing it early ends the replay."""
 
     def __init__(self, method: Any, socket: str) -> None:
         self._socket = socket
@@ -20,7 +20,7 @@ class ReplayCall(Closing):
         self._call = method(iter(self._requests.get, None))
 
     def run(self, request: control_pb2.ReplayRequest) -> control_pb2.ReplayResponse:
-        """Run one piece of the recording; takes as long as its cycles take.
+        """Replay one part of the recording; return after its cycles, without a timeout.
 
         Raises RefusedError, which ends the replay, or DaemonUnreachableError.
         """
@@ -33,9 +33,10 @@ class ReplayCall(Closing):
     def cycles(
         self, messages: list[control_pb2.RecordedMessage], until_ns: int, end: bool = False
     ) -> Iterator[control_pb2.ReplayResponse]:
-        """Run all cycles up to a time; yield the answers, of which there may be several.
+        """Run all cycles up to `until_ns`; yield one or more responses.
 
-        `messages`, none after that time, are taken out as they are consumed.
+        No message may be later than `until_ns`.  Consumed ones are removed from `messages`.  `end`
+        ends the replay.
         """
         more = True
         while more:
@@ -47,6 +48,6 @@ class ReplayCall(Closing):
             more = response.more
 
     def close(self) -> None:
-        """End the call; one that was not ended by `end` is ended by rtcfd."""
+        """End the call; rtcfd then ends the replay if `end` has not."""
         self._requests.put(None)
         self._call.cancel()

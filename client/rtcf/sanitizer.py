@@ -1,4 +1,4 @@
-"""Reads the reports of RealtimeSanitizer: what was called, and from where."""
+"""A parser of RealtimeSanitizer's reports: the function called and its stack."""
 
 import re
 from collections.abc import Iterable, Iterator
@@ -13,16 +13,16 @@ _FILE_ONLY = re.compile(r"^(.*?) (?:/\S+\.\w+|\?\?:[?0])$")
 _MODULE = re.compile(r"^(.*?) \((\S+)\)(?: \(BuildId: .*\))?$")
 _BUILD_ID = re.compile(r" \(BuildId: [0-9a-f]*\)$")
 
-# The executor, and what of it calls the hooks of components.
+# Functions of the executor, and those of them that call the hooks of components.
 _EXECUTOR = "rtcf::executor::"
 _CALLERS = re.compile(r"\brtcf::executor::(Loop|Instance)::")
-# What a component's author did not write.
+# Sources that do not belong to the component's author.
 _LIBRARIES = ("/usr/include/", "/usr/lib/")
 
 
 @dataclass(frozen=True)
 class Frame:
-    """One frame of a stack; `file` and `line` where the library tells."""
+    """One frame of a stack; `file` and `line` are empty without debug information."""
 
     function: str
     file: str = ""
@@ -30,13 +30,13 @@ class Frame:
 
     @property
     def of_library(self) -> bool:
-        """Tell whether it is of the compiler's or another library."""
+        """Whether the function belongs to the compiler's or another library."""
         return self.file.startswith(_LIBRARIES)
 
 
 @dataclass
 class Violation:
-    """One report."""
+    """One report of the sanitizer."""
 
     kind: str  # e.g. "unsafe-library-call"
     called: str = ""  # e.g. "malloc"
@@ -44,13 +44,13 @@ class Violation:
 
     @property
     def component_frames(self) -> list[Frame]:
-        """From what the component called down to its update()."""
+        """The frames from the function called up to the component's hook, innermost first."""
         own = list(self.frames[1 : self._caller])  # the first is the sanitizer's own
         return own if any(_EXECUTOR not in frame.function for frame in own) else []
 
     @property
     def short_frames(self) -> list[Frame]:
-        """The same, without the inside of libraries: only what was called of them."""
+        """`component_frames` without the internals of libraries: only their entry functions."""
         frames = self.component_frames
         return [
             frame
@@ -60,12 +60,12 @@ class Violation:
 
     @property
     def of_executor(self) -> bool:
-        """Tell whether no component's code was running."""
+        """Whether no code of a component was running."""
         return not self.component_frames and self._caller != 1
 
     @property
     def _caller(self) -> int:
-        """Where the executor's frames below the hook begin."""
+        """The index of the executor's frame that called the hook."""
         for pattern in (_CALLERS, re.compile(re.escape(_EXECUTOR))):
             for index, frame in enumerate(self.frames):
                 if pattern.search(frame.function):
@@ -74,7 +74,7 @@ class Violation:
 
 
 def violations(lines: Iterable[str]) -> Iterator[Violation]:
-    """Yield the reports in an output."""
+    """Yield the reports in the lines of a sanitizer's output."""
     current: Violation | None = None
     for line in lines:
         if begin := _BEGIN.match(line):

@@ -1,7 +1,7 @@
-"""What a client holds for as long as it lives: a runner, or a component.
+"""A lease: a client's hold on a runner or a component that ends with its connection.
 
-Made by Client.hold_runner and Client.lease_component.  rtcfd takes the end of
-the connection for the death of its client; end() is the orderly way.
+Created by Client.hold_runner and Client.lease_component.  rtcfd treats a lost connection as the
+death of the client; end() ends the lease in order.
 """
 
 from collections.abc import Iterator
@@ -15,7 +15,7 @@ from rtcf.v1 import control_pb2
 
 
 class Tenancy:
-    """A call that lasts.  One thread iterates over its messages; any may call end()."""
+    """A lease.  One thread iterates over its messages; any thread may call end() and drop()."""
 
     def __init__(self, method: Any, request: Any, opening: Any, socket: str) -> None:
         self._request = request
@@ -27,8 +27,8 @@ class Tenancy:
     def __iter__(self) -> Iterator[Any]:
         """Yield rtcfd's messages; the last one is `ended`.
 
-        Raises RefusedError if it was not given, and DaemonUnreachableError if the
-        connection was lost: rtcfd keeps what was held for 10 s, see `attach`.
+        Raises RefusedError if the lease is not granted.  Raises DaemonUnreachableError if the
+        connection is lost; the lease then stays valid for 10 s, see `attach`.
         """
         try:
             yield from self._call
@@ -38,9 +38,9 @@ class Tenancy:
             self._requests.put(None)
 
     def end(self) -> None:
-        """Give back what is held; the messages end when that is done."""
+        """Request the end of the lease; the messages end after it."""
         self._requests.put(self._request(end=control_pb2.EndLease()))
 
     def drop(self) -> None:
-        """Leave without a word, as a client that dies does."""
+        """Close the connection without ending the lease, like a client that dies."""
         self._call.cancel()

@@ -1,6 +1,6 @@
-"""A process that runs a component, and is ended if it says nothing for too long.
+"""A process that runs a component and is killed after too long without output.
 
-Its standard output tells what it is about to do, its standard error what it finds.
+It writes each stage to standard output before the stage begins, and reports to standard error.
 """
 
 import subprocess
@@ -9,21 +9,21 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import IO
 
-# Of a hook or of some updates; what takes longer would stop a real loop.
+# For one hook or some updates; a longer one would stop a real loop.
 HANG_S = 10.0
-# A report is made within the cycle, and finding its source lines may take long.
+# Within a report: looking up its source lines can take long.
 _REPORT_S = 120.0
 _POLL_S = 0.05
 _BEGIN, _END = "==ERROR: RealtimeSanitizer: ", "SUMMARY: "
 
 
 class Watched:
-    """The process; owned by who waits for it."""
+    """The process; owned by the caller of wait()."""
 
     def __init__(self, command: Sequence[str], environment: Mapping[str, str]) -> None:
-        self.stage = ""  # what it is doing
-        self.errors: list[str] = []  # lines
-        self.hang = ""  # what did not return
+        self.stage = ""  # the present stage
+        self.errors: list[str] = []  # lines of standard error
+        self.hang = ""  # a message if the component did not return
         self._heard = time.monotonic()
         self._reporting = False
         self._process = subprocess.Popen(
@@ -42,9 +42,9 @@ class Watched:
         ]
 
     def wait(self, hang_s: float = HANG_S) -> int:
-        """Wait for its end; return its exit status, negative of a signal.
+        """Wait for the end of the process; return its exit status, negative for a signal.
 
-        It is ended after `hang_s` without a word.
+        The process is killed after `hang_s` without output.
         """
         for reader in self._readers:
             reader.start()
@@ -53,8 +53,8 @@ class Watched:
                 limit = _REPORT_S if self._reporting else hang_s
                 if time.monotonic() - self._heard > limit:
                     self.hang = (
-                        f"the component does not return: nothing for {limit:g} s while "
-                        f"{self.stage or 'it was loaded'}"
+                        f"the component does not return: no progress for {limit:g} s while "
+                        f"{self.stage or 'loading'}"
                     )
                     self._process.kill()
                     break

@@ -1,5 +1,5 @@
-"""An oscilloscope in the browser: one page, and streams relayed to it.
+"""An oscilloscope in the browser: one page and the streams relayed to it.
 
-`site` answers pages and questions, `tab` is one page's WebSocket, `hub` the one stream that all
-tabs of a runner share; `door` decides who comes in.
+`site` serves the page and the HTTP requests, `tab` handles the WebSocket of one page, `hub` reads
+the single stream that all tabs of a runner share, and `door` authenticates requests.
 """

@@ -1,4 +1,4 @@
-"""The service, by `python3 -m rtcf_scope`."""
+"""Run the service by `python3 -m rtcf_scope`."""
 
 import sys
 

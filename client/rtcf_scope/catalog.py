@@ -1,6 +1,6 @@
-"""What a runner is, for a page: state, signals, parameters, connections and figures, as JSON.
+"""Runners as JSON for a page: state, signals, parameters, connections and statistics.
 
-Everything here asks rtcfd and waits for it: not to be called in the event loop.
+Functions with a `client` block on calls to rtcfd: do not call them in the event loop.
 """
 
 import math
@@ -13,16 +13,16 @@ from rtcf_shared.enums import word
 
 from rtcf_scope.chunk import traces
 
-_RARELY = 1_000_000  # cycles: a stream that is opened for its schema
+_RARELY = 1_000_000  # cycles; decimation of a stream opened only for its schema
 
 
 def runners(client: rtcf.Client) -> list[dict[str, Any]]:
-    """Return all runners by name."""
+    """Return the status of all runners."""
     return [runner(each) for each in client.list_runners()]
 
 
 def runner(status: runner_pb2.RunnerStatus) -> dict[str, Any]:
-    """Return what there is to say of one."""
+    """Return the status of one runner."""
     return {
         "runner": status.runner,
         "state": word(runner_pb2.RunnerState.DESCRIPTOR, status.state),
@@ -38,7 +38,10 @@ def runner(status: runner_pb2.RunnerStatus) -> dict[str, Any]:
 
 
 def graph(client: rtcf.Client, name: str) -> dict[str, Any]:
-    """Return signals, components with their parameters, and connections."""
+    """Return the signals, the components with their parameters, and the connections of a runner.
+
+    Raises RtcfError.
+    """
     with client.watch_ports([], name, _RARELY) as stream:
         schema = stream.schema
     return {
@@ -50,7 +53,7 @@ def graph(client: rtcf.Client, name: str) -> dict[str, Any]:
 
 
 def component(info: graph_pb2.ComponentInfo) -> dict[str, Any]:
-    """Return a component; values of its ports and state where it was asked for alone."""
+    """Return a component; values of ports and state only from a query for this component."""
     return {
         "name": info.full_name,
         "type": f"{info.spec.package}/{info.spec.type}",
@@ -65,7 +68,7 @@ def component(info: graph_pb2.ComponentInfo) -> dict[str, Any]:
 
 
 def statistics(client: rtcf.Client, name: str) -> dict[str, Any]:
-    """Return what cycles and components take, in µs."""
+    """Return the times of cycles and components, in µs; raises RtcfError."""
     figures = client.get_statistics(name)
     return {
         "iterations": figures.iterations,
@@ -80,7 +83,7 @@ def statistics(client: rtcf.Client, name: str) -> dict[str, Any]:
 
 
 def event(found: control_pb2.Event) -> dict[str, Any]:
-    """Return something that has happened."""
+    """Return an event of rtcfd."""
     return {
         "kind": "event",
         "what": word(control_pb2.Event.Kind.DESCRIPTOR, found.kind),
@@ -105,26 +108,26 @@ def record(found: control_pb2.LogRecord) -> dict[str, Any]:
 
 
 def lost(count: int, what: str) -> dict[str, Any]:
-    """Return, as a record, that some are not told."""
+    """Return a log record with the number of dropped events or log records; `what` names them."""
     return {
         "kind": "record",
         "what": "warn",
         "time_ns": str(time.time_ns()),
         "iteration": 0,
         "component": "",
-        "message": f"{count} {what} before this were left out",
+        "message": f"{count} earlier {what} dropped",
     }
 
 
 def value(told: graph_pb2.ParameterValue) -> Any:
-    """Return a parameter's value as JSON has it: of one that is not finite, its name."""
+    """Return a parameter's value for JSON: NaN and infinities as text."""
     kind = told.WhichOneof("kind")
     found = None if kind is None else getattr(told, kind)
     return str(found) if isinstance(found, float) and not math.isfinite(found) else found
 
 
 def history(client: rtcf.Client, runner_name: str, most: int) -> list[dict[str, Any]]:
-    """Return who set what, newest first."""
+    """Return the last parameter changes, at most `most`, newest first; raises RtcfError."""
     changes = client.get_history(runner=runner_name, most=most)
     return [
         {"component": each.component, "parameter": each.parameter, "value": value(each.value),
@@ -135,7 +138,10 @@ def history(client: rtcf.Client, runner_name: str, most: int) -> list[dict[str, 
 
 
 def setting(info: graph_pb2.ParameterInfo, told: Any) -> graph_pb2.ParameterSetting:
-    """Return the setting of a parameter to what a page says; raises ValueError."""
+    """Return the setting of a parameter to a page's value.
+
+    Raises ValueError if the value does not fit the parameter's type.
+    """
     found = graph_pb2.ParameterValue()
     try:
         if info.type == "bool" and isinstance(told, bool):
@@ -149,7 +155,7 @@ def setting(info: graph_pb2.ParameterInfo, told: Any) -> graph_pb2.ParameterSett
     except (OverflowError, ValueError):
         pass
     if found.WhichOneof("kind") is None:
-        raise ValueError(f"{info.name} is of type {info.type}, and {told!r} is not")
+        raise ValueError(f"{info.name} has type {info.type}: invalid value {told!r}")
     return graph_pb2.ParameterSetting(name=info.name, value=found)
 
 

@@ -1,4 +1,4 @@
-"""Cycles one after the other, as the tabs of a runner get them, and the last ones of them."""
+"""Chunks of consecutive cycles for the tabs of a runner, and a bounded memory of the last ones."""
 
 import re
 from collections import deque
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from rtcf.streams.ports import PortBatch, PortSchema
 
-ELEMENTS = 64  # of an array that are told, each as a signal of its own
+ELEMENTS = 64  # listed elements of an array, each a signal
 _LONGEST = 1000  # characters of a name
 _COLUMN = re.compile(r"(?:/[A-Za-z]\w*)+\.[A-Za-z_]\w*", re.ASCII)
 _ELEMENT = re.compile(r"(.+)\[([0-9]{1,9})\]")
@@ -17,24 +17,24 @@ _ELEMENT = re.compile(r"(.+)\[([0-9]{1,9})\]")
 
 @dataclass
 class Chunk:
-    """A batch; `at` counts all cycles that its hub has told before."""
+    """A batch of cycles with its position in the hub's sequence of cycles."""
 
     batch: PortBatch
-    at: int
-    lost: int  # cycles before these
-    packed: dict[tuple[str, ...], bytes] = field(default_factory=dict)  # made by wire, for all tabs
+    at: int  # number of cycles that the hub has sent before this chunk
+    lost: int  # dropped cycles before this chunk
+    packed: dict[tuple[str, ...], bytes] = field(default_factory=dict)  # cache of wire.body
 
     def __len__(self) -> int:
         return len(self.batch)
 
     @property
     def end(self) -> int:
-        """`at` of the next one."""
+        """`at` of the next chunk."""
         return self.at + len(self)
 
     @property
     def cycles(self) -> NDArray[np.int64]:
-        """The numbers of the cycles."""
+        """The cycle numbers."""
         return self.batch.cycles
 
     @property
@@ -44,16 +44,16 @@ class Chunk:
 
     @property
     def latencies_us(self) -> NDArray[np.float64]:
-        """Wake-up after each deadline; µs."""
+        """The wake-up latency of each cycle; µs."""
         return self.batch.latencies_ns / 1e3
 
     @property
     def durations_us(self) -> NDArray[np.float64]:
-        """Calculation in each cycle; µs."""
+        """The calculation duration of each cycle; µs."""
         return self.batch.durations_ns / 1e3
 
     def values(self, name: str) -> NDArray[np.float64]:
-        """Return the values of a trace; NaN where the graph has no such signal."""
+        """Return the values of a trace, one per cycle; NaN if the graph lacks the signal."""
         if not is_there(self.batch.schema, name):
             return np.full(len(self), np.nan)
         signal, index = split_element(name)
@@ -62,7 +62,7 @@ class Chunk:
 
 
 class Memory:
-    """The last chunks of a runner, bounded in bytes."""
+    """The last chunks of a runner, at most `most_bytes` of them."""
 
     def __init__(self, most_bytes: int) -> None:
         self._most = most_bytes
@@ -76,7 +76,7 @@ class Memory:
         return len(self._chunks)
 
     def add(self, chunk: Chunk) -> None:
-        """Keep it; the oldest ones go."""
+        """Add a chunk; remove the oldest chunks above the limit."""
         self._chunks.append(chunk)
         self._bytes += _size(chunk)
         while self._bytes > self._most and len(self._chunks) > 1:
@@ -85,7 +85,7 @@ class Memory:
             gone.packed.clear()
 
     def between(self, begin: int, end: int) -> list[Chunk]:
-        """Return those that hold any of the cycles from `begin` to before `end`, by `at`."""
+        """Return the chunks with any of the cycles [begin, end), counted as `Chunk.at`."""
         found = []
         for chunk in reversed(self._chunks):
             if chunk.end <= begin:
@@ -101,29 +101,29 @@ def _size(chunk: Chunk) -> int:
 
 
 def split_element(name: str) -> tuple[str, int]:
-    """Return signal and place of "/arm.q[2]"; of one that is a number, place 0."""
+    """Return signal and index of a trace: ("/arm.q", 2) for "/arm.q[2]"; index 0 for a scalar."""
     found = _ELEMENT.fullmatch(name)
     return (found[1], int(found[2])) if found else (name, 0)
 
 
 def column_of(name: str) -> str:
-    """Return the output or state that a trace is of: "/arm.cmd" of "/arm.cmd.twist.linear.x".
+    """Return the output or state of a trace: "/arm.cmd" for "/arm.cmd.twist.linear.x".
 
-    Empty of what is no name of a signal.
+    Empty for text that is not a signal name.
     """
     found = _COLUMN.match(name) if len(name) <= _LONGEST else None
     return found[0] if found else ""
 
 
 def is_there(schema: PortSchema, name: str) -> bool:
-    """Tell whether a trace has values in a stream."""
+    """Return whether a stream has values of a trace."""
     signal, index = split_element(name)
     found = schema.signals.get(signal)
     return found is not None and index < max(int(np.prod(found.shape)), 1)
 
 
 def traces(schema: PortSchema) -> list[dict[str, str]]:
-    """Return name and unit of all that can be drawn."""
+    """Return name, unit and kind ("bool" or "number") of all possible traces of a stream."""
     found = []
     for signal in schema.signals.values():
         count = int(np.prod(signal.shape)) if signal.shape else 0

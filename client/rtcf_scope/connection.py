@@ -1,4 +1,4 @@
-"""A connection that answers what is no HTTP in one line, and logs one line at most."""
+"""A connection that answers malformed HTTP with one line, and logs at most one line per error."""
 
 import asyncio
 import logging
@@ -24,13 +24,13 @@ HEADERS = {
 }
 _UNREADABLE = (
     b"HTTP/1.1 400 Bad Request\r\nContent-Type: text/plain\r\nConnection: close\r\n\r\n"
-    b"this is no request of HTTP\n"
+    b"not an HTTP request\n"
 )
-_LONGEST = 200  # characters of what is wrong
+_LONGEST = 200  # characters of an error message
 
 
 class _OneLine(logging.Formatter):
-    """Leaves tracebacks out: what went wrong stands in the line."""
+    """Formats a record as one line: the exception instead of its traceback."""
 
     def format(self, record: logging.LogRecord) -> str:
         error = record.exc_info[1] if record.exc_info else None
@@ -39,14 +39,14 @@ class _OneLine(logging.Formatter):
 
 
 def logger() -> logging.Logger:
-    """Return a logger of the server: a line on standard error for each error."""
+    """Return the server's logger, which writes one line per error to standard error."""
     found = logging.getLogger("rtcf_scope.server")
     if not found.handlers:
         handler = logging.StreamHandler(sys.stderr)
         handler.setFormatter(_OneLine())
         found.addHandler(handler)
         found.propagate = False
-        # What it says of requests has their headers, in which the session is.
+        # aiohttp logs request headers, which contain the session.
         logging.getLogger("aiohttp").addHandler(logging.NullHandler())
         logging.getLogger("aiohttp").propagate = False
     return found
@@ -63,19 +63,19 @@ class Connection(web.RequestHandler):
         loop: asyncio.AbstractEventLoop,
         counted: Callable[["Connection"], None],
     ) -> None:
-        """`counted` is called once it is one of the server's connections."""
-        # Requests have the token in their line: not for a log.
+        """Call `counted` when the server has counted the connection."""
+        # No access log: a request line can contain the token.
         no_log: Any = None
         super().__init__(server, loop=loop, logger=logger(), access_log=no_log)
         self._counted = counted
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """Begin, and be counted."""
+        """Register with the server, then report it."""
         super().connection_made(transport)
         self._counted(self)
 
     def data_received(self, data: bytes) -> None:
-        """Take what has come; what a parser fails at ends the connection."""
+        """Process received bytes; close the connection if the parser fails."""
         try:
             super().data_received(data)
         except Exception:
@@ -90,15 +90,18 @@ class Connection(web.RequestHandler):
         exc: BaseException | None = None,
         message: str | None = None,
     ) -> web.StreamResponse:
-        """Return the answer to a request that failed."""
+        """Return the response to a request that failed.
+
+        Raises ConnectionError if the response has already started.
+        """
         if isinstance(exc, HttpProcessingError):
-            text = f"this is no request of HTTP: {exc.message}"
+            text = f"not an HTTP request: {exc.message}"
         else:
-            text = message or "the scope has failed: its log says why"
-            if not isinstance(exc, ConnectionError):  # who asked has gone
+            text = message or "internal error of the scope: see its log"
+            if not isinstance(exc, ConnectionError):  # the client has disconnected
                 logger().error("%s %s failed", request.method, request.path, exc_info=exc)
         if request.writer.output_size > 0:
-            raise ConnectionError("the answer has begun already")
+            raise ConnectionError("the response has already started")
         text = line(" ".join(text.split())[:_LONGEST])
         answer = web.Response(status=status, text=f"{text}\n", headers=HEADERS)
         answer.force_close()

@@ -1,12 +1,13 @@
-"""Who comes in: whoever shows the token or a session, by a name of this machine, from the page.
+"""Authentication of requests by token or session, host name and origin.
 
-The page itself is no secret, what it asks is.  The token is exchanged for a session, which the page
-keeps where pages of this host and port alone can read it, and shows in a header.  No cookie has it:
-a browser sends cookies of one port to all servers of a machine.  Sessions are known to this process
-alone and end with it, so that another server, which has its port later, gets nothing of use.
+The page itself is public; its requests are not.  The page exchanges the token for a session, keeps
+the session in storage that only pages of the same host and port can read, and sends it in a
+header.  The session is not a cookie, because browsers send cookies of one port to all servers of a
+machine.  Sessions exist only in the memory of this process.  Another server that later uses the
+same port therefore receives no valid session.
 
-A page of another site may not ask anything (its Origin is another), nor by a name of its own that
-it lets lead here (the Host is another: DNS rebinding).
+Requests of a page of another site are rejected by their Origin.  Requests by an unknown host name
+that resolves to this machine (DNS rebinding) are rejected by their Host.
 """
 
 import asyncio
@@ -25,10 +26,10 @@ from rtcf_scope.connection import HEADERS, Connection
 from rtcf_scope.line import line
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
-_MOST_SESSIONS = 256  # those that were shown least lately go
-_SESSION_PROTOCOL = "session."  # of a WebSocket, before its session: it has no other header
-_STRANGER_S = 5.0  # for a first request with the token
-_LONGEST = 80  # characters that are said again in a refusal
+_MOST_SESSIONS = 256  # the least recently used ones are removed
+_SESSION_PROTOCOL = "session."  # subprotocol prefix; pages cannot set WebSocket headers
+_STRANGER_S = 5.0  # deadline of the first authenticated request
+_LONGEST = 80  # characters of a request that an error quotes
 _CROWDED = (
     b"HTTP/1.1 503 Service Unavailable\r\nContent-Type: text/plain\r\nConnection: close\r\n\r\n"
     b"too many connections: close some tabs\n"
@@ -37,33 +38,36 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class Door:
-    """The rules of one server; one thread."""
+    """Authentication of one server; used only in the event loop."""
 
     def __init__(
         self, token: str, names: Iterable[str], most_connections: int, token_file: Path | None
     ) -> None:
-        """`names` are those of this machine, by which it may be called beside loopback's."""
+        """Accept the host names `names` in addition to those of loopback.
+
+        Errors name `token_file`, the file of the token, if there is one.
+        """
         self._token = token.encode()
         self._where = (
-            "the one that rtcfctl scope printed"
+            "the address that rtcfctl scope printed"
             if token_file is None
-            else f"http://HOST:PORT/?token=TOKEN, with the token that is in {token_file}"
+            else f"http://HOST:PORT/?token=TOKEN with the token in {token_file}"
         )
         self._names = {*LOOPBACK, *(name.lower() for name in names)}
         self._most = most_connections
-        self._sessions: OrderedDict[bytes, None] = OrderedDict()  # by their hash, newest last
-        self._tickets: dict[bytes, Callable[[], None]] = {}
-        self._new: set[Any] = set()
-        self._known: set[Any] = set()  # connections that have shown the token
+        self._sessions: OrderedDict[bytes, None] = OrderedDict()  # by hash, last used last
+        self._tickets: dict[bytes, Callable[[], None]] = {}  # by hash
+        self._new: set[Any] = set()  # connections that the server has not counted yet
+        self._known: set[Any] = set()  # authenticated connections
 
     def ticket(self, used: Callable[[], None]) -> str:
-        """Return a token that gives one session, once; `used` is called then."""
+        """Return a token for a single session; call `used` when it is exchanged."""
         ticket = secrets.token_urlsafe(24)
         self._tickets[_hash(ticket)] = used
         return ticket
 
     async def enter(self, request: web.Request) -> web.Response:
-        """Answer with a new session for the token, or a ticket."""
+        """Exchange the token or a ticket for a new session; raises HTTPForbidden."""
         given = _bearer(request)
         used = self._tickets.pop(_hash(given), None)
         if used is not None:
@@ -78,7 +82,7 @@ class Door:
         return web.json_response({"session": session})
 
     def middleware(self) -> Any:
-        """Return what looks at each request before it is answered."""
+        """Return the aiohttp middleware that checks each request and adds security headers."""
 
         @web.middleware
         async def look(request: web.Request, handler: Handler) -> web.StreamResponse:
@@ -87,13 +91,13 @@ class Door:
         return look
 
     def open(self, server: web.Server) -> Callable[[], asyncio.Protocol]:
-        """Return what makes a connection's protocol: of too many, one that refuses."""
+        """Return the factory of connections; above the limit, connections answer 503 and close."""
         loop = asyncio.get_running_loop()
 
         def connection() -> asyncio.Protocol:
             there = {*server.connections}
             self._known &= there
-            # The server counts a connection a little later than it makes one.
+            # The server counts a connection only in connection_made().
             if len(there | self._new) >= self._most:
                 return _Refusal()
             protocol = Connection(server, loop, self._new.discard)
@@ -121,11 +125,13 @@ class Door:
     def _check(self, request: web.Request) -> None:
         host = request.headers.get("Host", "")
         if not self._is_ours(host):
-            text = f"{line(host[:_LONGEST])} is not a name of this scope: see --name\n"
+            text = f"unknown host name {line(host[:_LONGEST])}: allow it with --name\n"
             raise web.HTTPForbidden(text=text)
         origin = request.headers.get("Origin")
         if origin is not None and origin not in (f"http://{host}", f"https://{host}"):
-            raise web.HTTPForbidden(text=f"pages of {line(origin[:_LONGEST])} may not ask here\n")
+            raise web.HTTPForbidden(
+                text=f"requests from pages of {line(origin[:_LONGEST])} are rejected\n"
+            )
         if is_public(request.path):
             return
         if not self._knows(_bearer(request)) and not self._knows(_session_of_protocols(request)):
@@ -142,7 +148,7 @@ class Door:
         return True
 
     def _stranger(self) -> web.HTTPForbidden:
-        return web.HTTPForbidden(text=f"the address with its token is {self._where}\n")
+        return web.HTTPForbidden(text=f"access requires the token: open {self._where}\n")
 
     def _is_ours(self, host: str) -> bool:
         try:
@@ -163,7 +169,7 @@ class _Refusal(asyncio.Protocol):
 
 
 def is_public(path: str) -> bool:
-    """Tell whether a path is the page's, which holds nothing of the loop, or the way in."""
+    """Return whether a path needs no authentication: the page's files and the login."""
     return path in ("/", "/api/session") or path.startswith("/page/")
 
 
@@ -184,5 +190,5 @@ def _hash(given: str) -> bytes:
 
 
 def _bytes(given: str) -> bytes:
-    # A header has any bytes.
+    # Headers can contain any bytes.
     return given.encode(errors="surrogateescape")

@@ -1,7 +1,7 @@
-"""The one stream of a runner that all its tabs share, and the last of what it told.
+"""The stream of a runner that all its tabs share, and a memory of the last cycles.
 
-A thread reads the stream; all else happens in the event loop.  Names that the graph does not have
-are left out of the stream by rtcfd, and are told as soon as it has them.
+A thread reads the stream; everything else runs in the event loop.  rtcfd omits signals that the
+graph does not have, and adds them to the stream when they exist.
 """
 
 import asyncio
@@ -16,41 +16,41 @@ from rtcf_shared.errors import RtcfError
 
 from rtcf_scope.chunk import Chunk, Memory
 
-_AHEAD = 32  # batches that the reader may be before the event loop
-_AGAIN_S = 1.0
-_MEMORY = 64 * 1024 * 1024
-_MOST_COLUMNS = 16384  # that rtcfd looks up
-_NO_COLUMN = "/."  # selects no output and no state: the cycles alone
-_PATIENCE_S = 2.0  # of a selection to come for the one before to tell what is before it
-_STANDS_S = 0.5  # without a cycle, after which a loop counts as one that stands
+_AHEAD = 32  # batches between reader thread and event loop
+_AGAIN_S = 1.0  # delay before a failed stream is opened again
+_MEMORY = 64 * 1024 * 1024  # bytes
+_MOST_COLUMNS = 16384  # outputs and states that rtcfd accepts in one selection
+_NO_COLUMN = "/."  # matches no output and no state: only the cycles are streamed
+_PATIENCE_S = 2.0  # for the old reader to reach the first cycle of the new one
+_STANDS_S = 0.5  # without a cycle, after which a loop counts as stopped
 
 
 class Listener(Protocol):
-    """A tab."""
+    """The hub's view of a tab; no method blocks."""
 
-    wants: bool  # cycles
-    columns: tuple[str, ...]  # outputs and states
+    wants: bool  # whether the tab needs cycles
+    columns: tuple[str, ...]  # outputs and states that the tab needs
 
     def take(self, chunk: Chunk) -> None:
-        """Take cycles; does not wait."""
+        """Process a chunk of cycles."""
 
     def know(self, schema: PortSchema) -> None:
-        """Take notice of which of its columns there are."""
+        """Process the schema of the stream: which columns exist."""
 
     def tell(self, message: dict[str, Any]) -> None:
-        """Take a text message; does not wait."""
+        """Send a text message to the page."""
 
     def trouble(self, text: str) -> None:
-        """Take what keeps its values away; empty: nothing does."""
+        """Process an error of the stream; an empty text ends the error."""
 
 
 class _Reader:
-    """One stream and its thread; the attributes without `_` are the event loop's."""
+    """One stream and its thread; the event loop owns the attributes without `_`."""
 
     def __init__(self, hub: "Hub", columns: tuple[str, ...]) -> None:
         self.columns = frozenset(columns)
-        self.schema: PortSchema | None = None  # once it is open
-        self.opened = 0.0  # the event loop's time
+        self.schema: PortSchema | None = None  # None until the stream is open
+        self.opened = 0.0  # event loop time, s
         self.trouble = ""
         self._selection = columns or (_NO_COLUMN,)
         self._hub = hub
@@ -62,18 +62,18 @@ class _Reader:
 
     @property
     def is_open(self) -> bool:
-        """Tell whether it hears of each cycle."""
+        """Return whether the stream is open and free of errors."""
         return self.schema is not None and not self.trouble
 
     def close(self) -> None:
-        """End it, without waiting for it."""
+        """End the stream and its thread, without waiting."""
         self._ended.set()
         self._room.release()
         if self._stream is not None:
             self._stream.close()
 
     def taken(self) -> None:
-        """Make room for another batch."""
+        """Free the place of a processed batch; the thread may read another one."""
         self._room.release()
 
     def _run(self) -> None:
@@ -83,8 +83,8 @@ class _Reader:
                 trouble = "the stream has ended"
             except RtcfError as error:
                 trouble = str(error)
-            except Exception as error:  # pages would wait for a thread that has ended
-                trouble = f"the stream has failed: {error!r}"
+            except Exception as error:  # the thread must go on: pages wait for its values
+                trouble = f"the stream failed: {error!r}"
             if not self._ended.is_set():
                 self._call(self._hub.trouble, self, trouble)
                 self._ended.wait(_AGAIN_S)
@@ -94,7 +94,7 @@ class _Reader:
             self._selection, self._hub.runner, allow_missing=True
         ) as stream:
             self._stream = stream
-            if self._ended.is_set():  # before close() could see it
+            if self._ended.is_set():  # closed before `_stream` was set
                 return
             self._call(self._hub.opened, self, stream.schema)
             stream.on_schema = lambda schema: self._call(self._hub.opened, self, schema)
@@ -112,56 +112,60 @@ class _Reader:
 
 
 class Hub:
-    """The tabs of one runner and what they watch."""
+    """The tabs of one runner and their common stream; lives in the event loop.
+
+    When the selection changes, a second reader opens the new stream while the first one continues.
+    The hub switches to the second reader at its first cycle, to avoid lost or repeated cycles.
+    """
 
     def __init__(self, client: rtcf.Client, runner: str) -> None:
         self.client = client
         self.runner = runner
         self.memory = Memory(_MEMORY)
-        self.base_ns: int | None = None
-        self.told = 0  # cycles
-        self.since = 0  # `told` when somebody began to watch
-        self._tabs: dict[Listener, None] = {}  # in the order in which they came
-        self._reader: _Reader | None = None  # whose cycles are told
-        self._next: _Reader | None = None  # of another selection, until it takes over
-        self._held: deque[PortBatch] = deque()  # of that
-        self._waits = False  # others are wanted than `_next` will have
-        self._seen = (-1, 0)  # the last cycle told, and its stamp
-        self._lost = 0  # cycles of batches that held none
-        self._overlap = False
+        self.base_ns: int | None = None  # stamp of the first cycle
+        self.told = 0  # number of cycles sent to tabs
+        self.since = 0  # `told` when the present streams began
+        self._tabs: dict[Listener, None] = {}  # in order of joining
+        self._reader: _Reader | None = None  # the source of the cycles sent now
+        self._next: _Reader | None = None  # with a new selection, until it replaces `_reader`
+        self._held: deque[PortBatch] = deque()  # batches of `_next`
+        self._waits = False  # the selection has changed again since `_next` was opened
+        self._seen = (-1, 0)  # number and stamp of the last cycle sent
+        self._lost = 0  # dropped cycles reported by empty batches
+        self._overlap = False  # the next batch may repeat cycles
 
     @property
     def is_empty(self) -> bool:
-        """Tell whether nobody misses it."""
+        """Return whether the hub has neither tabs nor cycles."""
         return not self._tabs and not self.memory
 
     def join(self, tab: Listener) -> None:
-        """Begin to tell a tab; call `changed` when its columns are others."""
+        """Add a tab, which calls `changed` when its columns change."""
         self._tabs[tab] = None
         self.changed()
 
     def leave(self, tab: Listener) -> None:
-        """Tell it nothing more; without tabs nothing is watched."""
+        """Remove a tab; without tabs the streams are closed."""
         self._tabs.pop(tab, None)
         self.changed()
 
     def close(self) -> None:
-        """End the streams."""
+        """Close the streams."""
         for reader in (self._reader, self._next):
             if reader is not None:
                 reader.close()
         self._reader = self._next = None
         self._held.clear()
-        # What goes by unwatched is missed by nobody.
+        # Cycles while no stream is open do not count as lost.
         self._seen, self._lost, self.since = (-1, 0), 0, self.told
 
     def changed(self) -> None:
-        """Watch what the tabs want now."""
+        """Open the stream that the tabs need now."""
         if not any(tab.wants for tab in self._tabs):
             self.close()
             self._tell_trouble()
             return
-        # Of values for which a cycle has no room those of the first tabs stay.
+        # Above the limit, the columns of the first tabs have priority.
         columns = tuple(dict.fromkeys(each for tab in self._tabs for each in tab.columns))
         columns = columns[:_MOST_COLUMNS]
         newest = self._next or self._reader
@@ -179,7 +183,7 @@ class Hub:
         self._tell_trouble()
 
     def opened(self, reader: _Reader, schema: PortSchema) -> None:
-        """Take notice of what a reader will tell."""
+        """Process the schema of a reader's stream."""
         if reader not in (self._reader, self._next):
             return
         if not reader.is_open:
@@ -192,7 +196,7 @@ class Hub:
         self._tell_trouble()
 
     def take(self, reader: _Reader, batch: PortBatch) -> None:
-        """Take what a reader read."""
+        """Process a batch of a reader."""
         if reader is self._next:
             if not self._held:
                 reader.loop.call_later(_PATIENCE_S, self._take_over, reader)
@@ -205,19 +209,19 @@ class Hub:
             self._take_over(self._next)
 
     def trouble(self, reader: _Reader, text: str) -> None:
-        """Take notice of what is wrong with a reader."""
+        """Process the error of a reader's stream."""
         if reader not in (self._reader, self._next):
             return
         reader.trouble = text
         if reader is self._reader:
-            self._overlap = True  # what comes next may have been told, or be later
+            self._overlap = True  # the next batch may repeat or skip cycles
         self._tell_trouble()
         if self._held:
             self._take_over(self._next)
         self._look_again()
 
     def _is_coming(self, reader: _Reader) -> bool:
-        """Tell whether a reader is about to tell its first cycle."""
+        """Return whether the first cycle of a reader is expected soon."""
         if reader.trouble:
             return False
         return (
@@ -232,7 +236,7 @@ class Hub:
             self.changed()
 
     def _is_due(self, first: PortBatch) -> bool:
-        """Tell whether the present reader has told all that is before the next one's batch."""
+        """Return whether all cycles before the next reader's first batch have been sent."""
         cycle, stamp = self._seen
         if self._reader is None or not self._reader.is_open or cycle < 0 or not len(first):
             return True
@@ -275,11 +279,11 @@ class Hub:
         for tab in tuple(self._tabs):
             try:
                 tab.take(chunk)
-            except Exception as error:  # of one page: not of the others
+            except Exception as error:  # an error of one page must not affect the others
                 print(f"rtcf-scope: a page of {self.runner} failed: {error!r}", file=sys.stderr)
 
     def _unseen(self, batch: PortBatch) -> Chunk:
-        """Return what the stream before has not told already, which is all after a restart."""
+        """Return the cycles of a batch not sent yet: all of them after a restart of the loop."""
         cycle, stamp = self._seen
         seen = (batch.cycles <= cycle) & (batch.stamps_ns <= stamp)
         skip = int(seen.sum())
@@ -293,7 +297,7 @@ class Hub:
             tab.know(schema)
 
     def _tell_trouble(self) -> None:
-        """Tell each tab what is wrong with the stream that has its columns."""
+        """Send each tab the error of the stream with its columns."""
         now = "" if self._reader is None else self._reader.trouble
         for tab in tuple(self._tabs):
             text = now

@@ -1,6 +1,6 @@
-"""Any text as one line that can be printed."""
+"""Conversion of any text into one printable line."""
 
 
 def line(text: str) -> str:
-    """Return a text with line ends, control characters and what is no character as escapes."""
+    """Return a text with unprintable characters, including line ends, as escapes."""
     return "".join(each if each.isprintable() else ascii(each)[1:-1] for each in text)

@@ -1,7 +1,7 @@
-"""What happens to a runner, for its tabs: its state every second, events and log records as they
-come.
+"""State, events and log records of a runner for its tabs.
 
-One thread of each, while there are tabs.
+The state is sent every second, events and log records as they arrive.  Each of the three has a
+thread while there are tabs.
 """
 
 import asyncio
@@ -19,11 +19,11 @@ from rtcf_scope import catalog
 from rtcf_scope.hub import Listener
 
 _EVERY_S = 1.0
-_MOST_RECORDS = 100  # in _EVERY_S: more than that nobody reads
+_MOST_RECORDS = 100  # log records per _EVERY_S; the rest is counted
 
 
 class News:
-    """The state, the events and the log records of one runner."""
+    """Sends state, events and log records of one runner to its tabs; lives in the event loop."""
 
     def __init__(self, client: rtcf.Client, runner: str) -> None:
         self._client = client
@@ -34,11 +34,11 @@ class News:
 
     @property
     def is_empty(self) -> bool:
-        """Tell whether nobody listens."""
+        """Return whether there are no tabs."""
         return not self._tabs
 
     def join(self, tab: Listener) -> None:
-        """Begin to tell a tab."""
+        """Add a tab; the first one starts the threads."""
         self._tabs.add(tab)
         if self._ended is None:
             self._ended = threading.Event()
@@ -47,13 +47,13 @@ class News:
                 threading.Thread(target=self._run, args=words, daemon=True).start()
 
     def leave(self, tab: Listener) -> None:
-        """Tell it nothing more; without tabs nobody asks."""
+        """Remove a tab; the last one ends the threads."""
         self._tabs.discard(tab)
         if not self._tabs:
             self.close()
 
     def close(self) -> None:
-        """End what follows."""
+        """End the threads, without waiting."""
         if self._ended is not None:
             self._ended.set()
             self._ended = None
@@ -76,7 +76,7 @@ class News:
         while not ended.is_set():
             try:
                 follow(ended, tell)
-            except (RtcfError, ValueError) as error:  # ValueError: of a name that no message has
+            except (RtcfError, ValueError) as error:  # ValueError: the name is not valid UTF-8
                 tell({"kind": "state", "state": "unknown", "status": str(error)})
             ended.wait(_EVERY_S)
 
@@ -88,7 +88,7 @@ class News:
 
     @contextlib.contextmanager
     def _closed_with(self, stream: Any) -> Iterator[None]:
-        """Have close() end a stream, inside."""
+        """Register a stream for close()."""
         self._streams.append(stream)
         try:
             yield

@@ -1,4 +1,4 @@
-"""Recordings that pages may open: those that were named at the start, and those of one folder."""
+"""Recordings that pages may open: files named on the command line and the files of one folder."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -12,22 +12,22 @@ from rtcf.recording.reader import RecordedColumn, Recording, RecordingError
 from rtcf_scope import wire
 from rtcf_scope.chunk import ELEMENTS, split_element
 
-MOST_VALUES = 16_000_000  # 128 MB; instead of more, minima and maxima are told
+MOST_VALUES = 16_000_000  # 128 MB; above it, windows are reduced to minima and maxima
 
 
 class Recordings:
-    """Files by their names; a page never says a path."""
+    """Recordings by file name; pages cannot request paths."""
 
     def __init__(self, files: Iterable[Path], folder: Path | None) -> None:
         self._files = {file.name: file for file in files}
         self._folder = folder
 
     def names(self) -> list[str]:
-        """Return those there are."""
+        """Return the names of all recordings, sorted."""
         return sorted(self._known())
 
     def describe(self, name: str) -> dict[str, Any]:
-        """Return what is in one; raises RecordingError."""
+        """Return signals, number of cycles and length of a recording; raises RecordingError."""
         with self._open(name) as recording:
             signals = []
             for signal in recording.signals.values():
@@ -43,14 +43,17 @@ class Recordings:
     def columns(
         self, name: str, traces: list[str], begin_s: float = -math.inf, end_s: float = math.inf
     ) -> bytes:
-        """Return the values of traces as bytes of wire, from `begin_s` to before `end_s` after the
-        first cycle; raises RecordingError."""
+        """Return the cycles in [begin_s, end_s), in seconds after the first cycle, as `wire` bytes.
+
+        Above MOST_VALUES values, each window of cycles has a minimum and a maximum instead.
+        Raises RecordingError.
+        """
         with self._open(name) as recording:
             span = (_stamp(recording, begin_s), _stamp(recording, end_s))
             numbers, durations, latencies = recording.read_cycles(*span).values()
             stamps = numbers.stamps_ns
             if not len(stamps):
-                then = "" if span == (None, None) else " then"
+                then = "" if span == (None, None) else " in this range"
                 raise RecordingError(f"{name} has no cycles{then}")
             found = [(stamps - recording.begin_ns) / 1e9, numbers.values, latencies.values / 1e3,
                      durations.values / 1e3]  # fmt: skip
@@ -71,12 +74,12 @@ class Recordings:
     def _open(self, name: str) -> Recording:
         file = self._known().get(name)
         if file is None:
-            raise RecordingError(f"no recording {name} here: start the scope with its file")
+            raise RecordingError(f"no recording {name}: start the scope with this file")
         return Recording(file)
 
 
 def _placed(signals: Mapping[str, RecordedColumn], trace: str, stamps: Any) -> Any:
-    """Return a trace's values at all cycles: NaN where it has none."""
+    """Return the values of a trace at all cycles; NaN where it has none."""
     signal, index = split_element(trace)
     values = np.full(len(stamps), np.nan)
     if signal not in signals:
@@ -86,19 +89,19 @@ def _placed(signals: Mapping[str, RecordedColumn], trace: str, stamps: Any) -> A
     if index < each.shape[1]:
         if len(each) == len(values):
             return each[:, index].astype("<f8")
-        # One that has joined, or left.
+        # The component was loaded or unloaded during the recording.
         place = np.searchsorted(stamps, column.stamps_ns).clip(max=len(stamps) - 1)
         values[place] = each[:, index]
     return values
 
 
 def _stamp(recording: Recording, seconds: float) -> int | None:
-    """Return the stamp (ns) so long after the first cycle; none if that is infinite."""
+    """Return the stamp (ns) at `seconds` after the first cycle; None if infinite."""
     return recording.begin_ns + round(seconds * 1e9) if math.isfinite(seconds) else None
 
 
 def _with_gaps(columns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return columns with a cycle of NaN where cycles are missing, at the time of the last one."""
+    """Return the columns with a NaN cycle in each gap, at the time of the cycle before the gap."""
     gaps = np.flatnonzero(np.diff(columns[1]) != 1) + 1
     if not len(gaps):
         return columns
@@ -108,8 +111,10 @@ def _with_gaps(columns: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _windows(columns: NDArray[np.float64], most: int) -> tuple[NDArray[np.float64], int]:
-    """Return the minima and maxima of windows of cycles by turns, and the length of these; the
-    columns and 1 if they have at most so many cycles."""
+    """Return alternating minima and maxima of windows of cycles, and the window length in cycles.
+
+    With at most `most` cycles, return the columns unchanged and 1.
+    """
     count = columns.shape[1]
     if count <= most:
         return columns, 1

@@ -1,4 +1,8 @@
-"""A file that leads a browser to the page: an address in a command line is seen by all users."""
+"""A file that redirects a browser to the page.
+
+The browser gets the file's name as argument, not the address with the token, because all users can
+see the arguments of a command.
+"""
 
 import contextlib
 import html
@@ -17,10 +21,10 @@ _PAGE = """<!doctype html>
 
 
 class Redirect:
-    """One file, which its user alone can read."""
+    """One HTML file that only its user can read."""
 
     def __init__(self, address: str) -> None:
-        """Raises OSError."""
+        """Create the file in a temporary folder; raises OSError."""
         self._folder = Path(tempfile.mkdtemp(prefix="rtcf-scope-", dir=_runtime_folder()))
         self.file = self._folder / "open.html"
         descriptor = os.open(self.file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
@@ -28,13 +32,13 @@ class Redirect:
             file.write(_PAGE.format(address=html.escape(address)))
 
     def remove(self) -> None:
-        """Remove it."""
+        """Remove the file and its folder."""
         with contextlib.suppress(OSError):
             shutil.rmtree(self._folder)
 
 
 def _runtime_folder() -> str | None:
-    """Return the user's folder of $XDG_RUNTIME_DIR if it is nobody else's; None: that of /tmp."""
+    """Return $XDG_RUNTIME_DIR if only the user can access it; None selects /tmp."""
     folder = os.environ.get("XDG_RUNTIME_DIR", "")
     try:
         found = os.stat(folder)

@@ -1,4 +1,4 @@
-"""Runs the server: as rtcf-scope.service, or for one session of `rtcfctl scope`."""
+"""The scope's server, for rtcf-scope.service and for one session of `rtcfctl scope`."""
 
 import argparse
 import asyncio
@@ -24,61 +24,66 @@ from rtcf_scope.site import RIGHTS, Site
 
 PORT = 8642
 MOST_CONNECTIONS = 128
-_END_S = 1.0  # for what is being answered
+_END_S = 1.0  # for requests in progress when the server ends
 _LEAST_TOKEN = 16  # characters
 
 
 @dataclass(frozen=True)
 class Options:
-    """How a server is to be run."""
+    """The options of a server."""
 
     socket: str | None
     address: str
-    port: int  # 0 = any that is free
-    names: tuple[str, ...]  # by which the machine may be called beside loopback's
-    right: str
+    port: int  # 0 = any free port
+    names: tuple[str, ...]  # accepted host names, in addition to those of loopback
+    right: str  # one of RIGHTS
     token: str
-    token_file: Path | None  # that holds it
-    layouts: Path
-    files: tuple[Path, ...]
-    recordings: Path | None
+    token_file: Path | None  # the file of the token; None if the token is new
+    layouts: Path  # folder
+    files: tuple[Path, ...]  # recordings
+    recordings: Path | None  # folder
 
 
 def add_options(parser: argparse.ArgumentParser, port: int) -> None:
-    """Add what service and session have in common; `port` unless another one is named."""
+    """Add the options of service and session; `port` is the default port (0: any free port)."""
     parser.add_argument(
         "--address", default="127.0.0.1", metavar="ADDRESS",
-        help="where to listen (default: 127.0.0.1, this machine alone)",
+        help="listen on this address (default: 127.0.0.1, this machine only)",
     )  # fmt: skip
     parser.add_argument(
         "--port",
         type=int,
         default=port,
         metavar="N",
-        help=f"(default: {port or 'any that is free'})",
+        help=f"listen on this port (default: {port or 'any free port'})",
     )
     parser.add_argument(
         "--name", dest="names", action="append", default=[], metavar="HOST",
-        help="a name or address of this machine that browsers may use, beside loopback's",
+        help="accept requests for this name or address of the machine, besides loopback",
     )  # fmt: skip
     parser.add_argument(
         "--right", choices=RIGHTS, default=RIGHTS[0],
-        help="what pages may do: observe (default), or tune parameters",
+        help="right of the pages (default: observe); with tune, pages can set parameters",
     )  # fmt: skip
-    parser.add_argument("--layouts", type=Path, metavar="FOLDER", help="where layouts are saved")
     parser.add_argument(
-        "--recordings", type=Path, metavar="FOLDER", help="whose *.mcap pages may open"
+        "--layouts", type=Path, metavar="FOLDER", help="save layouts in this folder"
+    )
+    parser.add_argument(
+        "--recordings", type=Path, metavar="FOLDER", help="let pages open *.mcap in this folder"
     )
     parser.add_argument(
         "--token-file", type=Path, metavar="FILE",
-        help="holds the token (default: a new one for each start)",
+        help="read the token from this file, or create it (default: a new token each start)",
     )  # fmt: skip
 
 
 def options(args: argparse.Namespace, files: Sequence[Path] = ()) -> Options:
-    """Return what a command line says; raises ValueError."""
+    """Return the options of a command line; `files` are its recordings.
+
+    Raises ValueError.
+    """
     if not 0 <= args.port < 65536:
-        raise ValueError(f"--port {args.port}: from 0 to 65535")
+        raise ValueError(f"--port {args.port}: must be from 0 to 65535")
     for file in files:
         if not file.is_file():
             raise ValueError(f"{file}: no such file")
@@ -95,9 +100,10 @@ def options(args: argparse.Namespace, files: Sequence[Path] = ()) -> Options:
 
 
 async def serve(given: Options, ready: Callable[[str, Door], None]) -> None:
-    """Serve until SIGINT or SIGTERM; `ready` gets the address, and the door that has its token.
+    """Serve until SIGINT or SIGTERM.
 
-    Raises RtcfError if the address cannot be had.
+    When the server listens, call `ready` with its address and its door.  Raises RtcfError if it
+    cannot listen on the address.
     """
     ended = asyncio.Event()
     loop = asyncio.get_running_loop()
@@ -118,7 +124,8 @@ async def serve(given: Options, ready: Callable[[str, Door], None]) -> None:
                 )
             except OSError as error:
                 raise RtcfError(
-                    f"{given.address} port {given.port}: {error.strerror}: choose another --port"
+                    f"cannot listen on {given.address} port {given.port}: {error.strerror}: "
+                    "choose another --port"
                 ) from None
             async with server:
                 port = server.sockets[0].getsockname()[1]
@@ -147,12 +154,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _log(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-    """Log what nobody waits for, in one line."""
+    """Log an error of the event loop that no task handles, as one line."""
     logger().error("%s: %r", context.get("message"), context.get("exception"))
 
 
 def _tell_service_manager(address: str, _: Door) -> None:
-    # The token is for those who may read it in its file, not for all who read the journal.
+    # Without the token: more users can read the journal than the token's file.
     print(f"serving {address}", flush=True)
     path = os.environ.get("NOTIFY_SOCKET")
     if path:
@@ -163,13 +170,13 @@ def _tell_service_manager(address: str, _: Door) -> None:
 
 def _called(given: Options) -> str:
     host = given.names[0] if given.names else given.address
-    # Not localhost, which may be an address at which somebody else listens.
+    # Not localhost: it can resolve to an address on which another server listens.
     host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
     return f"[{host}]" if ":" in host else host
 
 
 def _token(file: Path | None) -> str:
-    """Return the token of a file, which is made if it is not there; raises ValueError."""
+    """Return the token of a file, which is created if it does not exist; raises ValueError."""
     if file is None:
         return secrets.token_urlsafe(24)
     try:
@@ -186,5 +193,5 @@ def _token(file: Path | None) -> str:
     except (OSError, UnicodeDecodeError) as error:
         raise ValueError(f"{file}: {error}") from None
     if len(token) < _LEAST_TOKEN or not all(c.isalnum() or c in "-_" for c in token):
-        raise ValueError(f"{file}: a token has {_LEAST_TOKEN} letters and digits or more")
+        raise ValueError(f"{file}: a token needs at least {_LEAST_TOKEN} letters and digits")
     return token

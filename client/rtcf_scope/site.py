@@ -1,4 +1,4 @@
-"""What the server answers: the page, questions of it, and its WebSocket."""
+"""The server's routes: the files of the page, its requests in JSON, and its WebSocket."""
 
 import asyncio
 import io
@@ -26,7 +26,7 @@ from rtcf_scope.tab import PROTOCOL, Tab
 
 RIGHTS = ("observe", "tune", "operate")
 MOST_TABS = 32
-_LONGEST = 500  # characters of a refusal
+_LONGEST = 500  # characters of an error message
 _PAGE = Path(__file__).with_name("page")
 _TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css",
           ".svg": "image/svg+xml"}  # fmt: skip
@@ -47,7 +47,7 @@ class Site:
         self._news: dict[str, News] = {}
         self._tabs: set[web.WebSocketResponse | Tab] = set()
         self.app = web.Application(middlewares=[door.middleware()], client_max_size=MOST_BYTES * 2)
-        # All that there is, by name: no path of a request ever becomes one of the file system.
+        # Read once, by URL path: no path of a request becomes a path of the file system.
         self._files = {
             f"/page/{file.relative_to(_PAGE)}": (file.read_bytes(), _TYPES[file.suffix])
             for file in _PAGE.rglob("*")
@@ -74,7 +74,7 @@ class Site:
         route.add_get("/stream", self._stream)
 
     def close(self) -> None:
-        """End all streams."""
+        """Close all streams."""
         for hub in self._hubs.values():
             hub.close()
         for news in self._news.values():
@@ -83,12 +83,12 @@ class Site:
     async def _file(self, request: web.Request) -> web.Response:
         path = "/page/index.html" if request.path == "/" else request.path
         if path not in self._files:
-            raise web.HTTPNotFound(text=f"nothing at {line(path[:_LONGEST])}\n")
+            raise web.HTTPNotFound(text=f"not found: {line(path[:_LONGEST])}\n")
         data, kind = self._files[path]
         return web.Response(body=data, content_type=kind, charset="utf-8")
 
     def _told(self, answer: Callable[[web.Request], Awaitable[Any]]) -> Handler:
-        """Return a handler that answers in JSON, and refusals in one line."""
+        """Return a handler that answers with the result of `answer` or an error, as JSON."""
 
         async def handle(request: web.Request) -> web.StreamResponse:
             try:
@@ -96,8 +96,8 @@ class Site:
             except (RtcfError, LayoutError, ValueError) as error:
                 return refused(error)
             except RecursionError:
-                return refused("this is nested too deeply")
-            except LookupError as error:  # of the name of an encoding
+                return refused("the JSON is nested too deeply")
+            except LookupError as error:  # unknown encoding in Content-Type
                 return refused(error)
 
         return handle
@@ -126,12 +126,12 @@ class Site:
 
     async def _set(self, request: web.Request) -> Any:
         if self._right == "observe":
-            raise ValueError("this scope only looks: start it with --right tune to set parameters")
+            raise ValueError("the scope is read-only: start it with --right tune to set parameters")
         told = await request.json()
         try:
             component, name, value = told["component"], told["parameter"], told["value"]
         except (KeyError, TypeError):
-            raise ValueError("a change has component, parameter and value") from None
+            raise ValueError("a change needs component, parameter and value") from None
 
         def change() -> Any:
             runner = runner_of(request)
@@ -171,7 +171,7 @@ class Site:
                 for name, value in (("begin", -math.inf), ("end", math.inf))
             )
         except ValueError:
-            return refused("begin and end are numbers of seconds")
+            return refused("begin and end must be numbers, in seconds")
         name = request.match_info["name"]
         try:
             data = await self._ask(self._recordings.columns, name, traces, begin, end)
@@ -180,19 +180,19 @@ class Site:
         return web.Response(body=data, content_type="application/octet-stream")
 
     async def _mcap(self, request: web.Request) -> web.StreamResponse:
-        """Answer with the cycles that are still known, of all that is being watched."""
+        """Answer with a recording of the requested cycles still in memory, with all columns."""
         runner = runner_of(request) or "rt_runner"
         try:
             first, last = (float(request.query.get(each, "nan")) for each in ("first", "last"))
         except ValueError:
-            return refused("first and last are numbers of cycles")
+            return refused("first and last must be cycle numbers")
         hub = self._hubs.get(runner)
         batches = [] if hub is None else [
             chunk.batch for chunk in hub.memory
             if not (chunk.cycles[-1] < first or chunk.cycles[0] > last)
         ]  # fmt: skip
         if not batches:
-            return refused("none of these cycles is known any more")
+            return refused("these cycles are no longer in memory")
 
         def write() -> bytes:
             file = io.BytesIO()
@@ -213,9 +213,9 @@ class Site:
 
     async def _stream(self, request: web.Request) -> web.StreamResponse:
         if len(self._tabs) >= MOST_TABS:
-            return refused(f"{MOST_TABS} pages are open already: close some", 503)
+            return refused(f"{MOST_TABS} pages are already open: close some", 503)
         if not web.WebSocketResponse(protocols=(PROTOCOL,)).can_prepare(request):
-            return refused("a stream is a WebSocket")
+            return refused("/stream requires a WebSocket")
         runner = runner_of(request) or "rt_runner"
         hub = self._hubs.setdefault(runner, Hub(self._client, runner))
         news = self._news.setdefault(runner, News(self._client, runner))
@@ -227,18 +227,18 @@ class Site:
         finally:
             news.leave(tab)
             self._tabs.discard(tab)
-            if hub.is_empty:  # of a runner that is not there, as far as is known
+            if hub.is_empty:  # names of nonexistent runners must not accumulate
                 self._hubs.pop(runner, None)
             if news.is_empty:
                 self._news.pop(runner, None)
 
 
 def runner_of(request: web.Request) -> str:
-    """Return the runner that a page asks about; empty is rt_runner."""
+    """Return the runner of a request; empty selects rt_runner."""
     return request.query.get("runner", "")
 
 
 def refused(error: object, status: int = 400) -> web.Response:
-    """Return an answer that says what is wrong, in one line."""
+    """Return a JSON response with an error message of one line."""
     text = json.dumps({"refused": " ".join(str(error).split())[:_LONGEST]})
     return web.Response(text=text, content_type="application/json", status=status)

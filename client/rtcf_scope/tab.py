@@ -1,7 +1,6 @@
-"""One page: what it asks, and what it is told as fast as it takes it.
+"""One page at its WebSocket: its requests and the messages sent to it.
 
-A page that does not keep up loses whole chunks, oldest first, which are counted; nobody waits
-for it.
+A slow page loses whole chunks, oldest first.  Their cycles are counted, and nothing else waits.
 """
 
 import asyncio
@@ -22,40 +21,40 @@ from rtcf_scope.hub import Hub
 from rtcf_scope.line import line
 from rtcf_scope.trigger import CYCLE, Search, Trigger, TriggerError, parse
 
-PROTOCOL = "rtcf-scope"  # of the WebSocket
+PROTOCOL = "rtcf-scope"  # subprotocol of the WebSocket
 
-_MOST_WAITING = 8 * 1024 * 1024  # bytes for a page that does not take them
+_MOST_WAITING = 8 * 1024 * 1024  # bytes queued for a slow page
 MOST_TRACES = 256
-_NAMED = 5  # signals in a message
-_LONGEST_NAMED = 200  # characters
-_BEAT_S = 20.0  # a page that answers no ping in so long is gone
+_NAMED = 5  # signals named in a message
+_LONGEST_NAMED = 200  # characters of a name
+_BEAT_S = 20.0  # ping interval; a page that does not answer is disconnected
 
 
 class Tab:
-    """A page at its WebSocket; a listener of its hub."""
+    """A page at its WebSocket, a Listener of its hub; lives in the event loop."""
 
     def __init__(self, hub: Hub) -> None:
         self.wants = False
         self.columns: tuple[str, ...] = ()
         self._hub = hub
-        self._shows = False  # cycles
-        self._asked: list[str] = []  # the traces that the page shows
-        self._over: list[str] = []  # those that are too many
-        self._schema: PortSchema | None = None  # of the last cycles
-        self._names: list[str] = []  # those asked for that have values in these
-        self._number = 0  # of what it watches
-        self._told = -1  # the number that `watching` has told
-        self._missing = _Missing()  # as the page knows it
+        self._shows = False  # whether the page shows cycles
+        self._asked: list[str] = []  # the traces requested by the page
+        self._over: list[str] = []  # requested traces above MOST_TRACES
+        self._schema: PortSchema | None = None  # of the last chunk
+        self._names: list[str] = []  # requested traces that exist in `_schema`
+        self._number = 0  # counts the changes of `_names`
+        self._told = -1  # the number in the last `watching` message
+        self._missing = _Missing()  # as last sent to the page
         self._told_trouble: str | None = None
-        self._waiting: deque[tuple[bytes | str, int]] = deque()  # what to send, cycles in it
-        self._bytes = 0
-        self._lost = 0  # cycles
-        self._has_begun = False  # to tell cycles: those before are not lost
+        self._waiting: deque[tuple[bytes | str, int]] = deque()  # messages, cycles in each
+        self._bytes = 0  # in `_waiting`, without shots
+        self._lost = 0  # cycles dropped since the last chunk sent
+        self._has_begun = False  # whether cycles were sent: earlier ones do not count as lost
         self._news = asyncio.Event()
         self._armed: _Armed | None = None
 
     async def serve(self, request: web.Request) -> web.WebSocketResponse:
-        """Talk until the page goes."""
+        """Exchange messages until the page disconnects; return the closed WebSocket."""
         socket = web.WebSocketResponse(
             heartbeat=_BEAT_S, max_msg_size=256 * 1024, protocols=(PROTOCOL,)
         )
@@ -74,7 +73,7 @@ class Tab:
         return socket
 
     def take(self, chunk: Chunk) -> None:
-        """Queue cycles, and look whether the trigger hits."""
+        """Queue a chunk of cycles, and search it for trigger hits."""
         if chunk.batch.schema is not self._schema:
             self._schema = chunk.batch.schema
             self._choose()
@@ -96,7 +95,7 @@ class Tab:
         self._queue(head + body, len(chunk) + lost)
 
     def know(self, schema: PortSchema) -> None:
-        """Tell the page which of its signals the graph does not have."""
+        """Send the page the requested signals that the graph does not have."""
         self._tell_missing(
             _Missing(
                 tuple(name for name in self._asked if not is_there(schema, name)),
@@ -106,7 +105,7 @@ class Tab:
         )
 
     def trouble(self, text: str) -> None:
-        """Tell the page what keeps its values away."""
+        """Send the page an error of the stream, if it has changed."""
         if text != self._told_trouble:
             self._told_trouble = text
             self.tell({"kind": "trouble", "text": text})
@@ -121,7 +120,7 @@ class Tab:
         except (ValueError, RecursionError):
             told = None
         if not isinstance(told, dict):
-            self.tell({"kind": "refused", "text": "a page says an object of JSON"})
+            self.tell({"kind": "refused", "text": "a message must be a JSON object"})
             return
         if "watch" in told:
             self._watch(told["watch"])
@@ -130,10 +129,10 @@ class Tab:
 
     def _watch(self, told: Any) -> None:
         if not isinstance(told, list):
-            self.tell({"kind": "refused", "text": "a page says what it watches as a list of names"})
+            self.tell({"kind": "refused", "text": "watch must be a list of signal names"})
             return
         names = list(dict.fromkeys(name for name in told if isinstance(name, str)))
-        # Of the cycle itself each message tells.
+        # Latency and duration (~) are in every message.
         traces = [name for name in names if not name.startswith("~")]
         self._asked, self._over = traces[:MOST_TRACES], traces[MOST_TRACES:]
         self._shows = bool(names)
@@ -143,7 +142,7 @@ class Tab:
         self._retune()
 
     def _arm(self, told: Any) -> None:
-        """Arm what a page says; of what cannot be, nothing is armed either."""
+        """Arm the trigger that a page requests; an invalid request disarms."""
         self._armed, refusal = None, ""
         try:
             if told is not None:
@@ -159,7 +158,7 @@ class Tab:
         self._retune()
 
     def _watched(self) -> list[str]:
-        """Return the signals of outputs and states that the trigger looks at."""
+        """Return the outputs and states that the trigger uses."""
         signals = [] if self._armed is None else self._armed.trigger.signals
         return [name for name in signals if not name.startswith("~")]
 
@@ -167,7 +166,7 @@ class Tab:
         names = (*self._asked, *self._watched())
         self.columns = tuple(dict.fromkeys(column for n in names if (column := column_of(n))))
         self.wants = self._shows or self._armed is not None
-        before = self._missing  # as far as it is still asked for
+        before = self._missing  # only signals that are still requested
         self._tell_missing(
             _Missing(
                 tuple(name for name in before.names if name in self._asked),
@@ -183,7 +182,7 @@ class Tab:
             self.tell({"kind": "missing", "text": missing.text} | asdict(missing))
 
     def _choose(self) -> None:
-        """Tell those traces that have values."""
+        """Select the requested traces that exist in the present schema."""
         schema = self._schema
         names = [] if schema is None else [n for n in self._asked if is_there(schema, n)]
         if names != self._names:
@@ -191,7 +190,7 @@ class Tab:
             self._number = (self._number + 1) & 0xFFFF
 
     def _tell_watching(self) -> int:
-        """Tell what stands in the binary messages that follow; return the base of their times."""
+        """Describe the next binary messages by `watching`, if needed; return their base time."""
         base_ns = self._hub.base_ns or 0
         if self._told != self._number:
             self._told = self._number
@@ -206,7 +205,7 @@ class Tab:
         begin = max(begin, self._hub.since)
         chunks = self._hub.memory.between(begin, end)
         if hit < chunks[0].at:
-            self.tell({"kind": "refused", "text": "the cycle of the hit is not kept: show fewer"})
+            self.tell({"kind": "refused", "text": "hit no longer in memory: show fewer cycles"})
             return
         columns = wire.cut(chunks, self._names, base_ns, begin, end)
         at = hit - max(begin, chunks[0].at)
@@ -219,7 +218,7 @@ class Tab:
 
     def _queue(self, data: bytes | str, cycles: int) -> None:
         if _is_shot(data, cycles):
-            # One waits, however large: who asked for it is to see it.
+            # Keep one shot of any size, so that the user sees it.
             self._waiting = deque(each for each in self._waiting if not _is_shot(*each))
         else:
             self._bytes += len(data)
@@ -254,17 +253,20 @@ def _is_shot(data: bytes | str, cycles: int) -> bool:
 
 
 class _Armed:
-    """A trigger that waits for its cycle, then for those behind it."""
+    """An armed trigger: waits for its hit, then for the cycles after it."""
 
     def __init__(self, trigger: Trigger) -> None:
         self.trigger = trigger
         self.done = False
         self._search = Search(trigger)
-        self._hit = -1  # place at the hub; -1 = none yet
-        self._from = 0  # nothing hits before
+        self._hit = -1  # counted as Chunk.at; -1 = none yet
+        self._from = 0  # earlier cycles do not hit
 
     def search(self, chunk: Chunk) -> list[tuple[int, int, int]]:
-        """Return begin, hit and end of the shots that are complete with this chunk."""
+        """Return begin, hit and end of the shots that this chunk completes.
+
+        If the trigger stays armed, return only the last of them.
+        """
         shots = []
         hits = self._hits(chunk)
         while not self.done:
@@ -286,7 +288,7 @@ class _Armed:
         special = dict(zip(CYCLE, (chunk.latencies_us, chunk.durations_us), strict=True))
         signals, schema = self.trigger.signals, chunk.batch.schema
         if not all(name in special or is_there(schema, name) for name in signals):
-            # What it compared with is of another graph.
+            # The last value belongs to another graph: do not compare with it.
             self._search = Search(self.trigger)
             return np.zeros(0, np.int64)
         columns = (special[name] if name in special else chunk.values(name) for name in signals)
@@ -295,22 +297,22 @@ class _Armed:
 
 @dataclass(frozen=True)
 class _Missing:
-    """Signals that a page asks for and does not get."""
+    """Requested signals without values."""
 
-    names: tuple[str, ...] = ()  # of traces that the graph does not have
-    trigger: tuple[str, ...] = ()  # that the trigger looks at, likewise
-    over: tuple[str, ...] = ()  # traces above the most of a page
+    names: tuple[str, ...] = ()  # traces that the graph does not have
+    trigger: tuple[str, ...] = ()  # signals of the trigger that the graph does not have
+    over: tuple[str, ...] = ()  # traces above MOST_TRACES
 
     @property
     def text(self) -> str:
-        """What to tell a person; empty: nothing is missing."""
+        """The message for the user; empty if nothing is missing."""
         parts = []
         if self.names:
-            parts.append(f"no such signal, left out until there is: {_few(self.names)}")
+            parts.append(f"signals omitted until they exist: {_few(self.names)}")
         if self.trigger:
-            parts.append(f"the trigger waits for a signal that is not there: {_few(self.trigger)}")
+            parts.append(f"the trigger waits until its signals exist: {_few(self.trigger)}")
         if self.over:
-            parts.append(f"a page shows {MOST_TRACES} traces at most, left out: {_few(self.over)}")
+            parts.append(f"traces omitted above {MOST_TRACES} per page: {_few(self.over)}")
         return "; ".join(parts)
 
 

@@ -1,4 +1,4 @@
-"""Finds the cycle that a trigger waits for, looking at every one."""
+"""Triggers: a search of every cycle for a hit."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,47 +10,47 @@ from rtcf.streams.condition import Condition, ConditionError
 
 from rtcf_scope.chunk import column_of
 
-MOST_CYCLES = 200_000  # of one shot
-CYCLE = ("~latency", "~duration")  # what is known of each cycle itself
+MOST_CYCLES = 200_000  # in one shot
+CYCLE = ("~latency", "~duration")  # signals of the cycle itself, µs
 KINDS = ("edge", "level", "window", "nan", "condition")
 _SLOPES = {"edge": ("rising", "falling", "either"), "level": ("above", "below"),
            "window": ("leaves", "enters"), "nan": ("",), "condition": ("",)}  # fmt: skip
 
 
 class TriggerError(ValueError):
-    """A trigger that cannot be; says why."""
+    """A trigger is invalid."""
 
 
 @dataclass(frozen=True)
 class Trigger:
-    """What to wait for; `low` is the level where there is one alone."""
+    """The settings of a trigger."""
 
     signal: str
-    kind: str
+    kind: str  # one of KINDS
     slope: str
-    low: float
+    low: float  # the level, for kinds with a single one
     high: float
-    before: int  # cycles that are shown before the hit
-    after: int  # from the hit on
-    holdoff: int  # cycles after a shot in which nothing hits
-    single: bool
-    condition: Condition | None = None  # in place of the signal
+    before: int  # cycles shown before the hit
+    after: int  # cycles shown from the hit on
+    holdoff: int  # cycles after a shot without hits
+    single: bool  # disarm after one shot
+    condition: Condition | None = None  # replaces `signal`
 
     @property
     def signals(self) -> list[str]:
-        """The signals that it looks at."""
+        """The signals that the trigger uses."""
         return [self.signal] if self.condition is None else self.condition.signals
 
 
 def parse(told: Any) -> Trigger:
-    """Return the trigger that a page asks for; raises TriggerError."""
+    """Return the trigger of a page's request; raises TriggerError."""
     try:
         kind = str(told["kind"])
         if kind not in KINDS:
-            raise TriggerError(f"trigger on {kind!r}: one of {', '.join(KINDS)}")
+            raise TriggerError(f"trigger kind {kind!r}: must be one of {', '.join(KINDS)}")
         slope = str(told.get("slope") or _SLOPES[kind][0])
         if slope not in _SLOPES[kind]:
-            raise TriggerError(f"{kind} {slope!r}: one of {', '.join(_SLOPES[kind])}")
+            raise TriggerError(f"{kind} {slope!r}: must be one of {', '.join(_SLOPES[kind])}")
         condition = Condition(str(told["condition"])) if kind == "condition" else None
         trigger = Trigger(
             str(told["signal"]) if condition is None else "", kind, slope,
@@ -61,36 +61,40 @@ def parse(told: Any) -> Trigger:
     except ConditionError as error:
         raise TriggerError(str(error)) from None
     except (KeyError, TypeError, AttributeError, OverflowError, RecursionError):
-        raise TriggerError("a trigger has signal, kind, before and after") from None
+        raise TriggerError("a trigger needs signal, kind, before and after") from None
     except TriggerError:
         raise
     except ValueError as error:
-        raise TriggerError(f"a trigger's numbers: {error}") from None
+        raise TriggerError(f"invalid number in the trigger: {error}") from None
     for signal in trigger.signals:
         if signal not in CYCLE and not column_of(signal):
-            raise TriggerError(f"{signal[:80]!r} is no signal: these are named as in /wave.phase")
+            raise TriggerError(f"{signal[:80]!r} is not a signal: name one as in /wave.phase")
     if not np.isfinite([trigger.low, trigger.high]).all():
-        raise TriggerError("a trigger's level is a number")
+        raise TriggerError("the levels of a trigger must be finite")
     if kind == "window" and not trigger.low < trigger.high:
-        raise TriggerError(f"a window from {trigger.low:g} to {trigger.high:g}: low is below high")
+        raise TriggerError(
+            f"window from {trigger.low:g} to {trigger.high:g}: low must be below high"
+        )
     if trigger.before < 0 or trigger.after < 1 or trigger.holdoff < 0:
-        raise TriggerError("a trigger shows at least one cycle, and none less than none before it")
+        raise TriggerError("before and holdoff must be at least 0, after must be at least 1 cycle")
     if trigger.before + trigger.after > MOST_CYCLES:
-        raise TriggerError(f"{MOST_CYCLES} cycles are the most that a trigger shows")
+        raise TriggerError(f"a trigger shows at most {MOST_CYCLES} cycles")
     return trigger
 
 
 class Search:
-    """A trigger at work on one stream of cycles."""
+    """The search for hits in one stream of cycles; keeps the last value between calls."""
 
     def __init__(self, trigger: Trigger) -> None:
         self._trigger = trigger
         self._last = np.nan
-        self._was_true = True  # as far as is known: it hits where it becomes true
+        self._was_true = True  # a condition hits only after it was false
 
     def hits(self, *columns: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Return the places at which it hits, in the values of its signals, which follow those of
-        the last call."""
+        """Return the indices of hits in `columns`, the values of the trigger's signals.
+
+        The values continue those of the previous call.
+        """
         trigger, values = self._trigger, columns[0]
         if trigger.condition is not None:
             return self._becomes_true(trigger.condition, columns)
@@ -104,7 +108,7 @@ class Search:
         elif trigger.kind == "level":
             found = values >= low if trigger.slope == "above" else values <= low
         elif trigger.kind == "window":
-            # A value that is no number is not inside, and none was there before the first one.
+            # NaN is not inside; there is no value before the first one.
             inside, inside_before = _inside(values, low, high), _inside(before, low, high)
             if trigger.slope == "leaves":
                 found = ~inside & inside_before

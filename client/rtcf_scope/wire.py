@@ -1,8 +1,8 @@
-"""Cycles as bytes for a page: a head, then columns of float64, all of one length.
+"""Binary messages to a page: a head, then columns of float64 of equal length.
 
-Columns are the time (seconds after the base that the text message `watching` tells), the number
-of the cycle, wake-up latency and calculation (µs), then the traces in the order of `watching`.
-All little endian; page/wire.js reads it.
+The columns are the time (seconds after the base in the text message `watching`), the cycle number,
+the wake-up latency (µs), the calculation duration (µs), then the traces in the order of `watching`.
+All values are little endian; page/wire.js parses them.
 """
 
 import struct
@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from rtcf_scope.chunk import Chunk
 
 CYCLES, SHOT, RECORDED = range(1, 4)
-# Kind, last of a loop, number of `watching`, cycles, columns, lost before these, cycle of the hit.
-# Of a recording, the last is the length of a window, whose minimum and maximum are two rows; 1 = a
-# row is a cycle.
+# Kind, last of a loop, number of `watching`, rows, columns, dropped cycles before, row of the hit.
+# For a recording, the last field is the length of a window in cycles: each window has two rows, its
+# minimum and its maximum; 1 means one row per cycle.
 _HEAD = struct.Struct("<BBHIIIdd8x")
 
 
@@ -29,7 +29,7 @@ def head(
 
 
 def columns(chunk: Chunk, names: Sequence[str], base_ns: int) -> list[NDArray[np.float64]]:
-    """Return all columns of a chunk."""
+    """Return the columns of a chunk with the traces `names`."""
     return [
         (chunk.stamps_ns - base_ns) / 1e9,
         chunk.cycles.astype("<f8"),
@@ -40,7 +40,7 @@ def columns(chunk: Chunk, names: Sequence[str], base_ns: int) -> list[NDArray[np
 
 
 def body(chunk: Chunk, names: Sequence[str], base_ns: int) -> bytes:
-    """Return a chunk's columns as bytes; made once for all tabs that show the same."""
+    """Return a chunk's columns as bytes, cached for all tabs with the same traces."""
     key = tuple(names)
     if key not in chunk.packed:
         chunk.packed[key] = np.array(columns(chunk, names, base_ns), "<f8").tobytes()
@@ -50,7 +50,7 @@ def body(chunk: Chunk, names: Sequence[str], base_ns: int) -> bytes:
 def cut(
     chunks: Sequence[Chunk], names: Sequence[str], base_ns: int, begin: int, end: int
 ) -> NDArray[np.float64]:
-    """Return the columns of the cycles from `begin` to before `end`, by their place at the hub."""
+    """Return the columns of the cycles [begin, end), counted as `Chunk.at`."""
     found = np.hstack([np.array(columns(each, names, base_ns), "<f8") for each in chunks])
     first = chunks[0].at
     result: NDArray[np.float64] = found[:, max(begin - first, 0) : end - first]

@@ -125,7 +125,10 @@ def check_plainly(*arguments: str) -> subprocess.CompletedProcess[str]:
         ("CallsAbort", "the component crashed while updating, from cycle 20 on: SIGABRT"),
         ("CrashingConfigure", "the component crashed while configuring /checked: SIGSEGV"),
         ("CallsExit", "the component ended its process while updating, from cycle 20 on: exit"),
-        ("NeverReturns", "the component does not return: nothing for 10 s while updating, from"),
+        (
+            "NeverReturns",
+            "the component does not return: no progress for 10 s while updating, from",
+        ),
     ],
 )
 def test_what_ends_the_process_is_told_as_what_it_is(name: str, said: str) -> None:

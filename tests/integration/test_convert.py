@@ -158,13 +158,13 @@ def test_refused_in_a_line_and_nothing_is_left(running: Daemon, recorded: Path) 
             Path("run.txt"),
             (),
             2,
-            "end its name in .csv or .bag, which says what to write",
+            "the suffix must be .csv or .bag, to select the format",
         ),
-        (recorded, there, (), 2, "is there already: --force writes over it"),
+        (recorded, there, (), 2, "already exists: --force overwrites it"),
         (recorded, itself, ("--force",), 2, "is the recording itself: write to another file"),
         (recorded, Path("no/where.csv"), (), 2, "No such file or directory"),
-        (there, Path("run.csv"), (), 1, "is no MCAP file"),
-        (recorded, Path("run.csv"), ("--repair",), 2, "end its name in .mcap"),
+        (there, Path("run.csv"), (), 1, "is not an MCAP file"),
+        (recorded, Path("run.csv"), ("--repair",), 2, "the suffix must be .mcap"),
         (recorded, itself.with_suffix(".mcap"), ("--repair", "--force"), 2, "recording itself"),
         (recorded.with_name("none"), Path("run.csv"), (), 1, "No such file or directory"),
     ):
@@ -198,7 +198,7 @@ def test_a_recording_of_somebody_else_has_no_lines(running: Daemon, tmp_path: Pa
         writer.close()
     done = running.ctl("convert", str(file), str(tmp_path / "x.csv"))
     assert done.returncode == 1
-    assert "tells no cycles: rtcfctl record has not written it" in done.stderr
+    assert "has no cycle topic: it was not written by rtcfctl record" in done.stderr
     assert not (tmp_path / "x.csv").exists()
 
 

@@ -70,7 +70,8 @@ def test_a_frozen_daemon_holds_up_no_stop_and_is_right_when_it_lives_again(
     begin(client)
     assert mark(daemon).exists()
     with stopped(daemon.pid):
-        assert "at its executor, as rtcfd does not answer within 0.5 s" in stop_by_command(daemon)
+        said = stop_by_command(daemon)
+        assert "at its executor, because rtcfd does not answer within 0.5 s" in said
         # Disk says so, whatever becomes of rtcfd now.
         assert not mark(daemon).exists()
     assert not runs(client)

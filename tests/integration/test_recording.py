@@ -207,7 +207,7 @@ def test_refused_and_no_file_is_touched(running: Daemon, tmp_path: Path) -> None
     file.write_text("mine")
     done = running.ctl("record", "-o", str(file))
     assert done.returncode == 2
-    assert "is there already: --force writes over it" in done.stderr
+    assert "already exists: --force overwrites it" in done.stderr
     assert file.read_text() == "mine"
     done = running.ctl("record", "-o", str(tmp_path / "no" / "where"))
     assert done.returncode == 2
@@ -256,7 +256,7 @@ def test_a_disk_that_takes_no_cycle_is_left_as_it_was(running: Daemon, full_disk
     subprocess.run(["mount", "-o", "remount,size=8k", full_disk], check=True)
     done = running.ctl("record", "--duration", "0.5", "-o", str(full_disk / "out"))
     assert done.returncode == 1
-    end = "No space left on device: no cycle was written, and the file is removed"
+    end = "No space left on device: no cycle was written; the file has been removed"
     assert done.stderr == f"rtcfctl: {full_disk / 'out'}: {end}\n"
     assert [each.name for each in full_disk.iterdir()] == ["filler"]
 
@@ -272,7 +272,7 @@ def test_a_full_disk_ends_it_with_a_line_and_what_was_written_can_be_read(
         file = disk / "run.mcap"
         done = running.ctl("record", "-o", str(file))
         assert done.returncode == 1
-        assert "No space left on device: what was written before can be read" in done.stderr
+        assert "No space left on device: the cycles written before are readable" in done.stderr
         with rtcf.read_recording(file) as recording:
             assert len(recording.cycles) > 0
     finally:
@@ -352,8 +352,8 @@ def test_what_is_around_a_moment_is_in_the_file(running: Daemon, tmp_path: Path)
         (("--pre", "1s"), "--pre and --post require --trigger"),
         (("--trigger", "wave.phase > 1", "--pre=-1s"), "--pre -1: 0 or more"),
         (("--trigger", "wave.phase > 1", "--duration", "1s"), "instead of --duration or --split"),
-        (("--trigger", "wave.phase >"), "is no condition"),
-        (("--trigger", "wave.nothing > 1"), "/wave.nothing is no number of this stream"),
+        (("--trigger", "wave.phase >"), "is not a condition"),
+        (("--trigger", "wave.nothing > 1"), "/wave.nothing is not a number of this stream"),
     ],
 )
 def test_what_cannot_be_recorded_is_refused_before_there_is_a_file(
@@ -433,5 +433,5 @@ def test_what_is_no_recording_is_said(tmp_path: Path) -> None:
     with pytest.raises(rtcf.RecordingError, match="No such file"):
         rtcf.read_recording(file)
     file.write_bytes(b"nothing of the kind")
-    with pytest.raises(rtcf.RecordingError, match="is no MCAP file"):
+    with pytest.raises(rtcf.RecordingError, match="is not an MCAP file"):
         rtcf.read_recording(file)

@@ -117,8 +117,8 @@ def test_a_bag_that_cannot_be_replayed_is_refused_in_one_line(
     good = _write(tmp_path / "good.bag", [("/G2_R2", 0, Float64(1))])
     for arguments, words in [
         ([str(tmp_path / "none.bag")], "none.bag cannot be read: No such file"),
-        ([str(text)], "text.bag is no bag"),
-        ([str(empty)], "empty.bag holds no message"),
+        ([str(text)], "text.bag is not a bag"),
+        ([str(empty)], "empty.bag has no messages"),
         ([str(other)], "/G2_R2 is recorded as std_msgs/String"),
         ([str(good), "--write", str(good)], "is the recording itself"),
         ([str(good), "--write", str(tmp_path / "no" / "x.bag")], "x.bag cannot be written"),

@@ -41,7 +41,7 @@ def test_without_the_token_nothing_is_told(scope: ScopeProcess, path: str) -> No
     for token in ("", "x" * len(scope.token), scope.token[:-1]):
         status, text = scope.ask(path, token=token)
         assert (status, text.decode()) == (
-            403, "the address with its token is the one that rtcfctl scope printed\n",
+            403, "access requires the token: open the address that rtcfctl scope printed\n",
         )  # fmt: skip
     assert scope.ask(f"{path}?token={scope.token}", token="")[0] == 403
 
@@ -57,15 +57,15 @@ def test_who_lacks_the_token_of_a_file_is_told_of_the_file(looping: Daemon, tmp_
     with ScopeProcess(looping, "--token-file", str(file)) as scope:
         status, text = scope.ask("/api/about", token="")
     assert (status, text.decode()) == (
-        403, "the address with its token is http://HOST:PORT/?token=TOKEN, "
-        f"with the token that is in {file}\n",
+        403, "access requires the token: open http://HOST:PORT/?token=TOKEN "
+        f"with the token in {file}\n",
     )  # fmt: skip
 
 
 @pytest.mark.parametrize("host", ["evil.example", "evil.example:80", "127.0.0.1.evil.example", "["])
 def test_a_name_that_is_not_this_machines_is_refused(scope: ScopeProcess, host: str) -> None:
     status, text = scope.ask("/api/about", Host=host)
-    assert (status, text.decode()) == (403, f"{host} is not a name of this scope: see --name\n")
+    assert (status, text.decode()) == (403, f"unknown host name {host}: allow it with --name\n")
     for ours in (f"localhost:{scope.port}", f"[::1]:{scope.port}", "127.0.0.1:1"):
         assert scope.ask("/api/about", Host=ours)[0] == 200
 
@@ -76,7 +76,7 @@ def test_pages_of_others_may_not_ask(scope: ScopeProcess, origin: str) -> None:
     asked: list[tuple[str, dict[str, str]]] = [("/api/about", {}), ("/stream", upgrade)]
     for path, headers in asked:
         status, text = scope.ask(path, Origin=origin, **headers)
-        assert (status, text.decode()) == (403, f"pages of {origin} may not ask here\n")
+        assert (status, text.decode()) == (403, f"requests from pages of {origin} are rejected\n")
 
 
 @pytest.mark.parametrize(
@@ -104,9 +104,9 @@ def test_a_layout_is_kept_until_it_is_removed(scope: ScopeProcess) -> None:
     assert scope.told("/api/layouts") == ["my arm"]
     assert scope.told("/api/layouts/my%20arm") == {"span": 5}
     status, text = scope.ask("/api/layouts/b", "PUT", "{")
-    assert status == 400 and b"layout b is no JSON" in text
+    assert status == 400 and b"layout b is not JSON" in text
     status, text = scope.ask("/api/layouts/b", "PUT", json.dumps("x" * 70_000))
-    assert (status, json.loads(text)) == (400, {"refused": "a layout has 65536 bytes at most"})
+    assert (status, json.loads(text)) == (400, {"refused": "a layout can have at most 65536 bytes"})
     scope.told("/api/layouts/my%20arm", "DELETE")
     assert scope.told("/api/layouts") == []
     status, text = scope.ask("/api/layouts/my%20arm")
@@ -138,7 +138,7 @@ def test_without_the_right_no_parameter_is_set(scope: ScopeProcess) -> None:
     status, text = scope.ask("/api/parameter", "POST", change)
     assert (status, json.loads(text)) == (
         400,
-        {"refused": "this scope only looks: start it with --right tune to set parameters"},
+        {"refused": "the scope is read-only: start it with --right tune to set parameters"},
     )
 
 
@@ -160,7 +160,7 @@ def test_with_the_right_parameters_are_set_within_their_bounds(
         assert rate.value.double_value == 2.0
         assert change("/wave", "shape", "square") == ""
         assert "1000" in change("/wave", "rate", 2000)
-        assert change("/wave", "rate", "fast") == "rate is of type double, and 'fast' is not"
+        assert change("/wave", "rate", "fast") == "rate has type double: invalid value 'fast'"
         assert change("/wave", "size", 1) == "/wave has no parameter size"
         assert "/nobody" in change("/nobody", "size", 1)
         assert scope.ask("/api/parameter", "POST", "[1]")[0] == 400
@@ -265,32 +265,32 @@ def test_a_trigger_on_several_signals_shows_its_cycle(scope: ScopeProcess) -> No
     [
         (
             {"trigger": {"kind": "condition", "condition": "a.x >", "before": 1, "after": 1}},
-            '"a.x >" is no condition: write one as in `wave.phase > 0.5`',
+            '"a.x >" is not a condition: write one as in `wave.phase > 0.5`',
         ),
-        ({"trigger": 3}, "a trigger has signal, kind, before and after"),
+        ({"trigger": 3}, "a trigger needs signal, kind, before and after"),
         (
             {"trigger": {"kind": "loud"}},
-            "trigger on 'loud': one of edge, level, window, nan, condition",
+            "trigger kind 'loud': must be one of edge, level, window, nan, condition",
         ),
         (
             {"trigger": {"kind": "window", "signal": "/wave.wave", "low": 2, "high": 1,
                          "before": 1, "after": 1}},
-            "a window from 2 to 1: low is below high",
+            "window from 2 to 1: low must be below high",
         ),
         (
             {"trigger": {"kind": "nan", "signal": "/wave.wave", "before": 1, "after": 1_000_000}},
-            "200000 cycles are the most that a trigger shows",
+            "a trigger shows at most 200000 cycles",
         ),
         (
             {"trigger": {"kind": "edge", "signal": "wave", "before": 1, "after": 1}},
-            "'wave' is no signal: these are named as in /wave.phase",
+            "'wave' is not a signal: name one as in /wave.phase",
         ),
         (
             {"trigger": {"kind": "condition", "condition": "min(wave.wave) > 1", "before": 1,
                          "after": 1}},
             "min() takes 2 values",
         ),
-        ({"watch": "/wave.wave"}, "a page says what it watches as a list of names"),
+        ({"watch": "/wave.wave"}, "watch must be a list of signal names"),
     ],
 )  # fmt: skip
 def test_what_a_page_may_not_ask_is_refused_in_one_line(
@@ -355,7 +355,7 @@ def test_recordings_are_told_as_they_were_recorded(looping: Daemon, tmp_path: Pa
         assert np.isnan(columns[5]).all()
         status, text = scope.ask("/api/recordings/other.mcap")
         assert (status, json.loads(text)["refused"]) == (
-            400, "no recording other.mcap here: start the scope with its file",
+            400, "no recording other.mcap: start the scope with this file",
         )  # fmt: skip
 
 
@@ -407,7 +407,7 @@ def test_over_ssh_the_way_through_is_told(looping: Daemon, monkeypatch: pytest.M
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["--port", "99999"], "rtcfctl: --port 99999: from 0 to 65535"),
+        (["--port", "99999"], "rtcfctl: --port 99999: must be from 0 to 65535"),
         (["/nowhere.mcap"], "rtcfctl: /nowhere.mcap: no such file"),
         (["--address", "192.0.2.1"], "choose another --port"),
         (["--token-file", "/dev/null"], "rtcfctl: /dev/null: a token has 16 letters"),

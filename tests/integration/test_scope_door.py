@@ -131,7 +131,7 @@ def test_a_page_without_a_session_says_how_to_get_one(
     page = chromium.page(f"http://127.0.0.1:{scope.port}/#{quote(LAYOUT)}")
     page.wait(
         "document.getElementById('trouble').textContent === "
-        "'the address with its token is the one that rtcfctl scope printed'"
+        "'access requires the token: open the address that rtcfctl scope printed'"
     )
     # It goes on once another tab has one.
     chromium.page(scope.address).wait("scope.rate")

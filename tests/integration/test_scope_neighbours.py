@@ -113,7 +113,7 @@ def test_a_signal_that_is_missing_is_named_and_comes_with_its_component(
             missing = await page.text("missing")
             assert missing["names"] == ["/late.wave", "/mimo.none", "/mimo.out1[9]"]
             assert missing["text"] == (
-                "no such signal, left out until there is: /late.wave, /mimo.none, /mimo.out1[9]"
+                "signals omitted until they exist: /late.wave, /mimo.none, /mimo.out1[9]"
             )
             await page.binary(CYCLES, traces=1)
             await asyncio.to_thread(client.load, _wave("late"))
@@ -160,7 +160,7 @@ def test_traces_above_the_most_of_a_page_are_left_out_by_name(scope: ScopeProces
             assert missing["over"] == ["/wave.wave", "/mimo.out1"]
             assert missing["names"] == GHOSTS[:255]
             assert missing["text"].endswith(
-                "a page shows 256 traces at most, left out: /wave.wave, /mimo.out1"
+                "traces omitted above 256 per page: /wave.wave, /mimo.out1"
             )
             await page.binary(CYCLES, traces=1)
             await page.say(watch=["/wave.phase", "/wave.wave", "/mimo.out1"])
@@ -223,7 +223,7 @@ def test_a_trigger_that_is_refused_leaves_none_armed(scope: ScopeProcess) -> Non
             await page.say(trigger=LEVEL | {"signal": ""})
             state = await page.text("trigger")
             assert (state["state"], state["refused"]) == (
-                "off", "'' is no signal: these are named as in /wave.phase",
+                "off", "'' is not a signal: name one as in /wave.phase",
             )  # fmt: skip
 
     asyncio.run(look())

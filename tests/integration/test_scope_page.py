@@ -166,7 +166,7 @@ def test_a_trigger_whose_signal_has_gone_says_so_and_arms_no_other(
     page.wait(f"{_SAID} === 'waiting for /gone.wave: not there'")
     assert page.ask("scope.trigger.armed") == ["/gone.wave"]
     assert page.ask("document.getElementById('trouble').textContent") == (
-        "the trigger waits for a signal that is not there: /gone.wave"
+        "the trigger waits until its signals exist: /gone.wave"
     )
     # Another one is chosen: it is armed, and hits.
     page.ask(f"{_SIGNAL}.value = '/w2.wave'; {_SIGNAL}.onchange()")
@@ -193,7 +193,7 @@ def test_what_is_armed_ends_with_a_layout_and_with_a_change_of_runner(
             assert page.ask("[scope.trigger.state, scope.trigger.armed]") == ["off", []]
             assert page.ask(f"{_SIGNAL}.selectedOptions[0].text") == "/w3.wave (not there)"
             assert page.ask("document.getElementById('trouble').textContent") == (
-                "no such signal, left out until there is: /w0.phase"
+                "signals omitted until they exist: /w0.phase"
             )
         finally:
             client.remove_runner("second")

@@ -130,8 +130,8 @@ def test_a_container_is_refused_in_a_line(
     )  # fmt: skip
     assert done.returncode == 1
     assert done.stderr.splitlines() == [
-        "rtcfctl: trace --kernel: this is a container, where processes have other numbers than the "
-        "kernel's: run it on the machine itself"
+        "rtcfctl: trace --kernel: process IDs in this container differ from the kernel's: run it "
+        "on the host"
     ]
 
 

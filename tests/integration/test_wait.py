@@ -30,11 +30,11 @@ def test_wait_gives_up(running: Daemon) -> None:
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
-        (("wait", "wave.phase >"), 2, '"wave.phase >" is no condition'),
+        (("wait", "wave.phase >"), 2, '"wave.phase >" is not a condition'),
         (("wait", "nobody.x > 1"), 1, "nobody.x matches no output of fixed size and no state"),
         (("wait", "wave.phase > 1", "--timeout", "0"), 2, "--timeout 0: more than 0 s"),
         (("wait", "wave.phase > 1", "--timeout", "soon"), 2, "soon"),
-        (("wait", "wave.phase[1] > 1"), 2, "/wave.phase[1] is no number of this stream"),
+        (("wait", "wave.phase[1] > 1"), 2, "/wave.phase[1] is not a number of this stream"),
         (("get", "nobody"), 1, "/nobody"),
         (("get", "wave.nothing"), 1, "/wave has no nothing; it has amplitude, rate, "),
         (("hz", "wave", "-n", "0"), 2, "-n 0: at least 1"),

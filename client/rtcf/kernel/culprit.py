@@ -1,8 +1,8 @@
 """The culprit of a late cycle, by the kernel's trace.
 
 A pure function of events.  It assigns each nanosecond from a cycle's deadline to its end to the
-owner of the CPU.  A cause is named only if the cycle would have been on time without it; all else
-is unknown.
+owner of the CPU.  A cause is named only if the cycle would have been on time without it; otherwise
+the cause is unknown.
 """
 
 from collections.abc import Iterable, Iterator
@@ -11,25 +11,25 @@ from enum import Enum
 from typing import NamedTuple
 
 _IDLE = 0  # pid of the idle thread
-_FIRST_FAIR_PRIORITY = 100  # of the kernel; smaller ones are real-time
-FAULT_NS = 5_000  # a page fault takes so long at most, if its page is in memory
-_FAULT_TO_WAIT_NS = 200_000  # and else it waits after so long at most
+_FIRST_FAIR_PRIORITY = 100  # kernel priority; smaller ones are real-time
+FAULT_NS = 5_000  # maximum time of a page fault whose page is in memory
+_FAULT_TO_WAIT_NS = 200_000  # maximum time from a page fault to the wait for its page
 
 
 @dataclass(frozen=True)
 class Switch:
-    """A CPU goes from one thread to another (sched_switch)."""
+    """A CPU switches from one thread to another (sched_switch)."""
 
     time_ns: int
     cpu: int
-    previous: int  # pid, as the next ones
+    previous: int  # pid
     previous_name: str
-    runnable: bool  # the previous one would go on: it was preempted
-    previous_priority: int  # of the kernel: 0 to 99 are real-time, the smallest first
-    next: int
+    runnable: bool  # the previous thread was preempted
+    previous_priority: int  # kernel priority: 0 to 99 are real-time, 0 is the highest
+    next: int  # pid
     next_name: str
     next_priority: int
-    uninterruptible: bool = False  # the previous one waits for the kernel, not for an event
+    uninterruptible: bool = False  # the previous thread waits uninterruptibly in the kernel
 
 
 @dataclass(frozen=True)
@@ -37,8 +37,8 @@ class Wake:
     """A thread is woken (sched_waking)."""
 
     time_ns: int
-    cpu: int  # that wakes it
-    thread: int
+    cpu: int  # the CPU that wakes it
+    thread: int  # pid of the woken thread
 
 
 @dataclass(frozen=True)
@@ -47,13 +47,13 @@ class Enter:
 
     time_ns: int
     cpu: int
-    key: str  # by which its end is found
-    name: str  # in words
+    key: str  # matches Leave.key
+    name: str  # for the user
 
 
 @dataclass(frozen=True)
 class Leave:
-    """A CPU ends the innermost interrupt or softirq of a key."""
+    """A CPU ends the innermost interrupt or softirq with this key."""
 
     time_ns: int
     cpu: int
@@ -62,7 +62,7 @@ class Leave:
 
 @dataclass(frozen=True)
 class Fault:
-    """The thread on a CPU accesses a page that is not there (page_fault_user and _kernel)."""
+    """The thread on a CPU accesses a missing page (page_fault_user and page_fault_kernel)."""
 
     time_ns: int
     cpu: int
@@ -70,7 +70,7 @@ class Fault:
 
 @dataclass(frozen=True)
 class Lost:
-    """Events of a CPU are missing since the one before."""
+    """Events of a CPU are missing between the previous event and this one."""
 
     time_ns: int
     cpu: int
@@ -81,7 +81,7 @@ Event = Switch | Wake | Enter | Leave | Fault | Lost
 
 @dataclass(frozen=True)
 class LateCycle:
-    """A cycle that ended behind the deadline of the next one; times on the clock of the events."""
+    """A cycle that ended after the next deadline; times are on the clock of the events."""
 
     deadline_ns: int
     begin_ns: int
@@ -90,7 +90,7 @@ class LateCycle:
 
     @property
     def delay_ns(self) -> int:
-        """From the deadline to the end."""
+        """The time from the deadline to the end."""
         return self.end_ns - self.deadline_ns
 
 
@@ -115,7 +115,7 @@ class Culprit:
     taken_ns: int = 0
 
     def __str__(self) -> str:
-        """Return it for a person."""
+        """Return the cause and its time for the user."""
         taken = f" for {self.taken_ns / 1000:.0f} µs" if self.taken_ns else ""
         return f"{self.words}{taken}"
 
@@ -123,14 +123,14 @@ class Culprit:
 class _Cause(NamedTuple):
     kind: Kind
     words: str
-    group: str = ""  # in words, of threads with one name
+    group: str = ""  # for the user: the group of threads with the same name
 
 
 _LESS_URGENT = (
     "though the loop is more urgent: preemption was off, its priority was higher meanwhile, or a "
     "limit of CPU time held the loop"
 )
-_OWN = _Cause(Kind.UNKNOWN, "")  # the loop's thread has its CPU, in the cycle
+_OWN = _Cause(Kind.UNKNOWN, "")  # the loop's thread runs in the cycle
 _NOTHING_ELSE = _Cause(
     Kind.UNKNOWN,
     "unknown: nothing else ran: a component took long, or the machine stood still "
@@ -153,9 +153,10 @@ def find_culprit(
 ) -> Culprit:
     """Return the cause of a late cycle.
 
-    `thread`: pid of the loop's thread.  The events are in order of time, of the CPU of the loop at
-    least, and begin before the deadline with a switch, which names the running thread.
-    `fault_ns`: the longest time of a page fault whose page is in memory.
+    thread    pid of the loop's thread
+    events    in order of time, at least those of the loop's CPU; the first one is a Switch before
+              the deadline, which names the running thread
+    fault_ns  maximum time of a page fault whose page is in memory
     """
     taken = _shares(list(events), thread, cycle, fault_ns)
     lost = taken.pop(_LOST, 0)
@@ -176,7 +177,7 @@ def _culprit(cause: _Cause, taken_ns: int = 0) -> Culprit:
 
 
 def _grouped(taken: dict[_Cause, int]) -> dict[_Cause, int]:
-    """Return the same with threads of one name as one cause."""
+    """Return the times with all threads of the same name as one cause."""
     groups: dict[_Cause, int] = {}
     for cause, ns in taken.items():
         _add(groups, _Cause(cause.kind, cause.group) if cause.group else cause, ns)
@@ -184,7 +185,7 @@ def _grouped(taken: dict[_Cause, int]) -> dict[_Cause, int]:
 
 
 def _shares(events: list[Event], thread: int, cycle: LateCycle, fault_ns: int) -> dict[_Cause, int]:
-    """Return for how long each cause had the CPU between deadline and end, ns."""
+    """Return the time of each cause on the CPU between deadline and end; ns."""
     cpu = _cpu_of(events, thread, cycle)
     taken: dict[_Cause, int] = {}
     switches = [each for each in events if isinstance(each, Switch) and each.cpu == cpu]
@@ -209,7 +210,7 @@ def _shares(events: list[Event], thread: int, cycle: LateCycle, fault_ns: int) -
 
 
 def _cpu_of(events: list[Event], thread: int, cycle: LateCycle) -> int | None:
-    """Return the CPU that the thread ran on in a cycle: where it waited for it, too."""
+    """Return the CPU on which the thread ran, and waited to run, in a cycle."""
     found: int | None = None
     for event in events:
         if isinstance(event, Switch) and thread in (event.previous, event.next):
@@ -225,19 +226,19 @@ class _State:
 
     thread: int
     fault_limit_ns: int
-    later: Iterator[Switch]  # the switches of the CPU behind the one that is taken next
-    current: int | None = None  # pid; None: not seen yet
-    name: str = ""
-    priority: int = 0  # when it got the CPU, and when it gave it back
-    last_priority: int = 0
-    passed_over: bool = False  # a less urgent thread than the loop's got the CPU after it
-    own_priority: int | None = None
+    later: Iterator[Switch]  # the switches of the CPU after the next one
+    current: int | None = None  # pid of the running thread; None: unknown yet
+    name: str = ""  # of the running thread
+    priority: int = 0  # of the running thread when it got the CPU
+    last_priority: int = 0  # of the running thread when it left the CPU
+    passed_over: bool = False  # the next thread has a lower priority than the loop's
+    own_priority: int | None = None  # of the loop's thread
     nested: list[Enter] = field(default_factory=list)  # interrupts, the innermost last
     runnable: bool = False  # the loop's thread waits for the CPU
-    throttled: bool = False  # others were chosen though it would run
-    asleep: bool = False  # it went to sleep, and has not run since
-    woke_ns: int = 0  # since when it runs after a sleep
-    fault_ns: int | None = None  # of its last one since it has the CPU
+    throttled: bool = False  # the scheduler preferred others to the runnable loop's thread
+    asleep: bool = False  # the loop's thread went to sleep and has not run since
+    woke_ns: int = 0  # when the loop's thread began to run after a sleep
+    fault_ns: int | None = None  # the last page fault since the loop's thread got the CPU
     waits_for_page: bool = False
 
     def take(self, event: Event) -> None:
@@ -250,7 +251,7 @@ class _State:
                 self.nested.append(event)
             case Leave(key=key) if any(each.key == key for each in self.nested):
                 while self.nested.pop().key != key:
-                    pass  # its end is missing
+                    pass  # the end of an inner interrupt is missing
             case Fault(time_ns=time_ns) if self.current == self.thread:
                 self.fault_ns = time_ns
             case Lost():
@@ -258,7 +259,7 @@ class _State:
                 self.nested.clear()
 
     def _switch(self, event: Switch) -> None:
-        self.nested.clear()  # of an interrupt no thread is switched
+        self.nested.clear()  # no switch happens inside an interrupt
         if event.previous == self.thread:
             self.own_priority = event.previous_priority
             self.runnable = event.runnable
@@ -273,7 +274,7 @@ class _State:
         self.passed_over = False
         back = next(self.later, None)
         if back is not None and back.previous == event.next:
-            # Meanwhile it may have changed both.
+            # The thread may have changed its name and priority meanwhile.
             self.name, self.last_priority = back.previous_name, back.previous_priority
             self.passed_over = self._is_below(back.next_priority) and back.next != self.thread
         if event.next == self.thread:
@@ -287,24 +288,25 @@ class _State:
             self.throttled = True
 
     def _is_less_urgent(self) -> bool:
-        """Tell whether the scheduler would choose the loop's thread, were it free to."""
+        """Return whether the scheduler should prefer the loop's thread to the running one."""
         return self.current == _IDLE or self._is_below(self.priority)
 
     def _is_below(self, priority: int) -> bool:
-        """Tell whether a priority is below the loop's, if that is real-time: among threads of
-        other priorities each has its share.
+        """Return whether a priority is below the loop's real-time priority.
+
+        False if the loop is not real-time: fair threads share the CPU whatever their nice value.
         """
         own = self.own_priority
         return own is not None and own < _FIRST_FAIR_PRIORITY and priority > own
 
     def add(self, taken: dict[_Cause, int], begin: int, end: int, cycle: LateCycle) -> None:
-        """Add a time in which nothing changes to its causes."""
+        """Add an interval without events to its cause in `taken`."""
         for at, until in ((begin, min(end, cycle.begin_ns)), (max(begin, cycle.begin_ns), end)):
             if at >= until:
                 continue
             own_fault = self.current == self.thread and not self.nested and self.fault_ns
             if own_fault and at >= cycle.begin_ns:
-                # The kernel does not say when it is done.
+                # The trace has no event for the end of a page fault.
                 done = max(at, min(until, own_fault + self.fault_limit_ns))
                 _add(taken, _FAULTS, done - at)
                 _add(taken, _OWN, until - done)
@@ -337,7 +339,7 @@ class _State:
 
 
 def _in_words(priority: int) -> str:
-    """Return a priority of the kernel for a person."""
+    """Return a kernel priority for the user."""
     if priority >= _FIRST_FAIR_PRIORITY:
         return f"nice {priority - 120}"
     if priority >= 0:

@@ -12,7 +12,10 @@ _FINISH_S = 1.0
 
 
 class LateCycles:
-    """Owned by the follower of the loop; `found` are cycles with their culprits, in order."""
+    """Finds the culprits of late cycles; one thread.
+
+    `found` has the cycle numbers with their culprits, in order.
+    """
 
     def __init__(self, trace: Trace, kernel: KernelTrace) -> None:
         self.found: list[tuple[int, Culprit]] = []
@@ -21,8 +24,8 @@ class LateCycles:
         self._waiting: deque[tuple[int, int, LateCycle]] = deque()
 
     def add(self, cycle: int, stamp_ns: int, begin_ns: int, end_ns: int, late_ns: int) -> None:
-        """Take a late cycle, by its stamps; the kernel's events of it may be still to come."""
-        # Stamps are of the wall clock, the loop and the kernel's trace of the monotonic one.
+        """Queue a late cycle by its stamps; its kernel events may not have arrived yet."""
+        # Stamps use the wall clock, the kernel's trace the monotonic clock.
         offset = time.clock_gettime_ns(time.CLOCK_REALTIME) - time.monotonic_ns()
         late = LateCycle(stamp_ns - offset, begin_ns - offset, end_ns - offset, late_ns)
         self._waiting.append((cycle, end_ns, late))
@@ -36,17 +39,20 @@ class LateCycles:
             self._trace.add_culprit(cycle, end_ns, str(culprit))
 
     def finish(self) -> None:
-        """Wait for the rest, a moment: events of a time to come (the clock was set) never come."""
+        """Wait briefly for the remaining culprits.
+
+        If the wall clock was set, events for a time in the future may never arrive.
+        """
         until = time.monotonic() + _FINISH_S
         while self._waiting and time.monotonic() < until:
             self.ask()
             time.sleep(_SHORT_S)
 
     def counts(self) -> list[tuple[str, int]]:
-        """Return how often each culprit was found, the most frequent first."""
+        """Return the number of late cycles of each culprit, the most frequent first."""
         return Counter(culprit.words for _, culprit in self.found).most_common()
 
     @property
     def problem(self) -> str:
-        """Why the kernel's trace ended; empty: it did not."""
+        """Why the kernel's trace ended; empty if it did not."""
         return self._kernel.problem

@@ -1,7 +1,7 @@
-"""Pages of the kernel's trace as `trace_pipe_raw` gives them: their format, and events of them.
+"""Decoding of the kernel's trace pages, as read from `trace_pipe_raw`.
 
-The layout of a page and of its entries is that of the kernel's include/linux/ring_buffer.h; the
-layout of an event is that of its file `format`.
+include/linux/ring_buffer.h of the kernel defines the layout of a page and its entries; the file
+`format` of an event defines the layout of the event.
 """
 
 import re
@@ -16,11 +16,11 @@ _FIELD = re.compile(
     r"\tfield:(?P<declared>[^;]+);\toffset:(?P<offset>\d+);\tsize:(?P<size>\d+);"
     r"(?:\tsigned:(?P<signed>\d);)?"
 )
-_PADDING, _EXTENDED, _STAMP = 29, 30, 31  # kinds of entries besides data
+_PADDING, _EXTENDED, _STAMP = 29, 30, 31  # kinds of entries other than data
 _DELTA_BITS = 27
-_MISSED = 1 << 31  # of a page: events before it are lost
+_MISSED = 1 << 31  # flag of a page: events before it are lost
 _LENGTH = (1 << 20) - 1
-# States of a thread: runnable (TASK_REPORT_MAX), and waiting for the kernel.
+# States of a thread: running, preempted (TASK_REPORT_MAX), and in an uninterruptible wait.
 _RUNNING, _PREEMPTED, _UNINTERRUPTIBLE = 0, 0x100, 2
 _SOFTIRQS = ("HI", "TIMER", "NET_TX", "NET_RX", "BLOCK", "IRQ_POLL", "TASKLET", "SCHED",
              "HRTIMER", "RCU")  # fmt: skip
@@ -28,25 +28,25 @@ _SOFTIRQS = ("HI", "TIMER", "NET_TX", "NET_RX", "BLOCK", "IRQ_POLL", "TASKLET", 
 
 @dataclass(frozen=True)
 class Page:
-    """Some events of a CPU, as the kernel has written them."""
+    """A page of events of one CPU, in the kernel's format."""
 
     cpu: int
     data: bytes
 
     @property
     def begin_ns(self) -> int:
-        """Return when the first event was, or a bit earlier."""
+        """The time of the first event, or slightly earlier."""
         return int.from_bytes(self.data[:8], "little")
 
 
 class Format:
-    """The fields of one kind of event, by the text of its file `format`."""
+    """The fields of one kind of event."""
 
     def __init__(self, text: str) -> None:
-        """Raises ValueError."""
+        """Parse the text of a file `format`; raises ValueError."""
         found = re.search(r"^ID: (\d+)$", text, re.M)
         if found is None:
-            raise ValueError("a format of an event without an ID")
+            raise ValueError("an event format has no ID")
         self.id = int(found[1])
         self._fields: dict[str, tuple[int, int, bool, bool]] = {}
         for each in _FIELD.finditer(text):
@@ -56,11 +56,11 @@ class Format:
             self._fields[name] = (int(each["offset"]), int(each["size"]), signed, is_text)
 
     def get(self, data: bytes, name: str) -> Any:
-        """Return a field's value, a number or text.  Raises KeyError."""
+        """Return the value of a field, a number or text; raises KeyError."""
         offset, size, signed, is_text = self._fields[name]
         if not is_text:
             return int.from_bytes(data[offset : offset + size], "little", signed=signed)
-        if size == 4:  # __data_loc: where the text is
+        if size == 4:  # __data_loc: offset and length of the text
             place = int.from_bytes(data[offset : offset + size], "little")
             offset, size = place & 0xFFFF, place >> 16
         return data[offset : offset + size].split(b"\0")[0].decode(errors="replace")
@@ -70,10 +70,13 @@ Convert = Callable[[int, int, bytes], Event]
 
 
 class Decoder:
-    """Makes events of pages.  `formats`: the text of the file `format` of each kind of event."""
+    """Decodes pages into events."""
 
     def __init__(self, formats: dict[str, str], header_page: str) -> None:
-        """Raises ValueError and KeyError where the kernel's formats are not as expected."""
+        """Parse the texts of the files `format`, by event, and of the file `header_page`.
+
+        Raises ValueError or KeyError if the kernel's formats are not as expected.
+        """
         self._convert: dict[int, Convert] = {}
         for name, text in formats.items():
             described = Format(text)
@@ -92,7 +95,7 @@ class Decoder:
                 yield convert(now, page.cpu, data)
 
     def entries(self, page: Page, number: int) -> Iterator[bytes]:
-        """Yield the bytes of all events of a kind."""
+        """Yield the bytes of all events with the ID `number`."""
         return (data for _, data in self._entries(page) if _number(data) == number)
 
     def _entries(self, page: Page) -> Iterator[tuple[int, bytes]]:
@@ -113,7 +116,7 @@ class Decoder:
                 now += (more << _DELTA_BITS) + delta
                 at += 8
             elif kind == _STAMP:
-                # Its upper bits are those of the time before.
+                # The upper bits are those of the previous time.
                 now = (now & ~((1 << 59) - 1)) | (more << _DELTA_BITS) + delta
                 at += 8
             else:
@@ -174,7 +177,7 @@ def _converter(name: str, described: Format) -> Convert:
         return lambda now, cpu, _: Enter(now, cpu, words, words)
     if edge == "exit":
         return lambda now, cpu, _: Leave(now, cpu, words)
-    raise ValueError(f"no event {name} is known")
+    raise ValueError(f"unknown event {name}")
 
 
 def _softirq(number: int) -> str:

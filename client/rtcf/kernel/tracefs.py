@@ -1,6 +1,6 @@
-"""The kernel's tracer, by tracefs: an instance of our own; a thread reads its pages in time.
+"""The kernel's tracer by tracefs: a separate instance, whose pages a thread reads.
 
-See Documentation/trace/ftrace.rst of the kernel.  Other users of the tracer are not disturbed.
+See Documentation/trace/ftrace.rst of the kernel.  Other users of the tracer are not affected.
 """
 
 import contextlib
@@ -26,25 +26,25 @@ _EVENTS = (
     "irq/softirq_entry",
     "irq/softirq_exit",
 )
-# Of processors that have them.
+# Events that only some processors have.
 _MORE_EVENTS = ("exceptions/page_fault_user", "exceptions/page_fault_kernel")
 _VECTORS = "irq_vectors"
 _WAKING = "sched/sched_waking"
 _BUFFER_KB = 4096  # of each CPU
 _KEPT_BYTES = 64 * 1024 * 1024
 _EVERY_S = 0.02
-_LONGEST_BACK_NS = 200_000_000  # from a deadline to the loop's turn before it
-_DECODED = 64  # pages that are kept as events, too: cycles in a row are late together
+_LONGEST_BACK_NS = 200_000_000  # from a deadline back to the loop's previous turn
+_DECODED = 64  # decoded pages in a cache, because consecutive cycles are often late
 _MARK = "rtcfctl trace\n"
-_FAULTS = 128  # pages that a measurement of page faults touches
-_COLDER = 3  # so many times longer do they take in a loop than in a measurement, at most
+_FAULTS = 128  # pages touched to measure the time of page faults
+_COLDER = 3  # maximum ratio of the time of a page fault in a loop to the measured one
 
 
 class KernelTrace:
-    """The kernel's events on the CPU of a loop, while it is entered; its thread reads them."""
+    """The kernel's events on a loop's CPU, traced within a `with` statement by a thread."""
 
     def __init__(self, thread: int, cpu: int | None) -> None:
-        """`thread`: id of the loop's thread; `cpu`: the one that it is bound to, None: none."""
+        """Trace the loop's thread with the ID `thread`, pinned to `cpu` (None: not pinned)."""
         self._thread = thread
         self._cpu = cpu
         self._pages: deque[Page] = deque()  # in order of time for each CPU
@@ -53,10 +53,10 @@ class KernelTrace:
         self._end = threading.Event()
         self._descriptors: dict[int, int] = {}  # by CPU
         self._problem = ""
-        self._read_ns = 0  # events up to then have been read
+        self._read_ns = 0  # all events up to this time have been read
 
     def __enter__(self) -> "KernelTrace":
-        """Begin.  Raises RtcfError where the kernel's trace cannot be read."""
+        """Start tracing; raises RtcfError if the kernel's trace is not readable."""
         root = _root()
         self._folder = root / "instances" / f"rtcf-{os.getpid()}"
         with _told(root):
@@ -83,7 +83,7 @@ class KernelTrace:
         self._remove()
 
     def culprit(self, cycle: LateCycle) -> Culprit:
-        """Return the cause of a late cycle that is settled()."""
+        """Return the cause of a late cycle for which settled() is true."""
         with self._lock:
             pages = [each for each in self._pages if each.begin_ns <= cycle.end_ns]
         events: list[Event] = []
@@ -93,9 +93,9 @@ class KernelTrace:
         return find_culprit(events, self._thread, cycle, self._fault_ns)
 
     def _since_last_turn(self, pages: list[Page], cycle: LateCycle) -> list[Event]:
-        """Return the events of a CPU, from the loop's turn before a deadline on."""
+        """Return the events of a CPU since the loop's last turn before a deadline."""
         events: list[Event] = []
-        # Of other CPUs than the loop's only the wake-ups of its thread count.
+        # On other CPUs than the loop's, only wake-ups of its thread matter.
         back_ns = 0 if self._cpu not in (None, pages[0].cpu) else _LONGEST_BACK_NS
         for page in reversed(pages):
             found = self._events(page)
@@ -115,18 +115,18 @@ class KernelTrace:
         )
 
     def settled(self, cycle: LateCycle) -> bool:
-        """Tell whether all events of a cycle have been read, or none will be."""
+        """Return whether all events of a cycle have been read, or tracing has failed."""
         return bool(self._problem) or self._read_ns > cycle.end_ns
 
     @property
     def problem(self) -> str:
-        """Why nothing is read any more; empty: it is."""
+        """Why tracing has failed; empty if it has not."""
         return self._problem
 
     def _begin(self) -> None:
         events = self._folder / "events"
         self._write("tracing_on", "0")
-        self._write("trace_clock", "mono")  # that of the loop
+        self._write("trace_clock", "mono")  # the clock of the loop
         self._write("buffer_size_kb", str(_BUFFER_KB))
         names = list(_EVENTS) + [each for each in _MORE_EVENTS if (events / each).is_dir()]
         for entry in sorted((events / _VECTORS).glob("*_entry")):
@@ -151,7 +151,7 @@ class KernelTrace:
             self._write(f"events/{name}/enable", "1")
 
     def _require_own_numbers(self, text: str) -> None:
-        """Refuse where the kernel numbers processes otherwise than they are numbered here."""
+        """Raise RtcfError if the kernel's process IDs differ from those of this namespace."""
         described = Format(text)
         self._write("tracing_on", "1")
         with open(self._folder / "trace_marker", "w") as marker:
@@ -164,8 +164,8 @@ class KernelTrace:
         }
         if os.getpid() not in writers:
             raise RtcfError(
-                "trace --kernel: this is a container, where processes have other numbers than the "
-                "kernel's: run it on the machine itself"
+                "trace --kernel: process IDs in this container differ from the kernel's: run it on "
+                "the host"
             )
         self._pages.clear()
         self._kept = 0
@@ -204,7 +204,7 @@ class KernelTrace:
 
 
 def _measured_fault_ns() -> int:
-    """Return the time of a page fault on this machine, ns: the shortest mean of some."""
+    """Return the time of a page fault on this machine in ns: the minimum of several means."""
     pages = range(0, _FAULTS * mmap.PAGESIZE, mmap.PAGESIZE)
 
     def touch() -> int:
@@ -214,7 +214,7 @@ def _measured_fault_ns() -> int:
         return time.monotonic_ns() - begin
 
     with mmap.mmap(-1, _FAULTS * mmap.PAGESIZE, mmap.MAP_PRIVATE) as memory:
-        with contextlib.suppress(OSError):  # of a kernel without huge pages
+        with contextlib.suppress(OSError):  # a kernel without huge pages
             memory.madvise(mmap.MADV_NOHUGEPAGE)
         means = []
         for _ in range(4):
@@ -224,7 +224,7 @@ def _measured_fault_ns() -> int:
 
 
 def _root() -> Path:
-    """Return where tracefs is mounted.  Raises RtcfError."""
+    """Return the mount point of tracefs; raises RtcfError."""
     for line in Path("/proc/self/mounts").read_text().splitlines():
         _, place, kind, *_ = line.split()
         if kind == "tracefs":
@@ -236,19 +236,17 @@ def _root() -> Path:
 
 @contextlib.contextmanager
 def _told(root: Path) -> Iterator[None]:
-    """Name the file of an OSError, and the remedy."""
+    """Convert errors into RtcfError with the file and the remedy."""
     try:
         yield
     except PermissionError:
         raise RtcfError(
-            f"trace --kernel: {root} is root's: run it as root (sudo rtcfctl … trace --kernel)"
+            f"trace --kernel: {root} requires root: run it as root (sudo rtcfctl … trace --kernel)"
         ) from None
     except OSError as error:
         raise RtcfError(f"trace --kernel: {error.filename or root}: {error.strerror}") from None
     except (KeyError, ValueError) as error:
-        raise RtcfError(
-            f"trace --kernel: the kernel's trace has another format than known: {error}"
-        ) from None
+        raise RtcfError(f"trace --kernel: unknown format of the kernel's trace: {error}") from None
 
 
 def _remove_left(instances: Path) -> None:

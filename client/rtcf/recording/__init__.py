@@ -1,1 +1,1 @@
-"""Recordings of every cycle: written from a stream, and read again."""
+"""Recordings of every cycle: writing from streams, and reading."""

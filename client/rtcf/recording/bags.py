@@ -1,4 +1,4 @@
-"""What rosbag, which is imported only when it is used, wants to know of messages."""
+"""Message types for rosbag, which is imported only on use."""
 
 import importlib
 import re
@@ -8,7 +8,7 @@ from rtcf.recording.reader import RecordingError
 
 
 class MessageType:
-    """A type of messages that nobody has generated a class for."""
+    """A message type without a generated class, for Bag.write."""
 
     def __init__(self, name: str, md5: str, definition: str) -> None:
         self._name, self._md5 = name, md5
@@ -19,22 +19,25 @@ class MessageType:
         )
 
     def raw(self, data: bytes) -> tuple[Any, ...]:
-        """Return a serialised message as Bag.write takes it."""
+        """Return a serialised message for Bag.write(raw=True)."""
         return self._name, data, self._md5, None, self._class
 
 
 def rosbag() -> Any:
-    """Return the module.  Raises RecordingError if it is not installed."""
+    """Return the module rosbag; raises RecordingError if it is not installed."""
     return _module("rosbag", "python3-rosbag")
 
 
 def time(nanoseconds: int) -> Any:
-    """Return a time as Bag.write takes it."""
+    """Return a time in ns for Bag.write."""
     return _module("genpy", "python3-genpy").Time(0, nanoseconds)
 
 
 def md5_of(name: str, definition: str) -> str:
-    """Return the MD5 sum of a type, of whose definition those of the types in it are a part."""
+    """Return the MD5 sum of a type by its full definition, which includes its field types.
+
+    Raises RecordingError if the definition is invalid.
+    """
     genmsg = _module("genmsg", "python3-genmsg")
     gentools = _module("genmsg.gentools", "python3-genmsg")
     first, *others = re.split(r"^=+\n", definition, flags=re.MULTILINE)
@@ -48,7 +51,7 @@ def md5_of(name: str, definition: str) -> str:
             context.register(each, genmsg.msg_loader.load_msg_from_string(context, text, each))
         return str(gentools.compute_md5(context, context.get_registered(name)))
     except (KeyError, ValueError, genmsg.InvalidMsgSpec) as error:
-        raise RecordingError(f"the definition of {name} is none: {error}") from None
+        raise RecordingError(f"invalid definition of {name}: {error}") from None
 
 
 def _module(name: str, package: str) -> Any:

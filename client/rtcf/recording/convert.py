@@ -1,4 +1,4 @@
-"""Recordings as files of other programs: CSV, and bags of ROS 1; and as they should have ended."""
+"""Conversion of recordings to CSV and ROS 1 bags, and repair of interrupted recordings."""
 
 import csv
 import io
@@ -26,19 +26,19 @@ OnProgress = Callable[[str], None]
 def convert(
     recording: Recording, to: Path, *, force: bool = False, on_progress: OnProgress | None = None
 ) -> int:
-    """Write a recording into a file whose suffix says of what kind: .csv or .bag.
+    """Write a recording to a file in the format of its suffix, .csv or .bag.
 
-    Return how many cycles or messages are in it.  A file that is there is written over if
-    `force`; one that cannot be written whole is removed.  Raises ValueError of a file name, and
-    RecordingError.
+    Return the number of cycles (.csv) or messages (.bag).  With `force`, overwrite an existing
+    file.  After an error the incomplete file is removed.  Raises ValueError for an unusable file
+    name, and RecordingError.
     """
     write = _KINDS.get(to.suffix)
     if write is None:
-        raise ValueError(f"{to}: end its name in {' or '.join(_KINDS)}, which says what to write")
+        raise ValueError(f"{to}: the suffix must be {' or '.join(_KINDS)}, to select the format")
     if to.exists() and to.samefile(recording.path):
         raise ValueError(f"{to} is the recording itself: write to another file")
     if write is _write_bag:
-        bags.rosbag()  # said before there is a file
+        bags.rosbag()  # raises before the file is created
     with _new_file(to, force) as file:
         written = 0
         for count in write(recording, file):
@@ -49,13 +49,13 @@ def convert(
 
 
 def repair(recording: Recording, to: Path, *, force: bool = False) -> tuple[int, int]:
-    """Write a recording that was cut off into a file that is ended in order, for other readers.
+    """Copy an interrupted recording to a complete file with a summary, for other readers.
 
-    Return how many cycles are in it, and how many damaged chunks are not.  A file that is there is
-    written over if `force`.  Raises ValueError of a file name, and RecordingError.
+    Return the number of cycles and the number of damaged chunks, which are omitted.  With `force`,
+    overwrite an existing file.  Raises ValueError for an unusable file name, and RecordingError.
     """
     if to.suffix != ".mcap":
-        raise ValueError(f"{to}: end its name in .mcap, as a repaired recording is one")
+        raise ValueError(f"{to}: the suffix must be .mcap for a repaired recording")
     if to.exists() and to.samefile(recording.path):
         raise ValueError(f"{to} is the recording itself: write to another file")
     cycles = damaged = 0
@@ -68,7 +68,7 @@ def repair(recording: Recording, to: Path, *, force: bool = False) -> tuple[int,
             if number != topic.number:
                 raise RecordingError(
                     f"{recording.path} has a topic number {topic.number} after {number - 1}: "
-                    "rtcfctl record has not written it"
+                    "it was not written by rtcfctl record"
                 )
         for chunk in range(recording.chunks):
             try:
@@ -83,14 +83,14 @@ def repair(recording: Recording, to: Path, *, force: bool = False) -> tuple[int,
 
 
 def _write_csv(recording: Recording, file: BinaryIO) -> Iterator[int]:
-    """Write a line for each cycle; cells of what was not there then are empty."""
+    """Write a line for each cycle; cells without a value are empty."""
     text = io.TextIOWrapper(file, encoding="utf-8", newline="", write_through=True)
     writer = csv.writer(text, lineterminator="\n")
     head = ["cycle", "stamp_ns", *_CYCLE[1:]]
     for name, signal in recording.signals.items():
         count = signal.leaf.count
         head += [name] if count is None else [f"{name}[{index}]" for index in range(count)]
-    recording.read_cycles(end_ns=0)  # refused before a line is written
+    recording.read_cycles(end_ns=0)  # raises before a line is written
     writer.writerow(head)
     for chunk in range(recording.chunks):
         first, *others = recording.read_cycles(chunk=chunk).values()
@@ -104,15 +104,15 @@ def _write_csv(recording: Recording, file: BinaryIO) -> Iterator[int]:
 
 
 def _cells(column: RecordedColumn, cycles: RecordedColumn) -> list[list[Any]]:
-    """Return the columns of a signal, in a line for each cycle."""
+    """Return the columns of a signal, with a cell for each cycle."""
     import numpy as np
 
-    # Not -1 for how many there are: there may be none, of what came later.
+    # Not reshape(…, -1), which fails for a signal without values in this chunk.
     values = column.values.reshape(len(column.values), math.prod(column.values.shape[1:]))
     shown = [_shown(values[:, index]) for index in range(values.shape[1])]
     if np.array_equal(column.cycles, cycles.values):
         return shown
-    # A number alone may come again, after the loop was started anew.
+    # Cycle numbers repeat after a restart of the loop: match by number and stamp.
     keys = zip(as_list(cycles.values), as_list(cycles.stamps_ns), strict=True)
     line = {key: number for number, key in enumerate(keys)}
     keys = zip(as_list(column.cycles), as_list(column.stamps_ns), strict=True)
@@ -128,7 +128,7 @@ def _cells(column: RecordedColumn, cycles: RecordedColumn) -> list[list[Any]]:
 
 
 def _shown(values: "NDArray[Any]") -> list[Any]:
-    """Return numbers as the shortest text that is read as the same number; truth as 0 and 1."""
+    """Return numbers for the shortest exact text; bool as 0 and 1."""
     if values.dtype == bool:
         return as_list(values.astype(int))
     return as_list(values.astype(str) if values.dtype.itemsize == 4 else values)
@@ -158,7 +158,7 @@ def _write_bag(recording: Recording, file: BinaryIO) -> Iterator[int]:
 def _named(
     topic: RecordedTopic, topics: dict[str, tuple[str, ...]]
 ) -> tuple[str, bags.MessageType]:
-    """Return the name and type of a topic; in a bag each name has one type."""
+    """Return name and type of a topic; names are made unique, as a bag has one type per name."""
     md5 = bags.md5_of(topic.ros_type, topic.definition)
     kind = topic.metadata.get("kind", "other")
     own = topic.ros_type, md5, kind
@@ -185,6 +185,6 @@ def _new_file(path: Path, force: bool) -> Iterator[BinaryIO]:
                 raise ValueError(f"{path}: {error.strerror}") from None
             yield file
     except FileExistsError:
-        raise ValueError(f"{path} is there already: --force writes over it") from None
+        raise ValueError(f"{path} already exists: --force overwrites it") from None
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror or error}") from None

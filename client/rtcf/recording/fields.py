@@ -1,18 +1,18 @@
-"""What stands in a record of an MCAP file, one after the other."""
+"""A reader of the fields of an MCAP record."""
 
 import struct
 from collections.abc import Iterator
 
 
 class Fields:
-    """Reads a record from its begin on; raises struct.error where it ends too early."""
+    """Reads the fields of a record in order; raises struct.error if the record is too short."""
 
     def __init__(self, data: bytes) -> None:
         self._data = data
         self._at = 0
 
     def numbers(self, form: str) -> tuple[int, ...]:
-        """Return what struct.unpack makes of the next bytes."""
+        """Return the next numbers, by a format of struct."""
         values = struct.unpack_from(form, self._data, self._at)
         self._at += struct.calcsize(form)
         return values

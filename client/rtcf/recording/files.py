@@ -1,4 +1,4 @@
-"""Recordings in one file, or in several of a bounded size or time each."""
+"""A recording in one file, or in several files of a limited size or length."""
 
 import contextlib
 from collections.abc import Callable
@@ -17,11 +17,13 @@ Result = TypeVar("Result")
 
 
 class Files(Closing):
-    """What a stream tells, written into `path`, and after next() into others of its name with -1,
-    -2, …; each can be read by itself.  Raises RtcfError of what the disk refuses."""
+    """Writes a stream to `path`; after each next() to a new file with -1, -2, … in its name.
+
+    Each file is a complete recording.  Methods raise RtcfError for errors of the disk.
+    """
 
     def __init__(self, path: Path, runner: str, *, force: bool = False) -> None:
-        """Make the first file: what is there already is refused by ValueError, unless `force`."""
+        """Create the first file; raises ValueError if it exists, unless `force` is set."""
         self.paths: list[Path] = []
         self._cycles = self._lost = 0  # of the files that are closed
         self._first = path
@@ -32,16 +34,16 @@ class Files(Closing):
 
     @property
     def size(self) -> int:
-        """Bytes of the file that is being written."""
+        """The size of the open file, in bytes."""
         return self._writer.size
 
     @property
     def bytes(self) -> int:
-        """Bytes of all files that are closed."""
+        """The size of all closed files, in bytes."""
         return sum(path.stat().st_size for path in self.paths)
 
     def taken_ns(self, batch: PortBatch) -> int:
-        """Return the loop time from the first cycle in this file to the end of a batch."""
+        """Return the loop time from the first cycle of this file to the last of a batch; ns."""
         if not len(batch):
             return 0
         if not self._begun_ns:
@@ -49,20 +51,20 @@ class Files(Closing):
         return int(batch.message.stamps_ns[-1]) - self._begun_ns
 
     def add(self, batch: PortBatch) -> list[str]:
-        """Write a batch; return a line for each state that no message can hold."""
+        """Write a batch; return a note for each omitted state (without a ROS message type)."""
         return self._doing(lambda: self._recorder.add(batch))
 
     def flush(self) -> None:
-        """Write what is still in memory."""
+        """Write buffered cycles to the disk."""
         self._doing(self._recorder.flush)
 
     def next(self) -> None:
-        """End this file and begin another."""
+        """Close this file and open the next one."""
         self.close()
         self._open()
 
     def close(self) -> None:
-        """End the file; what the disk does not take is not counted."""
+        """Close the file; cycles that could not be written are not counted."""
         if self._file.closed:
             return
         self._doing(self._finish)
@@ -71,12 +73,12 @@ class Files(Closing):
 
     @property
     def cycles(self) -> int:
-        """Cycles in all files, and in memory."""
+        """The number of cycles in all files, including buffered ones."""
         return self._cycles + (0 if self._file.closed else self._recorder.cycles)
 
     @property
     def lost(self) -> int:
-        """Cycles that were not taken in time, so far."""
+        """The number of dropped cycles so far."""
         return self._lost + (0 if self._file.closed else self._recorder.lost)
 
     def _open(self) -> None:
@@ -84,12 +86,12 @@ class Files(Closing):
         stem, suffix = self._first.stem, self._first.suffix
         path = self._first.with_name(f"{stem}-{number}{suffix}") if number else self._first
         try:
-            # It has its name from its head on: at any time a file of that name can be read.
+            # The file gets its name once it has a header, so that it is always readable.
             with whole_file(path, force=self._force) as part:
                 self._file = part.open("wb", buffering=0)
                 self._writer = _begun(self._file, path)
         except FileExistsError:
-            raise ValueError(f"{path} is there already: --force writes over it") from None
+            raise ValueError(f"{path} already exists: --force overwrites it") from None
         except OSError as error:
             raise ValueError(f"{path}: {error.strerror}") from None
         self.paths.append(path)
@@ -97,7 +99,7 @@ class Files(Closing):
         self._recorder = Recorder(self._writer, self._runner)
 
     def _finish(self) -> None:
-        # Closing writes what is left, and may find no room either.
+        # Closing writes buffered data, so it can fail on a full disk, too.
         with self._file:
             try:
                 self._recorder.flush()
@@ -111,14 +113,14 @@ class Files(Closing):
             raise RtcfError(f"{self.paths[-1]}: {error.strerror}: {self._left()}") from None
 
     def _left(self) -> str:
-        """Describe the file that the disk has no more room for; an empty one is removed."""
+        """Return the state of the file after an error for the user; remove it if it is empty."""
         path = self.paths[-1]
         with contextlib.suppress(OSError):
             self._file.close()
         if not path.is_file() or _has_cycles(path):
-            return "what was written before can be read"
+            return "the cycles written before are readable"
         path.unlink(missing_ok=True)
-        return "no cycle was written, and the file is removed"
+        return "no cycle was written; the file has been removed"
 
 
 def _begun(file: BinaryIO, path: Path) -> McapWriter:
@@ -133,7 +135,7 @@ def _begun(file: BinaryIO, path: Path) -> McapWriter:
 
 
 def _has_cycles(path: Path) -> bool:
-    from rtcf.recording.reader import read_recording  # for a full disk alone
+    from rtcf.recording.reader import read_recording  # needed only on a full disk
 
     try:
         with read_recording(path) as recording:
@@ -142,6 +144,6 @@ def _has_cycles(path: Path) -> bool:
                 for chunk in range(recording.chunks)
             )
     except OSError:
-        return True  # it cannot be read, which says nothing about its content
+        return True  # the file is not readable, so its content is unknown
     except (RtcfError, ValueError):
         return False

@@ -1,12 +1,11 @@
-"""Writes MCAP files of ROS 1 messages, many of one channel at a time.
+"""Writes MCAP files of ROS 1 messages by columns.
 
-The format is that of https://mcap.dev/spec: version 0, profile `ros1`.  A chunk holds whole
-columns: all messages of a channel follow each other.  It has no index of its messages, which would
-be larger than the messages.
+The format is https://mcap.dev/spec, version 0, profile `ros1`.  In a chunk, all messages of a
+channel are consecutive.  A chunk has no message index, which would be larger than the messages.
 
-At any time the file is a valid one: it ends in a footer without a summary, which the next chunk
-overwrites last.  Readers open it up to its last chunk, even where the writer was killed.  A pipe
-has its footer at its end alone.
+The file is valid at any time: it ends with a footer without a summary, which the next chunk
+overwrites as its last step.  Readers can open the file up to its last chunk, even if the writer was
+killed.  On a pipe, the footer is written only at the end.
 """
 
 import contextlib
@@ -28,40 +27,40 @@ _FOOTER = struct.Struct("<QQI")
 
 
 def record(opcode: int, content: bytes) -> bytes:
-    """Return a record."""
+    """Return a record with its head."""
     return struct.pack("<BQ", opcode, len(content)) + content
 
 
-# Of a file without a summary.
+# The end of a file without a summary.
 END = record(DATA_END, bytes(4)) + record(FOOTER, bytes(_FOOTER.size)) + MAGIC
 FOOTER_SIZE = len(record(FOOTER, bytes(_FOOTER.size)))
 
 
 @dataclass(frozen=True)
 class Column:
-    """Messages of one channel, of one size; times in ns."""
+    """Messages of one channel and of equal size; times in ns."""
 
     channel: int
     sequences: "NDArray[Any]"  # cycle numbers
     times: "NDArray[Any]"
-    data: "NDArray[Any]"  # bytes, a row each
+    data: "NDArray[Any]"  # bytes, a row per message
 
 
 @dataclass(frozen=True)
 class Chunk:
-    """Records, compressed; times in ns."""
+    """Compressed records; times in ns."""
 
     start: int
     end: int
     size: int  # bytes, uncompressed
-    crc: int  # of them
+    crc: int  # of the uncompressed records
     compression: str
     packed: bytes
 
 
 @dataclass
 class _Summary:
-    """The parts of the file that its end repeats."""
+    """The content of the summary at the end of the file."""
 
     schemas: list[bytes] = field(default_factory=list)
     channels: list[bytes] = field(default_factory=list)
@@ -73,14 +72,16 @@ class _Summary:
 
 
 class McapWriter:
-    """One file, unbuffered; owned by its recorder.  All methods raise OSError, and
-    leave the file as it was before them then."""
+    """The writer of one unbuffered file, owned by its recorder.
+
+    All methods can raise OSError; the file is then unchanged.
+    """
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
-        self._seeks = file.seekable()  # else it has an end once it is closed
-        self._at = 0  # the file is valid up to there
-        self._pending = bytearray()  # behind it
+        self._seeks = file.seekable()  # otherwise close() writes the only footer
+        self._at = 0  # bytes written, without the footer
+        self._pending = bytearray()  # records to be written after them
         self._summary = _Summary()
         self._compress = _compressor()
         self._pending += MAGIC + record(HEADER, _text("ros1") + _text(_LIBRARY))
@@ -94,8 +95,10 @@ class McapWriter:
     def channel(
         self, topic: str, ros_type: str, definition: str, metadata: Mapping[str, str]
     ) -> int:
-        """Add a topic of a type; return its number.  Its first messages follow in the next
-        chunk."""
+        """Add a topic; return its number.
+
+        It is written with the next chunk, which must have its first messages.
+        """
         number = len(self._summary.channels) + 1
         schema = _text(ros_type) + _text("ros1msg") + _bytes(definition.encode())
         self._summary.schemas.append(struct.pack("<H", number) + schema)
@@ -107,7 +110,7 @@ class McapWriter:
         return number
 
     def metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """Add facts about the file."""
+        """Add a metadata record, written with the next chunk."""
         pairs = b"".join(_text(key) + _text(value) for key, value in values.items())
         metadata = record(METADATA, _text(name) + _bytes(pairs))
         self._summary.metadata.append(
@@ -116,7 +119,7 @@ class McapWriter:
         self._pending += metadata
 
     def chunk(self, columns: Sequence[Column]) -> None:
-        """Write messages, and see that the system has them."""
+        """Write messages as one chunk and flush it to the operating system."""
         merged: dict[tuple[int, int], list[Column]] = {}
         for column in columns:
             if len(column.times):
@@ -139,7 +142,7 @@ class McapWriter:
         )
 
     def packed_chunk(self, chunk: Chunk, counts: Mapping[int, int]) -> None:
-        """Write a chunk that is compressed already, with `counts` messages by channel."""
+        """Write an already compressed chunk; `counts` has its number of messages by channel."""
         head = struct.pack("<QQQI", chunk.start, chunk.end, chunk.size, chunk.crc)
         name = _text(chunk.compression)
         packed = record(CHUNK, head + name + struct.pack("<Q", len(chunk.packed)) + chunk.packed)
@@ -151,7 +154,7 @@ class McapWriter:
         except OSError:
             del self._pending[mark:]
             raise
-        # No index of messages: an empty map of their places, 0 bytes long.
+        # No message index: an empty map with a length of 0 bytes.
         summary = self._summary
         summary.chunks.append(
             struct.pack("<QQQQ", chunk.start, chunk.end, at, len(packed))
@@ -167,7 +170,7 @@ class McapWriter:
             summary.counts[channel] = summary.counts.get(channel, 0) + count
 
     def close(self) -> None:
-        """End the file in order; the caller closes it."""
+        """Write the summary and the footer; the caller closes the file."""
         self._pending += record(DATA_END, bytes(4))
         start = self._at + len(self._pending)
         summary = self._summary
@@ -192,10 +195,10 @@ class McapWriter:
         self._commit(record(FOOTER, _FOOTER.pack(start, offset_start, 0)) + MAGIC)
 
     def _commit(self, end: bytes) -> None:
-        """Write what is pending, and the end of the file behind it.
+        """Write the pending records and the new end of the file.
 
-        The begin, which takes the place of the end before, comes last: until then readers find that
-        end.
+        The first bytes, which overwrite the old end, are written last.  Until then readers find the
+        old end.
         """
         if not self._seeks:
             self._write(None, bytes(self._pending) + (b"" if end is END else end))
@@ -209,7 +212,7 @@ class McapWriter:
             if begin:
                 self._write(self._at, data[:begin])
         except OSError:
-            if self._at:  # the file ends as it did before
+            if self._at:  # restore the old end
                 with contextlib.suppress(OSError):
                     self._write(self._at, END)
                     self._file.truncate(self._at + len(END))
@@ -241,7 +244,7 @@ class McapWriter:
 
 
 def _rows(columns: Sequence[Column]) -> "NDArray[Any]":
-    """Return the records of messages of one channel and size, one after the other."""
+    """Return the consecutive records of messages of one channel and size."""
     import numpy as np
 
     size = columns[0].data.shape[1]
@@ -260,7 +263,7 @@ def _rows(columns: Sequence[Column]) -> "NDArray[Any]":
 
 
 def message_type(size: int) -> Any:
-    """Return NumPy's type of a message's record with `size` bytes of data."""
+    """Return the NumPy type of a message record with `size` bytes of data."""
     import numpy as np
 
     return np.dtype(

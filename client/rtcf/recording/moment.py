@@ -1,4 +1,4 @@
-"""The cycles around one in which something is so: what came before is kept until then."""
+"""The cycles around the first cycle in which a condition is true."""
 
 from collections import deque
 from itertools import islice
@@ -6,19 +6,21 @@ from itertools import islice
 from rtcf.streams.condition import Condition
 from rtcf.streams.ports import PortBatch
 
-MOST_BYTES = 512 * 1024 * 1024  # of values that are kept before
+MOST_BYTES = 512 * 1024 * 1024  # memory limit of the pre-trigger data
 
 
 class Moment:
-    """Waits for a condition in a stream; then gives what was `pre_s` before and is until `post_s`
-    after, by the loop's time stamps."""
+    """Waits for a condition in a stream; returns the cycles from `pre_s` before to `post_s` after.
+
+    Times are by the loop's stamps.
+    """
 
     def __init__(
         self, condition: Condition, pre_s: float, post_s: float, most_bytes: int = MOST_BYTES
     ) -> None:
-        self.cycle: int | None = None  # in which the condition was true
-        self.over = False  # all of it has come, or the loop has ended
-        self.cut = False  # more came before than may be kept
+        self.cycle: int | None = None  # the first cycle in which the condition is true
+        self.over = False  # all cycles have been returned, or the loop has ended
+        self.cut = False  # pre-trigger data truncated: memory limit reached
         self.condition = condition
         self._pre_ns, self._post_ns = round(pre_s * 1e9), round(post_s * 1e9)
         self._most = most_bytes
@@ -27,7 +29,7 @@ class Moment:
         self._until_ns = 0
 
     def take(self, batch: PortBatch) -> list[PortBatch]:
-        """Return what belongs to it, now that this has come.  Raises ConditionError."""
+        """Process a batch; return the batches to record now.  Raises ConditionError."""
         if self.over:
             return []
         if self.cycle is not None:
@@ -52,7 +54,7 @@ class Moment:
     def _keep(self, batch: PortBatch) -> None:
         self._before.append(batch)
         self._bytes += _size(batch)
-        # One more than is needed: of the first one a part may be.
+        # Keep the first batch as long as any of its cycles is in the pre-trigger time.
         newest_ns = batch.message.stamps_ns[-1] if len(batch) else 0
         while len(self._before) > 1 and (
             self._bytes > self._most or self._second_begins_before(newest_ns - self._pre_ns)
@@ -61,8 +63,10 @@ class Moment:
             self._bytes -= _size(self._before.popleft())
 
     def _second_begins_before(self, stamp_ns: int) -> bool:
-        """Tell whether the first batch is not needed for what is from a time on.  Some have no
-        cycles: they tell of lost ones."""
+        """Return whether the first batch has only cycles before a time.
+
+        Batches without cycles, which only report lost ones, are skipped.
+        """
         second = next((each for each in islice(self._before, 1, None) if len(each)), None)
         return second is not None and second.message.stamps_ns[0] < stamp_ns
 
@@ -70,7 +74,7 @@ class Moment:
         if not len(batch):
             return batch
         late = int((batch.stamps_ns > self._until_ns).sum())
-        # Another loop's cycles are of another story.
+        # Do not continue into the next start of the loop.
         self.over = late > 0 or batch.message.last_of_loop
         return batch.part(0, len(batch) - late)
 

@@ -1,4 +1,4 @@
-"""Reads recordings: MCAP files of `rtcfctl record`, also one whose writer was killed."""
+"""Reads recordings: MCAP files of `rtcfctl record`, also after a kill of the writer."""
 
 import contextlib
 import os
@@ -27,23 +27,23 @@ if TYPE_CHECKING:
 _RECORD = struct.Struct("<BQ")
 _CHUNK_HEAD = struct.Struct("<QQQI")
 _MESSAGE = struct.Struct("<BQH")
-_AHEAD = 2  # chunks that are unpacked while others are read
-# Of the messages of cycles.
+_AHEAD = 2  # chunks decompressed in advance
+# The fields of cycle messages.
 _CYCLE = {
     name: ros_layout.Leaf(name, "<i8", None, offset)
     for name, offset in (("iteration", 16), ("duration_ns", 24), ("latency_ns", 32))
 }
-# Of a file that is damaged.
+# Exceptions raised by parsing a damaged file.
 _NONSENSE = (ArithmeticError, LookupError, MemoryError, RuntimeError, ValueError, struct.error)
 
 
 class RecordingError(RtcfError):
-    """A file that is no recording, or not one that this module reads."""
+    """A file is missing, damaged, or not a supported recording."""
 
 
 @dataclass(frozen=True)
 class RecordedSignal:
-    """A number, or an array of numbers, of a recording."""
+    """A number or an array of numbers in a recording."""
 
     name: str
     unit: str
@@ -57,38 +57,38 @@ class RecordedColumn:
 
     cycles: "NDArray[np.int64]"
     stamps_ns: "NDArray[np.int64]"
-    values: "NDArray[Any]"  # by cycle, then as the signal is shaped
+    values: "NDArray[Any]"  # of shape (cycles, *shape of the signal)
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedTopic:
-    """The messages of one output or state, or of the cycles; two may have one name."""
+    """The messages of one output or state, or of the cycles; names need not be unique."""
 
     number: int
     name: str
     ros_type: str
-    definition: str  # with those of the types in it
+    definition: str  # including its field types
     metadata: dict[str, str]
 
 
 @dataclass(frozen=True)
 class _Chunk:
-    at: int  # of its records, compressed or not
-    length: int
-    compression: str
+    at: int  # offset of its records in the file
+    length: int  # bytes in the file
+    compression: str  # empty = none
     start_ns: int
     end_ns: int
-    size: int  # of its records, uncompressed
-    crc: int  # of them; 0 = not told
+    size: int  # bytes, uncompressed
+    crc: int  # of the uncompressed records; 0 = unknown
 
 
 @dataclass(frozen=True)
 class _Run:
-    """Messages of one channel and size that follow each other."""
+    """Consecutive messages of one channel and size."""
 
-    at: int  # bytes of the chunk before them
+    at: int  # offset in the chunk
     count: int
-    size: int  # of a message's record
+    size: int  # bytes of a message record
 
 
 class _Records:
@@ -108,7 +108,7 @@ class _Records:
             at += size
 
     def field(self, run: _Run, offset: int, kind: str, count: int | None = None) -> "NDArray[Any]":
-        """Return one field of the records of a run, or `count` of them that follow each other."""
+        """Return one field of each record of a run, or `count` consecutive fields of each."""
         import numpy as np
 
         each = ros_layout.size_of(kind)
@@ -121,7 +121,10 @@ class _Records:
         return fields
 
     def _count(self, at: int, size: int, guess: int) -> int:
-        """Return how many messages of one channel and size follow each other; perhaps `guess`."""
+        """Return the number of consecutive messages of one channel and size.
+
+        `guess` is the first number tried, usually the length of the previous run.
+        """
         import numpy as np
 
         most, count = (len(self.data) - at) // size, 1
@@ -145,16 +148,20 @@ class _Records:
 class _Cycles:
     """The cycles of a channel's messages in a chunk."""
 
-    low: "NDArray[np.uint32]"  # the low 32 bits of their numbers, which the messages have
+    low: "NDArray[np.uint32]"  # the low 32 bits of the cycle numbers, from the messages
     stamps_ns: "NDArray[np.int64]"
     numbers: "NDArray[np.int64]"
 
 
 class Recording(Closing):
-    """A recording, opened for reading; values are read when they are asked for.
+    """A recording, opened for reading; values are read on demand.
 
-    `signals` are there by name, as in a stream of ports; `whole` tells whether the file was ended
-    in order; `metadata` has what else stands in it, by name.  Raises RecordingError.
+    path      the file
+    signals   by name, with the same names as in a stream of ports
+    whole     whether the file was closed in order
+    metadata  the metadata records of the file, by name
+
+    The constructor and all methods raise RecordingError.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
@@ -164,8 +171,8 @@ class Recording(Closing):
         self.metadata: dict[str, dict[str, str]] = {}
         self._channels: dict[int, RecordedTopic] = {}
         self._chunks: list[_Chunk] = []
-        self.cycle_topic = 0  # its number; 0 = none
-        self._declared: dict[int, int] = {}  # chunks before a channel
+        self.cycle_topic = 0  # topic number of the cycles; 0 = none
+        self._declared: dict[int, int] = {}  # number of chunks before each channel
         self._cache: tuple[int, _Records] | None = None
         try:
             self._file = self.path.open("rb")
@@ -184,22 +191,22 @@ class Recording(Closing):
 
     @property
     def chunks(self) -> int:
-        """How many parts the file has, one after the other, that are read at once each."""
+        """The number of chunks: parts of the file that are read as a whole."""
         return len(self._chunks)
 
     @property
     def begin_ns(self) -> int:
-        """The stamp of the first message; 0 = there is none."""
+        """The stamp of the first message; ns, 0 = no messages."""
         return self._chunks[0].start_ns if self._chunks else 0
 
     @property
     def end_ns(self) -> int:
-        """The stamp of the last message; 0 = there is none."""
+        """The stamp of the last message; ns, 0 = no messages."""
         return self._chunks[-1].end_ns if self._chunks else 0
 
     @property
     def cycles(self) -> "NDArray[np.int64]":
-        """The numbers of all cycles, in the order in which they were recorded."""
+        """The numbers of all cycles, in order of recording."""
         return self.read_cycles()["iteration"].values
 
     @property
@@ -209,12 +216,12 @@ class Recording(Closing):
 
     @property
     def durations_ns(self) -> "NDArray[np.int64]":
-        """Calculation in each cycle; ns."""
+        """The calculation duration of each cycle; ns."""
         return self.read_cycles()["duration_ns"].values
 
     @property
     def latencies_ns(self) -> "NDArray[np.int64]":
-        """Wake-up after each deadline; ns."""
+        """The wake-up latency of each cycle; ns."""
         return self.read_cycles()["latency_ns"].values
 
     def __getitem__(self, name: str) -> "NDArray[Any]":
@@ -228,8 +235,10 @@ class Recording(Closing):
         end_ns: int | None = None,
         chunk: int | None = None,
     ) -> RecordedColumn:
-        """Return the values of a signal whose stamps are from `begin_ns` to before `end_ns`, or
-        those in one chunk; the rest of the file is not read."""
+        """Return the values of a signal with stamps in [begin_ns, end_ns), or those in one chunk.
+
+        Chunks outside the range are not read.
+        """
         return self.read_all([name], begin_ns, end_ns, chunk)[name]
 
     def read_all(
@@ -239,7 +248,7 @@ class Recording(Closing):
         end_ns: int | None = None,
         chunk: int | None = None,
     ) -> dict[str, RecordedColumn]:
-        """Return the values of several signals by name, of all without `names`, as `read` does.
+        """Return the values of several signals (default: all) by name; see `read`.
 
         Each chunk is read once.  Signals of the same cycles share `cycles` and `stamps_ns`.
         """
@@ -258,16 +267,17 @@ class Recording(Closing):
         end_ns: int | None = None,
         chunk: int | None = None,
     ) -> dict[str, RecordedColumn]:
-        """Return `iteration`, `duration_ns` and `latency_ns` of cycles, as `read_all` does."""
+        """Return `iteration`, `duration_ns` and `latency_ns` of the cycles; see `read_all`."""
         if not self.cycle_topic:
-            raise RecordingError(f"{self.path} tells no cycles: rtcfctl record has not written it")
+            raise RecordingError(
+                f"{self.path} has no cycle topic: it was not written by rtcfctl record"
+            )
         leaves = [(self.cycle_topic, leaf) for leaf in _CYCLE.values()]
         with self._whole_only():
             return dict(zip(_CYCLE, self._read(leaves, begin_ns, end_ns, chunk), strict=True))
 
     def messages(self, chunk: int) -> list[tuple[RecordedTopic, int, bytes]]:
-        """Return the messages of a chunk as ROS 1 serialises them, with their stamps (ns), in the
-        order of these."""
+        """Return topic, stamp (ns) and serialised ROS 1 message of a chunk's messages, by stamp."""
         found: list[tuple[int, int, int, RecordedTopic]] = []
         with self._whole_only():
             records = self._records(chunk)
@@ -287,15 +297,15 @@ class Recording(Closing):
             ]
 
     def packed_chunk(self, chunk: int) -> tuple[mcap.Chunk, dict[int, int]]:
-        """Return a chunk as it stands in the file, and how many messages of each channel it has.
+        """Return a chunk, still compressed, and its number of messages by channel.
 
-        Raises RecordingError if it is damaged.
+        Raises RecordingError if the chunk is damaged.
         """
         with self._whole_only():
             found = self._chunks[chunk]
             records = self._records(chunk)
             if found.crc and zlib.crc32(records.data) != found.crc:
-                raise ValueError("the checksum of a chunk is another")
+                raise ValueError("a chunk has a wrong checksum")
             counts = {
                 channel: sum(run.count for run in runs) for channel, runs in records.runs.items()
             }
@@ -305,11 +315,11 @@ class Recording(Closing):
 
     @property
     def topics(self) -> list[RecordedTopic]:
-        """The outputs, states and cycles that have messages, in the order of their numbers."""
+        """The topics of outputs, states and cycles, sorted by number."""
         return [self._channels[number] for number in sorted(self._channels)]
 
     def to_pandas(self, names: Iterable[str] | None = None) -> Any:
-        """Return a pandas.DataFrame of signals that are numbers, by cycle."""
+        """Return a pandas.DataFrame of the scalar signals, indexed by cycle number."""
         import pandas
 
         columns = self.read_all(names)
@@ -337,7 +347,7 @@ class Recording(Closing):
         end_ns: int | None = None,
         chunk: int | None = None,
     ) -> list[RecordedColumn]:
-        """Return the columns of leaves of channels' messages."""
+        """Return the columns of (channel, leaf) pairs."""
         import numpy as np
 
         cycles: dict[int, list[_Cycles]] = {channel: [] for channel, _ in leaves}
@@ -376,8 +386,10 @@ class Recording(Closing):
         return columns
 
     def _cycles(self, records: _Records, channels: Iterable[int]) -> dict[int, _Cycles]:
-        """Return the cycles of those channels that have messages; one object for those of the same
-        cycles."""
+        """Return the cycles of each channel with messages.
+
+        Channels with the same cycles share one object.
+        """
         import numpy as np
 
         every: _Cycles | None = None
@@ -401,14 +413,14 @@ class Recording(Closing):
 
     def _records(self, number: int) -> _Records:
         if self._cache is None or self._cache[0] != number:
-            self._cache = None  # its memory is free before the next one needs some
+            self._cache = None  # free the memory before the next chunk is read
             chunk = self._chunks[number]
             packed = self._packed(chunk)
             self._cache = (number, _Records(self._unpacked(chunk, packed)))
         return self._cache[1]
 
     def _several(self, numbers: Sequence[int]) -> Iterator[_Records]:
-        """Give the records of chunks; the next ones are unpacked meanwhile."""
+        """Yield the records of chunks; decompress the next ones in threads meanwhile."""
         if len(numbers) < 2:
             yield from map(self._records, numbers)
             return
@@ -434,9 +446,7 @@ class Recording(Closing):
         if chunk.compression == "":
             return data
         if chunk.compression != "zstd":
-            raise RecordingError(
-                f"{self.path}: chunks compressed by {chunk.compression} are not read"
-            )
+            raise RecordingError(f"{self.path}: unsupported compression {chunk.compression}")
         try:
             import zstandard
         except ImportError:
@@ -449,11 +459,11 @@ class Recording(Closing):
             raise ValueError(error) from None
 
     def _scan(self) -> None:
-        """Find channels and chunks, up to the end or to where the writer was killed."""
+        """Find all channels and chunks, up to the end or to the last complete record."""
         size = self._file.seek(0, os.SEEK_END)
         self._file.seek(0)
         if self._file.read(len(mcap.MAGIC)) != mcap.MAGIC:
-            raise RecordingError(f"{self.path} is no MCAP file")
+            raise RecordingError(f"{self.path} is not an MCAP file")
         schemas: dict[int, tuple[str, str]] = {}
         at = len(mcap.MAGIC)
         while at + _RECORD.size <= size:
@@ -494,7 +504,7 @@ class Recording(Closing):
         return _Chunk(self._file.tell(), packed, compression, start, end, size, crc)
 
     def _has_summary(self, size: int) -> bool:
-        """Tell whether the file ends as a writer that closes it ends it."""
+        """Return whether the file has a summary, which close() writes."""
         self._file.seek(max(size - mcap.FOOTER_SIZE - len(mcap.MAGIC), 0))
         opcode, length = _RECORD.unpack(self._file.read(_RECORD.size))
         (start,) = struct.unpack("<Q", self._file.read(8))
@@ -526,7 +536,7 @@ class Recording(Closing):
                 self.signals[full] = RecordedSignal(full, unit, number, leaf)
 
     def _sample(self, channel: int) -> bytes | None:
-        """Return one message of a channel."""
+        """Return the first message of a channel; None if it has none."""
         for number in range(self._declared[channel], self.chunks):
             records = self._records(number)
             for run in records.runs.get(channel, ()):
@@ -535,7 +545,7 @@ class Recording(Closing):
 
 
 def _low(records: _Records, channel: int) -> "tuple[NDArray[np.uint32], NDArray[np.int64]]":
-    """Return the sequence numbers and stamps (ns) of messages."""
+    """Return the sequence numbers and stamps (ns) of a channel's messages."""
     import numpy as np
 
     runs = records.runs[channel]
@@ -546,7 +556,7 @@ def _low(records: _Records, channel: int) -> "tuple[NDArray[np.uint32], NDArray[
 
 
 def _column(records: _Records, channel: int, leaf: ros_layout.Leaf) -> "NDArray[Any]":
-    """Return the values of a leaf of messages."""
+    """Return the values of a leaf in a channel's messages."""
     import numpy as np
 
     offset = mcap.MESSAGE_HEAD + leaf.offset
@@ -556,7 +566,7 @@ def _column(records: _Records, channel: int, leaf: ros_layout.Leaf) -> "NDArray[
 
 
 def _between(found: _Cycles, begin_ns: int | None, end_ns: int | None) -> tuple[Any, _Cycles]:
-    """Return which of some cycles have stamps from `begin_ns` to before `end_ns`, and these."""
+    """Return the index of the cycles with stamps in [begin_ns, end_ns), and these cycles."""
     import numpy as np
 
     if begin_ns is None and end_ns is None:
@@ -570,5 +580,5 @@ def _between(found: _Cycles, begin_ns: int | None, end_ns: int | None) -> tuple[
 
 
 def read_recording(path: str | os.PathLike[str]) -> Recording:
-    """Open a recording; see Recording."""
+    """Open a recording; raises RecordingError."""
     return Recording(path)

@@ -1,4 +1,4 @@
-"""Writes what a stream of ports tells into an MCAP file."""
+"""Writes a stream of port values to an MCAP file."""
 
 import struct
 from dataclasses import dataclass
@@ -43,22 +43,22 @@ _KINDS = {
 
 @dataclass(frozen=True)
 class _State:
-    """How a state travels: as the message of std_msgs that holds such numbers."""
+    """The std_msgs message type in which a declared state is recorded."""
 
     signal: Signal
     ros_type: str
     definition: str
-    prefix: bytes  # before the numbers
+    prefix: bytes  # of a serialised message, before the numbers
 
 
 class Recorder:
-    """One recording of one runner; raises OSError of its file."""
+    """A recording of one runner; methods raise OSError for errors of its file."""
 
     def __init__(self, writer: McapWriter, runner: str) -> None:
         self._writer = writer
         self._schema: PortSchema | None = None
         self._channels: dict[tuple[str, ...], int] = {}
-        self._kept: list[tuple[int, int, _State | None]] = []  # column of the schema, its channel
+        self._kept: list[tuple[int, int, _State | None]] = []  # column of the schema, channel
         self._cycle_channel = writer.channel(
             f"/{runner}/cycles", "rtcf_msgs/Cycle", _CYCLE, {"runner": runner, "kind": "cycle"}
         )
@@ -68,11 +68,11 @@ class Recorder:
         self.lost = 0
 
     def add(self, batch: PortBatch) -> list[str]:
-        """Take a batch; return a line for each state that no message can hold."""
+        """Add a batch; return a note for each omitted state (without a ROS message type)."""
         self.lost += batch.lost
         if not len(batch):
             return []
-        # Topics begin with their first messages.
+        # Add new topics before their first messages.
         notes = self._enter(batch.schema) if batch.schema is not self._schema else []
         self.cycles += len(batch)
         self._take(batch)
@@ -81,7 +81,7 @@ class Recorder:
         return notes
 
     def flush(self) -> None:
-        """Write what has been taken."""
+        """Write the buffered batches as a chunk."""
         self._writer.chunk(self._columns)
         self._columns, self._bytes = [], 0
 
@@ -96,8 +96,8 @@ class Recorder:
                 state = _state(of_column.get(number))
                 if state is None:
                     notes.append(
-                        f"{column.component}.{column.name} is {column.type}, which no ROS message "
-                        "holds: it is left out"
+                        f"{column.component}.{column.name} is omitted: no ROS message for its type "
+                        f"{column.type}"
                     )
                     continue
             key = _key(column)
@@ -149,7 +149,7 @@ class Recorder:
 
 
 def _key(column: ports_pb2.PortColumn) -> tuple[str, ...]:
-    """Return what the values of a channel have in common: a type may be rebuilt meanwhile."""
+    """Return the key of a channel: a rebuilt type with other properties gets a new channel."""
     kind = str(column.kind)
     return column.component, column.name, kind, column.type, column.unit, column.ros_md5
 
@@ -184,6 +184,6 @@ def _state(signal: Signal | None) -> _State | None:
     count = 1
     for length in signal.shape:
         count *= length
-    # No dimensions, no offset, so many numbers; of a matrix row by row.
+    # No dimensions, no offset, the number of values; matrices by rows.
     prefix = struct.pack("<III", 0, 0, count)
     return _State(signal, f"std_msgs/{name}MultiArray", _LAYOUT.format(kind=kind), prefix)

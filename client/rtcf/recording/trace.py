@@ -1,7 +1,7 @@
-"""A trace of a loop as Perfetto and chrome://tracing read it: JSON, an event a line.
+"""A trace of a loop for Perfetto and chrome://tracing: JSON with one event per line.
 
-The format is told in "Trace Event Format" of the Chromium project.  Its time is microseconds;
-here they are counted from the first cycle.
+The format is the "Trace Event Format" of the Chromium project.  Times are in microseconds since the
+first cycle.
 """
 
 import json
@@ -15,8 +15,8 @@ from rtcf.streams.numbered import Lost
 from rtcf.streams.ports import PortBatch
 from rtcf.v1 import control_pb2, runner_pb2
 
-_CYCLES, _EVENTS, _LOGS, _KERNEL = 1, 2, 3, 4  # numbers of tracks; components have those behind
-_REAL = 10**18  # ns since 1970 are more, those of a simulated clock fewer
+_CYCLES, _EVENTS, _LOGS, _KERNEL = 1, 2, 3, 4  # numbers of tracks, followed by those of components
+_REAL = 10**18  # stamps above it are in ns since 1970, others are on a simulated clock
 _FAULTS = (
     control_pb2.Event.KIND_LOOP_FAULT,
     control_pb2.Event.KIND_COMPONENT_FAULT,
@@ -28,18 +28,18 @@ OnLate = Callable[[int, int, int, int, int], None]
 
 
 class Trace:
-    """The file; owned by who follows the loop.  One whose writer was killed can be read, too."""
+    """A trace file; one thread.  It is readable even after a kill of the writer."""
 
     def __init__(self, path: Path, runner: str, frequency_hz: float) -> None:
-        """Raises OSError, as the methods do."""
+        """Create the file; this and all methods can raise OSError."""
         self.cycles = self.lost = self.late = 0
         self.events = self.faults = self.records = 0
         self.set_frequency(frequency_hz)
-        self._first: tuple[int, int] | None = None  # cycle, and its stamp in ns
+        self._first: tuple[int, int] | None = None  # the first cycle and its stamp in ns
         self._last_ns = 0
         self._tracks: dict[str, int] = {}
-        self._sums: dict[str, tuple[int, float]] = {}  # of components: calls, and ns
-        self.spans = 0  # of components in cycles
+        self._sums: dict[str, tuple[int, float]] = {}  # by component: calls and total ns
+        self.spans = 0  # number of component spans in cycles
         self._file = path.open("w", encoding="utf-8")
         self._file.write("[\n")
         self._write(self._named("process_name", 0, runner))
@@ -48,25 +48,25 @@ class Trace:
         self._track(_LOGS, "log of the executor")
 
     def set_frequency(self, frequency_hz: float) -> None:
-        """Take the loop's rate, by which cycles are late."""
+        """Set the loop's rate, which defines late cycles."""
         self._period_ns = 1e9 / frequency_hz
 
     def close(self) -> None:
-        """End the file."""
-        # What follows the last comma.
+        """Complete and close the file."""
+        # JSON needs an event after the last comma.
         self._file.write(json.dumps(self._named("trace_ended", 0, "")) + "\n]\n")
         self._file.close()
 
     def abandon(self) -> None:
-        """Let go of a file that is not to be."""
+        """Close the file without completing it; the caller removes it."""
         self._file.close()
 
     def add_cycles(self, batch: PortBatch, on_late: OnLate | None = None) -> None:
-        """Add cycles in order: beginning, duration and lateness of each, and in it what each
-        component took, if the stream tells.
+        """Add cycles in order, with spans of components if the stream has their times.
 
-        `on_late` gets the number of each late one, its deadline, its beginning, its end, and by
-        how much it was late, ns."""
+        `on_late` is called for each late cycle with its number, its deadline, its begin, its end
+        and its lateness, in ns.
+        """
         message = batch.message
         turns: Any = batch.turns_ns.tolist() if batch.schema.turns else []
         names = [json.dumps(each, ensure_ascii=False) for each in batch.schema.turns]
@@ -102,7 +102,7 @@ class Trace:
             self.cycles += 1
 
     def _add_turns(self, cycle: int, begin_ns: int, turns: list[int], names: list[str]) -> None:
-        """Add what ran in a cycle, as spans inside of its own.  There are many: no dicts."""
+        """Add the spans of components in a cycle; without dicts, because spans are many."""
         before = turns[0]
         begin_us = self._us(begin_ns)
         spans = []
@@ -119,14 +119,14 @@ class Trace:
         self._file.write("".join(spans))
 
     def add_culprit(self, cycle: int, end_ns: int, words: str) -> None:
-        """Add the cause of a late cycle at its end, on a track of the kernel."""
+        """Add the cause of a late cycle at its end, on the track of the kernel."""
         if "kernel" not in self._tracks:
             self._tracks["kernel"] = _KERNEL
-            self._track(_KERNEL, "kernel: what made cycles late")
+            self._track(_KERNEL, "kernel: causes of late cycles")
         self._mark(_KERNEL, words, end_ns, {"cycle": cycle})
 
     def add_events(self, events: Iterable[control_pb2.Event | Lost]) -> None:
-        """Add what happened: swaps and other changes, states, faults."""
+        """Add events: changes of the graph and other changes, states, faults."""
         for each in events:
             if isinstance(each, Lost):
                 self._mark(_EVENTS, f"{each.count} events lost", self._last_ns, {})
@@ -141,7 +141,7 @@ class Trace:
             self._mark(_EVENTS, f"{kind}: {each.message}", when, known, everywhere=is_fault)
 
     def add_records(self, records: Iterable[control_pb2.LogRecord | Lost]) -> None:
-        """Add what was logged, on a track of each component."""
+        """Add log records, on a track for each component."""
         for each in records:
             if isinstance(each, Lost):
                 self._mark(_LOGS, f"{each.count} log records lost", self._last_ns, {})
@@ -154,21 +154,21 @@ class Trace:
             self._mark(track, f"{level}: {each.message}", when, facts)
 
     def add_figures(self, found: runner_pb2.RunnerStatistics) -> None:
-        """Add what each component took on average since the last call, as a curve."""
+        """Add the mean duration of each component since the last call, as a curve."""
         for each in found.components:
             count, total = each.duration.count, each.duration.count * each.duration.mean_ns
             before = self._sums.get(each.component, (0, 0.0))
             self._sums[each.component] = (count, total)
-            # Those of before the trace are no part of it, and figures may begin anew.
+            # Skip times before the trace, and statistics reset since the last call.
             if 0 < before[0] < count:
                 mean_us = (total - before[1]) / (count - before[0]) / 1e3
                 self._count(f"{each.component} (µs, mean)", self._last_ns, mean_us)
 
     def _when(self, time_ns: int, cycle: int | None) -> int:
-        """Return a time on the clock of the stamps."""
+        """Return the time of an event on the clock of the stamps; ns."""
         if self._first is None or self._first[1] > _REAL:
             return time_ns
-        # A simulated clock: only the cycle is known.
+        # On a simulated clock, the time follows from the cycle.
         if cycle is None:
             return self._last_ns
         first, stamp_ns = self._first

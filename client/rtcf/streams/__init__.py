@@ -1,1 +1,1 @@
-"""What a client follows as it happens: values of every cycle, events."""
+"""Streams from rtcfd: values of every cycle, events, log records."""

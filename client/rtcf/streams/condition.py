@@ -1,9 +1,9 @@
-"""Conditions on values of every cycle: `wave.phase > 0.9 and abs(/arm/pid.effort) < 2`.
+"""Conditions on the values of a cycle: `wave.phase > 0.9 and abs(/arm/pid.effort) < 2`.
 
-Signals by their full names ("/" in front may be left out, one number of an array is `name[2]`),
-numbers, `true` and `false`, + - * /, comparisons, `and`, `or`, `not`, parentheses, and the
-functions abs, min, max, sqrt and isnan.  Where a name may stand, "/" begins one; elsewhere it
-divides.
+A condition consists of signals by their full names (the leading "/" is optional, `name[2]` is an
+element of an array), numbers, `true` and `false`, + - * /, comparisons, `and`, `or`, `not`,
+parentheses, and the functions abs, min, max, sqrt and isnan.  "/" begins a name where an operand is
+expected; otherwise it divides.
 """
 
 import ast
@@ -37,16 +37,18 @@ _NODES = (
 
 
 class ConditionError(ValueError):
-    """A condition that cannot be; says what, and where."""
+    """A condition is invalid, or its signals do not exist."""
 
 
 class Condition:
-    """What is true in some cycles; `signals` are those that it looks at, as they are written."""
+    """A condition on signals; `signals` has their full names, in order of appearance."""
 
     def __init__(self, text: str) -> None:
-        """Raises ConditionError."""
+        """Parse a condition; raises ConditionError."""
         if len(text) > _LONGEST:
-            raise ConditionError(f"a condition of {len(text)} characters: at most {_LONGEST}")
+            raise ConditionError(
+                f"the condition has {len(text)} characters: at most {_LONGEST} are allowed"
+            )
         self.text = text
         self.signals: list[str] = []
         source = " ".join(self._translated())
@@ -78,22 +80,28 @@ class Condition:
 
     @property
     def columns(self) -> list[str]:
-        """The outputs and states to watch."""
-        # The name of a column ends behind the first dot's word; what follows is a field of it.
+        """The outputs and states to select in a stream."""
+        # The name of a column ends after the word at the first dot; fields follow.
         return sorted({re.sub(r"^([^.]*\.\w+).*$", r"\1", name) for name in self.signals})
 
     def check(self, schema: "PortSchema") -> None:
-        """Raise ConditionError where a signal is not in a stream, or is no number."""
+        """Raise ConditionError if a signal is not in a stream or is not a single number."""
         for name in self.signals:
             _find(schema, name)
 
     def where(self, batch: "PortBatch") -> "NDArray[np.bool_]":
-        """Return for each cycle whether it is true.  Raises ConditionError as check() does."""
+        """Return for each cycle of a batch whether the condition is true.
+
+        Raises ConditionError like check().
+        """
         values = [_column(batch, name) for name in self.signals]
         return self.over(values, len(batch))
 
     def over(self, values: "list[NDArray[Any]]", count: int) -> "NDArray[np.bool_]":
-        """Return for each of `count` cycles whether it is true, of the values of `signals`."""
+        """Return for each of `count` cycles whether the condition is true.
+
+        `values` has an array for each of `signals`.
+        """
         import numpy as np
 
         with np.errstate(all="ignore"):
@@ -101,7 +109,7 @@ class Condition:
         return np.broadcast_to(np.asarray(found, bool), (count,))
 
     def _translated(self) -> Iterator[str]:
-        """Yield it as Python writes it, with s0, s1 … for the signals."""
+        """Yield the tokens as Python source, with s0, s1 … for the signals."""
         at, last = 0, ""
         while (at := _matched(_SPACE, self.text, at).end()) < len(self.text):
             operand = not last or _BEFORE_AN_OPERAND.search(last) is not None
@@ -117,23 +125,23 @@ class Condition:
                 at, last = word.end(), _WORDS.get(word[0], word[0])
                 if word[0] not in _WORDS and word[0] not in _FUNCTIONS:
                     raise ConditionError(
-                        f'"{word[0]}" in "{_line(self.text)}" is no signal: these are '
+                        f'"{word[0]}" in "{_line(self.text)}" is not a signal: name one as '
                         "COMPONENT.PORT, COMPONENT.STATE or COMPONENT.PORT.FIELD"
                     )
             elif sign := _SIGN.match(self.text, at):
                 at, last = sign.end(), _WORDS.get(sign[0], sign[0])
             else:
                 part, line = _line(self.text[at : at + 10]), _line(self.text)
-                raise ConditionError(f'"{part}" in "{line}" is not understood')
+                raise ConditionError(f'"{part}" in "{line}" is not valid in a condition')
             yield last
 
 
 def _no_condition(text: str) -> str:
-    return f'"{_line(text)}" is no condition: write one as in `wave.phase > 0.5`'
+    return f'"{_line(text)}" is not a condition: write one as in `wave.phase > 0.5`'
 
 
 def _line(text: str) -> str:
-    """Return it for a message of one line: line ends and control characters as escapes."""
+    """Return a text with unprintable characters, including line ends, as escapes."""
     return "".join(each if each.isprintable() else ascii(each)[1:-1] for each in text)
 
 
@@ -151,7 +159,7 @@ def _is_deep(tree: ast.AST) -> bool:
 
 
 def _is_truth(node: ast.expr) -> bool:
-    """Tell whether an expression is true or false, rather than a number."""
+    """Return whether an expression is boolean and not a number."""
     if isinstance(node, ast.BoolOp):
         return all(_is_truth(each) for each in node.values)
     if isinstance(node, ast.UnaryOp):
@@ -200,11 +208,11 @@ def _value(node: ast.expr, values: "list[NDArray[Any]]") -> Any:
             return found
         case ast.Call(func=ast.Name(id=function), args=given):
             return _called(function, [_value(each, values) for each in given])
-    raise ConditionError("a condition calls functions by their names")
+    raise ConditionError("a condition can only call functions by name")
 
 
 def _called_function(call: ast.Call) -> ast.Name:
-    """Return the function of a call; raises ConditionError of one that cannot be."""
+    """Return the function of a call; raises ConditionError if the call is invalid."""
     if not isinstance(call.func, ast.Name) or call.func.id not in _FUNCTIONS:
         raise ConditionError(f"the functions of a condition are {', '.join(_FUNCTIONS)}")
     count = 2 if call.func.id in ("min", "max") else 1
@@ -225,7 +233,7 @@ def _called(function: str, given: list[Any]) -> Any:
 
 
 def _find(schema: "PortSchema", name: str) -> tuple[str, int | None]:
-    """Return the signal and the place in it that a name means."""
+    """Return the signal of a name, and the index in its flattened array (None: scalar)."""
     if name in schema.signals:
         if schema.signals[name].shape:
             size = "x".join(str(each) for each in schema.signals[name].shape)
@@ -242,7 +250,7 @@ def _find(schema: "PortSchema", name: str) -> tuple[str, int | None]:
         return array, int(rest[:-1])
     near = sorted(each for each in schema.signals if each.startswith(f"{name}."))
     known = ", ".join(near or sorted(schema.signals)[:10])
-    raise ConditionError(f"{name} is no number of this stream; there is {known or 'nothing'}")
+    raise ConditionError(f"{name} is not a number of this stream; it has {known or 'none'}")
 
 
 def _column(batch: "PortBatch", name: str) -> "NDArray[Any]":
@@ -250,5 +258,5 @@ def _column(batch: "PortBatch", name: str) -> "NDArray[Any]":
     column: NDArray[Any] = batch[signal]
     if place is None:
         return column
-    # Not -1 for how many there are: a batch may have no cycles, and only tell of lost ones.
+    # Not reshape(…, -1), which fails for a batch without cycles (which only reports lost ones).
     return column.reshape(len(batch), math.prod(batch.schema.signals[signal].shape))[:, place]

@@ -1,4 +1,4 @@
-"""Events as they happen: states of runners, faults, changes."""
+"""The stream of events: states of runners, faults, changes."""
 
 from collections.abc import Iterable, Iterator
 from typing import Any
@@ -8,7 +8,7 @@ from rtcf.v1 import control_pb2
 
 
 class EventStream(NumberedStream[control_pb2.Event]):
-    """An iterator over Event and Lost; made by Client.watch_events."""
+    """An iterator over Event and Lost; created by Client.watch_events."""
 
     def __init__(
         self,

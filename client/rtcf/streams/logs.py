@@ -1,4 +1,4 @@
-"""Log records of a runner as they come: of its components, and of its executor."""
+"""The stream of log records of a runner's components and executor."""
 
 from collections.abc import Iterable, Iterator
 from typing import Any
@@ -8,12 +8,12 @@ from rtcf_shared.enums import choices
 from rtcf.streams.numbered import NumberedStream, Place
 from rtcf.v1 import control_pb2
 
-# By word: "debug" to "fatal".
+# The levels by name: "debug" to "fatal".
 LEVELS = choices(control_pb2.LogRecord.Level.DESCRIPTOR)
 
 
 class LogStream(NumberedStream[control_pb2.LogRecord]):
-    """An iterator over LogRecord and Lost; made by Client.watch_logs."""
+    """An iterator over LogRecord and Lost; created by Client.watch_logs."""
 
     def __init__(
         self,
@@ -26,7 +26,7 @@ class LogStream(NumberedStream[control_pb2.LogRecord]):
         until_now: bool,
     ) -> None:
         if level not in LEVELS:
-            raise ValueError(f'level "{level}": {", ".join(LEVELS)}')
+            raise ValueError(f'level "{level}": must be one of {", ".join(LEVELS)}')
         request = control_pb2.WatchLogsRequest(runner=runner, components=components)
         request.level = LEVELS[level]  # type: ignore[assignment]
         super().__init__(method, socket, request, after, until_now)

@@ -1,4 +1,4 @@
-"""What comes one after the other, with numbers; none lost without a count."""
+"""A stream of numbered entries; lost entries are counted."""
 
 from abc import abstractmethod
 from collections.abc import Iterator
@@ -15,9 +15,9 @@ Entry = TypeVar("Entry")
 
 @dataclass(frozen=True)
 class Place:
-    """Where somebody stands; made by a stream.
+    """A position in a stream, from NumberedStream.place.
 
-    Numbers begin anew with each start of rtcfd, as `log_id` tells.
+    Sequence numbers restart with each start of rtcfd, which `log_id` identifies.
     """
 
     log_id: str = ""
@@ -26,8 +26,7 @@ class Place:
 
 @dataclass(frozen=True)
 class Lost:
-    """So many, of all that could have been asked for, are not known any more: they would stand
-    here."""
+    """The number of entries missing at this position, because rtcfd no longer keeps them."""
 
     count: int
 
@@ -35,8 +34,8 @@ class Lost:
 class NumberedStream(Closing, Generic[Entry]):
     """An iterator over entries and Lost, used by one thread.
 
-    Raises RefusedError, and DaemonUnreachableError if the connection is lost: go on from
-    `place` then.
+    Raises RefusedError, and DaemonUnreachableError if the connection is lost.  A new stream can
+    then continue after `place`.
     """
 
     def __init__(
@@ -49,7 +48,7 @@ class NumberedStream(Closing, Generic[Entry]):
         self._socket = socket
         self._call = method(request)
         self._waiting: list[Entry | Lost] = []
-        self._fetch()  # from here on nothing is missed
+        self._fetch()  # from now on no entry is missed
 
     def __iter__(self) -> Iterator[Entry | Lost]:
         while True:
@@ -59,20 +58,20 @@ class NumberedStream(Closing, Generic[Entry]):
                 return
 
     def close(self) -> None:
-        """End the stream.  Any thread."""
+        """End the stream; callable from any thread."""
         self._call.cancel()
 
     @abstractmethod
     def _entries(self, response: Any) -> Iterator[Entry]:
-        """Return what a message tells."""
+        """Return the entries of a message."""
 
     def _fetch(self) -> bool:
-        """Take the next message; tell whether there was one."""
+        """Receive the next message; return whether there was one."""
         try:
             response = next(self._call, None)
         except grpc.RpcError as error:
             if error.code() == grpc.StatusCode.CANCELLED:
-                return False  # by close()
+                return False  # cancelled by close()
             raise failures.from_grpc(error, self._socket) from None
         if response is None:
             return False

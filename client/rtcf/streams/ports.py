@@ -1,4 +1,4 @@
-"""Values of ports and declared state of every cycle, as NumPy columns."""
+"""The stream of values of outputs and declared state of every cycle, as NumPy columns."""
 
 import re
 from collections.abc import Callable, Iterable, Iterator
@@ -21,46 +21,49 @@ _STATE = re.compile(
     r"^(bool|float|double|u?int(?:8|16|32|64))(?:\[(\d+)(?:x(\d+)(,RowMajor)?)?\])?$"
 )
 _OLDER = (
-    "its executor is older and tells no {}: `rtcfctl runner restart` stops the loop and starts one "
-    "that does"
+    "the executor is too old for {}: `rtcfctl runner restart` stops the loop and starts a new "
+    "executor"
 )
 _FORMATS = {"bool": "?", "float": "<f4", "double": "<f8"}
 
 
 @dataclass(frozen=True)
 class Signal:
-    """A number, or an array of numbers, that has a value in every cycle."""
+    """A number or an array of numbers with a value in every cycle."""
 
-    name: str  # full: component, '.', port or state, and the field if it is one of several
-    unit: str  # empty = not told
-    column: int  # of the schema
-    format: str  # of one number, as NumPy writes it
-    shape: tuple[int, ...]  # () = one number
+    name: str  # full: component, '.', port or state, and the field of a message
+    unit: str  # empty = unknown
+    column: int  # index in the schema
+    format: str  # NumPy format of one number
+    shape: tuple[int, ...]  # () = scalar
     offset: int  # bytes, in a value of the column
-    transposed: bool = False  # a matrix, which lies in memory column by column
-    number: int = 0  # of the first one, among the numbers of a value of the column
+    transposed: bool = False  # a matrix in column-major order
+    number: int = 0  # index of the first number among all numbers of the column
 
 
 @dataclass(frozen=True)
 class PortSchema:
-    """What a stream tells, until the graph changes."""
+    """The content of a stream, valid until the graph changes."""
 
     columns: tuple[ports_pb2.PortColumn, ...] = ()
-    notes: tuple[str, ...] = ()  # what matches and is not there, a line each
+    notes: tuple[str, ...] = ()  # a line for each matching name without values
     signals: dict[str, Signal] = field(default_factory=dict)  # by name, in schedule order
-    turns: tuple[str, ...] = ()  # components in schedule order, of a stream with their times
+    turns: tuple[str, ...] = ()  # components in schedule order, if the stream has their times
 
 
 @dataclass(frozen=True)
 class PortBatch:
-    """Some cycles one after the other, `every` apart; or, of a stream of minima and maxima, windows
-    of so many cycles, told by their first ones."""
+    """Consecutive cycles, `every` apart.
+
+    In a stream of minima and maxima, consecutive windows of `every` cycles, each identified by its
+    first cycle.
+    """
 
     schema: PortSchema
     every: int
     first_cycle: int
-    lost: int  # cycles before these that were asked for and that nobody took in time
-    last_of_loop: bool  # the last one is the cycle in which components made safe
+    lost: int  # dropped cycles before this batch
+    last_of_loop: bool  # the last cycle is the one of safe(), at the end of the loop
     message: ports_pb2.PortBatch
 
     def __len__(self) -> int:
@@ -68,12 +71,12 @@ class PortBatch:
 
     @property
     def is_min_max(self) -> bool:
-        """Tell whether it is of windows."""
+        """Whether the batch has minima and maxima of windows."""
         return len(self.message.counts) > 0
 
     @property
     def cycles(self) -> "NDArray[np.int64]":
-        """The numbers of the cycles."""
+        """The cycle numbers."""
         last = self.first_cycle + len(self) * self.every
         return _integers(range(self.first_cycle, last, self.every))
 
@@ -84,61 +87,66 @@ class PortBatch:
 
     @property
     def latencies_ns(self) -> "NDArray[np.int64]":
-        """Wake-up after each deadline; ns."""
+        """The wake-up latency of each cycle; ns."""
         return _integers(self.message.latencies_ns)
 
     @property
     def durations_ns(self) -> "NDArray[np.int64]":
-        """Calculation in each cycle; ns."""
+        """The calculation duration of each cycle; ns."""
         return _integers(self.message.durations_ns)
 
     def __getitem__(self, name: str) -> "NDArray[Any]":
-        """Return the values of a signal: by cycle, then as the signal is shaped."""
+        """Return the values of a signal, of shape (cycles, *shape of the signal)."""
         if self.is_min_max:
-            raise RtcfError(f"{name}: a stream of minima and maxima has minima() and maxima()")
+            raise RtcfError(f"{name}: use minima() and maxima() for a stream of minima and maxima")
         return self._values(name, len(self))
 
     def minima(self, name: str) -> "NDArray[Any]":
-        """Return the smallest value of each number of a signal: by window, then as shaped."""
+        """Return the minima of a signal's numbers, of shape (windows, *shape of the signal)."""
         return self._values(name, 2 * len(self))[0::2]
 
     def maxima(self, name: str) -> "NDArray[Any]":
-        """Return the largest values; NaN is above all numbers."""
+        """Return the maxima like minima(); NaN counts as the largest value."""
         return self._values(name, 2 * len(self))[1::2]
 
     def minima_at(self, name: str) -> "NDArray[np.int64]":
-        """Return the cycle in which each minimum was there first."""
+        """Return the first cycle of each minimum."""
         return self._places(name)[0::2]
 
     def maxima_at(self, name: str) -> "NDArray[np.int64]":
-        """Return the cycle in which each maximum was there first."""
+        """Return the first cycle of each maximum."""
         return self._places(name)[1::2]
 
     @property
     def turns_ns(self) -> "NDArray[np.int64]":
-        """Of a stream with times of components: by cycle, when the first one's turn began, and when
-        the update() of each of `schema.turns` had ended, which is when the next one's began; ns
-        after the beginning of the calculation; -1 = it did not run."""
+        """The times of components, of shape (cycles, 1 + number of `schema.turns`); ns.
+
+        The first column is the begin of the first update(), the others are the end of the update()
+        of each component, at which the next one begins.  Times count from the begin of the
+        calculation; -1 = the component did not run.
+        """
         numbers: NDArray[np.int64] = _numpy().frombuffer(self.message.turns, dtype="<i8")
         return numbers.reshape(len(self), 1 + len(self.schema.turns))
 
     @property
     def window_begins(self) -> "NDArray[np.int64]":
-        """The first cycle of each window that is in its minima and maxima; not the window's own
-        first cycle where the stream began later, or cycles were lost."""
+        """The first cycle included in the minima and maxima of each window.
+
+        It is later than the window's first cycle if the stream began later or cycles were lost.
+        """
         return self.cycles + _integers(self.message.begins or [0] * len(self))
 
     @property
     def window_ends(self) -> "NDArray[np.int64]":
-        """The last cycle of each window that is in its minima and maxima."""
-        # An older executor does not tell it: the window's own last cycle.
+        """The last cycle included in the minima and maxima of each window."""
+        # Older executors do not send it: use the window's last cycle.
         return self.cycles + _integers(self.message.ends or [self.every - 1] * len(self))
 
     def part(self, begin: int, end: int | None = None) -> "PortBatch":
-        """Return some of its cycles as a batch; not of minima and maxima."""
+        """Return the cycles with index [begin, end) as a batch; not for minima and maxima."""
         end = len(self) if end is None else end
         old = self.message
-        turn = len(old.turns) // max(len(self), 1)  # bytes of a cycle
+        turn = len(old.turns) // max(len(self), 1)  # bytes per cycle
         message = ports_pb2.PortBatch(
             first_cycle=self.first_cycle + begin * self.every,
             lost=old.lost if begin == 0 else 0,
@@ -177,7 +185,7 @@ class PortBatch:
 
 
 def _column(data: bytes, count: int, size: int, signal: Signal, offset: int) -> "NDArray[Any]":
-    """Return one signal of `count` values of `size` bytes, in which it lies at `offset`."""
+    """Return a signal at `offset` in each of `count` values of `size` bytes."""
     np = _numpy()
     if not data:
         return np.zeros((0, *signal.shape), signal.format)  # type: ignore[no-any-return]
@@ -197,11 +205,12 @@ def _column(data: bytes, count: int, size: int, signal: Signal, offset: int) -> 
 
 
 class PortStream(Closing):
-    """An iterator over PortBatch; made by Client.watch_ports, used by one thread.
+    """An iterator over PortBatch; created by Client.watch_ports, used by one thread.
 
-    `schema` is that of the batches to come, as far as is known; `on_schema` is called in the
-    thread that reads when it is another one, also of a loop that stands.  Raises RefusedError, and
-    DaemonUnreachableError if the connection is lost.
+    schema     the schema of the next batch
+    on_schema  called in the reading thread when the schema changes, even if the loop is stopped
+
+    Raises RefusedError, and DaemonUnreachableError if the connection is lost.
     """
 
     def __init__(self, method: Any, socket: str, request: ports_pb2.WatchPortsRequest) -> None:
@@ -213,7 +222,7 @@ class PortStream(Closing):
         self._min_max = request.min_max
         self._times = request.component_times
         self._call = method(request)
-        self._next()  # the schema: from here on nothing is missed
+        self._next()  # the schema; from now on no cycle is missed
 
     def __iter__(self) -> Iterator[PortBatch]:
         while (response := self._next()) is not None:
@@ -229,7 +238,7 @@ class PortStream(Closing):
             )
 
     def close(self) -> None:
-        """End the stream.  Any thread."""
+        """End the stream; callable from any thread."""
         self._call.cancel()
 
     def _next(self) -> ports_pb2.WatchPortsResponse | None:
@@ -237,7 +246,7 @@ class PortStream(Closing):
             response: ports_pb2.WatchPortsResponse | None = next(self._call, None)
         except grpc.RpcError as error:
             if error.code() == grpc.StatusCode.CANCELLED:
-                return None  # by close()
+                return None  # cancelled by close()
             raise failures.from_grpc(error, self._socket) from None
         if response is not None and response.WhichOneof("kind") == "schema":
             self.schema = schema_of(response.schema)
@@ -247,7 +256,7 @@ class PortStream(Closing):
 
 
 def schema_of(message: ports_pb2.PortSchema) -> PortSchema:
-    """Return what a stream tells, with its signals."""
+    """Return the schema of a message, with its signals."""
     signals = {}
     outputs = {
         (column.component, column.name)
@@ -263,8 +272,10 @@ def schema_of(message: ports_pb2.PortSchema) -> PortSchema:
 
 
 def signal_name(component: str, name: str, hidden: bool) -> str:
-    """Return the full name of an output or a state; `hidden`: a state that has the name of an
-    output of its component."""
+    """Return the full name of an output or a state.
+
+    `hidden` marks a state with the same name as an output of its component.
+    """
     return f"{component}.{name}[state]" if hidden else f"{component}.{name}"
 
 
@@ -290,7 +301,7 @@ def _signals(number: int, name: str, column: ports_pb2.PortColumn) -> Iterator[S
         return
     match = _STATE.match(column.type)
     if match is None:
-        return  # a structure, of which nobody has told the fields
+        return  # a structure with unknown fields
     kind, rows, columns, by_rows = match.groups()
     form = _FORMATS.get(kind) or f"<{'u' if kind[0] == 'u' else 'i'}{int(kind.strip('uint')) // 8}"
     if rows is None:

@@ -1,7 +1,7 @@
-"""Where the numbers of a serialised ROS message lie, by its definition and a sample of it.
+"""The layout of the numbers in a serialised ROS 1 message, by its definition and a sample.
 
-Of messages of one length: strings and arrays are as long in each as in the sample.  How ROS 1
-serialises is told in http://wiki.ros.org/msg.
+The layout applies to messages of the sample's length, with strings and arrays of the same lengths.
+http://wiki.ros.org/msg describes the serialisation of ROS 1.
 """
 
 import struct
@@ -21,24 +21,24 @@ _LENGTH = struct.Struct("<I")
 
 @dataclass(frozen=True)
 class Leaf:
-    """A number of a message, or an array of numbers."""
+    """A number or an array of numbers in a message."""
 
-    path: str  # e.g. "twist.linear.x"; empty: the message is nothing else
-    format: str  # as NumPy writes it
-    count: int | None  # None: one number
+    path: str  # e.g. "twist.linear.x"; empty for the only value of a std_msgs message
+    format: str  # NumPy format of one number
+    count: int | None  # length of the array; None: a single number
     offset: int  # bytes
-    number: int = 0  # of the first one, among all numbers of the message
+    number: int = 0  # index of the first number among all numbers of the message
 
 
 def size_of(form: str) -> int:
-    """Return the bytes of one number."""
+    """Return the size of one number of a NumPy format, in bytes."""
     return 1 if form == "?" else int(form[-1])
 
 
 def leaves(definition: str, sample: bytes) -> list[Leaf]:
-    """Return the numbers of such a message, in order."""
+    """Return the numbers of messages with a definition and the length of a sample, in order."""
     found = list(_Walk(Definition(definition), sample).message("", ""))
-    # std_msgs wrap one thing, whose name says nothing.
+    # std_msgs wrap one value in a field `data`: omit this name.
     data = [leaf for leaf in found if leaf.path == "data"]
     rest = {leaf.path.partition(".")[0] for leaf in found} - {"data", "layout"}
     if len(data) == 1 and not rest:
@@ -47,7 +47,7 @@ def leaves(definition: str, sample: bytes) -> list[Leaf]:
 
 
 class _Walk:
-    """One way through a sample."""
+    """One traversal of a sample."""
 
     def __init__(self, types: Definition, sample: bytes) -> None:
         self._types = types

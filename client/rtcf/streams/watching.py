@@ -1,4 +1,4 @@
-"""The calls of a client that follow something: figures, events, logs, values of every cycle."""
+"""Calls that open streams: statistics, events, log records, values of every cycle."""
 
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
@@ -18,13 +18,15 @@ if TYPE_CHECKING:
 
 
 class Watching(Connection):
-    """What of a Client begins streams."""
+    """The part of Client that opens streams."""
 
     def watch_statistics(
         self, runner: str = "", interval_s: float = 1.0
     ) -> Iterator[runner_pb2.RunnerStatistics]:
-        """Yield the figures now and after each interval (at least 0.1 s), without end but by a
-        refusal, as when the runner is removed."""
+        """Yield the statistics of a runner now and after each interval (at least 0.1 s).
+
+        The stream only ends with an error, for example after removal of the runner.
+        """
         request = control_pb2.WatchStatisticsRequest(
             runner=runner, interval_ms=round(interval_s * 1000)
         )
@@ -41,11 +43,12 @@ class Watching(Connection):
         *,
         until_now: bool = False,
     ) -> EventStream:
-        """Watch what happens to some runners, or all, and to rtcfd itself.
+        """Open a stream of events of some runners (default: all) and of rtcfd.
 
-        Begins behind `after`, the `place` of a stream of before; Place() is where what rtcfd keeps
-        begins, None is now.  With `until_now` it ends with what has happened so far; without, it
-        ends with a refusal when none of the runners is there.
+        after      the `place` of an earlier stream; Place() starts with the oldest event that
+                   rtcfd keeps, None with new events
+        until_now  end after the events so far; otherwise the stream ends with an error when none
+                   of the runners exists
         """
         return EventStream(
             self._stub.WatchEvents, self.socket, several("runners", runners), after, until_now
@@ -60,11 +63,13 @@ class Watching(Connection):
         *,
         until_now: bool = False,
     ) -> LogStream:
-        """Watch what a runner's components and its executor log, or only some components; `level`
-        is the lowest one: "debug", "info", "warn", "error" or "fatal".
+        """Open a stream of log records of a runner's components and executor.
 
-        `after` and `until_now` are as in watch_events; it ends with a refusal when the runner is
-        removed.  Raises ValueError on a level that there is not.
+        components  if not empty, only records of these
+        level       the lowest level: "debug", "info", "warn", "error" or "fatal"
+
+        `after` and `until_now` are as in watch_events.  The stream ends with an error after removal
+        of the runner.  Raises ValueError for an unknown level.
         """
         return LogStream(
             self._stub.WatchLogs,
@@ -86,17 +91,19 @@ class Watching(Connection):
         component_times: bool = False,
         allow_missing: bool = False,
     ) -> "PortStream":
-        """Watch values of outputs and declared state, of each `every`-th cycle, or (`min_max`) the
-        minima and maxima of each `every` cycles, which hide no value: see PortBatch.minima().
+        """Open a stream of values of outputs and declared state, of each `every`-th cycle.
 
-        `selection` names them with the wildcards of a shell, e.g. "/arm/*.effort"; all without.
-        With `component_times` each cycle also has the time at which the update() of each component
-        ended: see PortBatch.turns_ns; not with `min_max`.
-        A pattern that matches nothing is an error; with `allow_missing` it applies to components
-        that are loaded later.
-        Nothing is missed from here on; what the caller does not take in time is counted.
+        selection        names with the wildcards of a shell, e.g. "/arm/*.effort" (default: all)
+        min_max          minima and maxima of each `every` cycles instead, see PortBatch.minima()
+        component_times  also the time at which each component's update() ended, see
+                         PortBatch.turns_ns; not with `min_max`
+        allow_missing    permit patterns without a match, for components to be loaded later;
+                         otherwise such patterns are errors
+
+        The stream has all cycles after the return of this call.  Cycles dropped because the caller
+        is slow are counted.
         """
-        # Few commands need it, and each import is time.
+        # Imported here to keep other commands fast.
         from rtcf.streams.ports import PortStream
 
         return PortStream(

@@ -1,4 +1,4 @@
-"""Components and graphs under test: NumPy in, cycles, NumPy out, and measures of the response.
+"""Tests of components and graphs: inputs and outputs as NumPy arrays, measures of the response.
 
 with rtcf.testing.Bench("my_package/Pi", kp=2.0) as bench:
     response = bench.run({"setpoint": 1.0}, steps=2000)

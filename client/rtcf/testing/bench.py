@@ -1,7 +1,7 @@
-"""A component, or a graph, in an executor of one's own and without real time.
+"""A test bench: runs a component or a graph in a private executor, without real time.
 
-Cycles are those of a replay, see rtcf.replay: on simulated time, as fast as they go, from the
-loop's start on. The same inputs give the same outputs, bit by bit.
+A run is a replay (see rtcf.replay) from the start of the loop, on simulated time, as fast as
+possible. The same inputs always result in bit-identical outputs.
 """
 
 from __future__ import annotations
@@ -31,20 +31,23 @@ from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 
 _MASKED: Any = np.ma  # without types in NumPy's own stubs
 _START_NS = 1_000_000_000  # simulated time of the first cycle
-_MOST_MESSAGES = 2000  # of one request
+_MOST_MESSAGES = 2000  # in one request
 _MOST_BYTES = 2 * 1024 * 1024
 
 Inputs = Mapping[str, npt.ArrayLike]
 
 
 class Bench(Closing):
-    """What is under test, in a rtcfd and an executor of its own, which end with it.
+    """A component or graph under test, in a private rtcfd and executor that end with the bench.
 
-    `what` is "package/Type", or the path of a graph file; further arguments are parameters of the
-    component, as `parameters` are, for those whose names are taken. `frequency_hz` is the loop's;
-    `path` are folders with libraries, by default those that a build makes in the present folder.
-    rtcfd logs to standard error, which pytest shows when a test fails. Raises RtcfError, and
-    ValueError for what cannot be meant.
+    what             "package/Type", or the path of a graph file
+    frequency_hz     the frequency of the loop
+    path             folders of libraries; by default the build folders below the current folder
+    parameters       parameters of the component
+    more_parameters  the same as keyword arguments
+
+    rtcfd logs to standard error, which pytest shows for a failed test. Raises RtcfError, and
+    ValueError for invalid arguments.
     """
 
     def __init__(
@@ -72,27 +75,29 @@ class Bench(Closing):
             self._open = opening.pop_all()
 
     def close(self) -> None:
-        """End the executor."""
+        """End the executor and rtcfd."""
         self._open.close()
 
     @property
     def client(self) -> Client:
-        """All else that can be asked of the rtcfd; the runner is rt_runner."""
+        """The client of the private rtcfd, for all other calls; the runner is rt_runner."""
         return self._client
 
     def run(self, inputs: Inputs | None = None, steps: int | None = None) -> Response:
-        """Run so many cycles from the loop's start on, with components made anew.
+        """Run `steps` cycles from the start of the loop, with newly created components.
 
-        `inputs` are by name of an input that no output feeds, "port" or "port.field", of several
-        components "/component.port": a number for all cycles, or an array with a row for each. What
-        is masked (numpy.ma) is not sent in that cycle. Without `steps` there are as many cycles as
-        rows. Raises ValueError, and RefusedError where the loop ends by a component's fault.
+        inputs  values of unconnected inputs, by name: "port" or "port.field", in a graph of several
+                components "/component.port". A value is a number for all cycles, or an array with a
+                row per cycle. Masked rows (numpy.ma) are not sent.
+        steps   number of cycles; by default the number of rows of `inputs`
+
+        Raises ValueError, and RefusedError if a component's fault ends the loop.
         """
         columns = {name: _MASKED.asarray(each) for name, each in (inputs or {}).items()}
         if steps is None:
             steps = max((len(each) for each in columns.values() if each.ndim), default=0)
         if steps < 1:
-            raise ValueError("how many steps? None of the inputs has a row for each")
+            raise ValueError("set steps to at least 1, or pass an array as input")
         by_topic = self._by_topic(columns, steps)
         with self._client.replay() as call:
             begun = call.run(
@@ -107,13 +112,13 @@ class Bench(Closing):
         return self._response(steps, outputs, {each.topic: each for each in begun.written})
 
     def set(self, component: str = "", **values: Any) -> None:
-        """Set parameters, of the only component or of the one named, for the next runs."""
+        """Set parameters of `component` (default: the only one) for the next runs."""
         settings = [_setting(name, value) for name, value in values.items()]
         self._client.set_parameters(component or self._only().full_name, settings)
 
     @property
     def parameters(self) -> dict[str, Any]:
-        """The values of the only component's parameters."""
+        """The parameters of the only component, by name."""
         return {
             each.name: getattr(each.value, str(each.value.WhichOneof("kind")))
             for each in self._only().parameters
@@ -121,12 +126,12 @@ class Bench(Closing):
 
     @property
     def state(self) -> dict[str, Any]:
-        """The declared state of the only component, as the last run has left it."""
+        """The declared state of the only component after the last run, by name."""
         return {each.name: parse(each.value) for each in self._only().states}
 
     @property
     def logs(self) -> list[str]:
-        """What components have logged, "/component: text", the oldest first."""
+        """The log records of components as "/component: text", oldest first."""
         with self._client.watch_logs(after=Place(), until_now=True) as records:
             return [
                 f"{each.component}: {each.message}"
@@ -139,7 +144,7 @@ class Bench(Closing):
         settings.realtime = runner_pb2.REALTIME_PREFERRED
         settings.lock_memory = False
         settings.ros.enabled = False
-        settings.ros.whitelist = ".*"  # what is fed, and read, from outside
+        settings.ros.whitelist = ".*"  # map all ports, because a replay uses only mapped ones
         settings.ros.blacklist = ""
         status = self._client.add_runner(DEFAULT_RUNNER, settings)
         self._period_ns = round(1e9 / status.settings.frequency_hz)
@@ -149,11 +154,11 @@ class Bench(Closing):
     def _only(self) -> graph_pb2.ComponentInfo:
         names = [each.full_name for each in self._components]
         if len(names) != 1:
-            raise ValueError(f"which component? There are {listing(names)}: ask `client`")
+            raise ValueError(f"needs one component, but there are {listing(names)}: use `client`")
         return self._client.get_component(names[0])
 
     def _ports(self, direction: graph_pb2.Direction) -> dict[str, str]:
-        """Return the topics of ports that are mapped, by name as in run()."""
+        """Return the topics of mapped ports, by names as in run()."""
         found = {}
         for component in self._components:
             for port in component.ports:
@@ -168,7 +173,7 @@ class Bench(Closing):
         return _START_NS + cycle * self._period_ns
 
     def _by_topic(self, columns: Mapping[str, Any], steps: int) -> dict[str, dict[str, Any]]:
-        """Return what fields of topics are given."""
+        """Return the rows of each field, by topic and field."""
         ports = self._ports(graph_pb2.DIRECTION_INPUT)
         found: dict[str, dict[str, Any]] = {}
         for name, column in columns.items():
@@ -182,11 +187,11 @@ class Bench(Closing):
     def _messages(
         self, by_topic: Mapping[str, dict[str, Any]], topics: Mapping[str, Any], steps: int
     ) -> list[list[control_pb2.RecordedMessage]]:
-        """Return what is sent, by cycle."""
+        """Return the messages to send, by cycle."""
         found: list[list[control_pb2.RecordedMessage]] = [[] for _ in range(steps)]
         for topic, fields in by_topic.items():
             if topic not in topics:
-                raise ValueError(f"{topic} is fed by an output of the graph")
+                raise ValueError(f"{topic} is connected to an output of the graph")
             try:
                 packed = messages.pack(
                     topics[topic].definition,
@@ -198,7 +203,7 @@ class Bench(Closing):
             for column in fields.values():
                 masked |= _MASKED.getmaskarray(column).reshape(steps, -1).any(axis=1)
             for cycle in as_list(np.flatnonzero(~masked)):
-                # A bit early: no rounding puts it off to the next cycle.
+                # Half a period early, so that rounding cannot delay it to the next cycle.
                 time_ns = self._at(cycle) - self._period_ns // 2
                 found[cycle].append(
                     control_pb2.RecordedMessage(topic=topic, time_ns=time_ns, data=packed[cycle])
@@ -233,7 +238,7 @@ class Bench(Closing):
 
 
 def _build_tree() -> Path | None:
-    """Return the build tree that this library is run from; None: it is installed."""
+    """Return the build tree of this library; None if it is installed."""
     tree = Path(rtcf.__file__).absolute().parents[2]
     return tree if (tree / "bin" / "rtcfd").exists() else None
 
@@ -241,17 +246,17 @@ def _build_tree() -> Path | None:
 def _graph_of(what: str, parameters: Mapping[str, Any]) -> Graph:
     if what.endswith((".yaml", ".yml")):
         if parameters:
-            raise ValueError(f"{what}: a graph file has its parameters in it")
+            raise ValueError(f"{what}: set parameters in the graph file")
         try:
             graphs = read_graphs(Path(what).read_text(), what)
         except OSError as error:
             raise RtcfError(f"{what}: {error.strerror}") from None
         if len(graphs) != 1:
-            raise ValueError(f"{what} has {len(graphs)} graphs: a bench takes one")
+            raise ValueError(f"{what} has {len(graphs)} graphs: a bench needs exactly one")
         return graphs[0]
     package, slash, kind = what.partition("/")
     if not (package and slash and kind):
-        raise ValueError(f'"{what}": a bench is of PACKAGE/TYPE, or of a graph file (.yaml)')
+        raise ValueError(f'"{what}" is neither PACKAGE/TYPE nor a graph file (.yaml)')
     spec = rtcf_shared.spec.component(package, kind)
     spec.parameters.extend(_setting(name, value) for name, value in parameters.items())
     return Graph(components=[spec])
@@ -263,13 +268,13 @@ def _setting(name: str, value: object) -> graph_pb2.ParameterSetting:
     kinds: dict[type, str] = {bool: "bool", int: "int", float: "double", str: "string"}
     kind = kinds.get(type(value))
     if kind is None:
-        raise ValueError(f"{name}: {value!r} is no bool, int, float or text")
+        raise ValueError(f"{name}: {value!r} is not a bool, int, float or text")
     held_value = graph_pb2.ParameterValue(**{f"{kind}_value": value})  # type: ignore[arg-type]
     return graph_pb2.ParameterSetting(name=name, value=held_value)
 
 
 def _split(name: str, ports: Iterable[str]) -> tuple[str, str]:
-    """Return the port that a name begins with, and the field that it goes on with."""
+    """Return the port and the field (possibly empty) of a name."""
     known = list(ports)
     for port in sorted(known, key=len, reverse=True):
         if name == port or name.startswith(f"{port}."):
@@ -278,9 +283,9 @@ def _split(name: str, ports: Iterable[str]) -> tuple[str, str]:
 
 
 def _rows(column: Any, steps: int) -> Any:
-    """Return a row for each cycle."""
+    """Return a column with a row per cycle."""
     if column.dtype.kind not in "biuf":
-        raise ValueError("numbers are needed")
+        raise ValueError("values must be numbers")
     if column.ndim == 0:
         return _MASKED.asarray(np.full(steps, column))
     if len(column) != steps:
@@ -291,7 +296,7 @@ def _rows(column: Any, steps: int) -> Any:
 def _pieces(
     due: list[list[control_pb2.RecordedMessage]],
 ) -> Iterator[tuple[int, list[control_pb2.RecordedMessage]]]:
-    """Yield the messages of some cycles, as one request takes them, and the last of these."""
+    """Yield the messages of each request, with its last cycle."""
     part: list[control_pb2.RecordedMessage] = []
     size = 0
     for cycle, sent in enumerate(due):

@@ -1,4 +1,4 @@
-"""Serialised ROS messages of one length as columns of NumPy, and columns as such messages."""
+"""Conversion between serialised ROS messages of equal length and NumPy columns."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ _SIZES = {"string": 0, "bool": 1, "byte": 1, "char": 1, "time": 8, "duration": 8
 
 
 def pack(definition: str, columns: Mapping[str, npt.NDArray[np.generic]]) -> list[bytes]:
-    """Return the messages, one for each row of the columns; what no column names is zero.
+    """Return one serialised message per row of the columns; fields without a column are zero.
 
-    Columns are by the path of a field, "" for what a message of one field wraps; an array's have
-    its values in the axes after the first one.  Raises ValueError: one line.
+    Columns are by the path of a field, or "" for the only value of a std_msgs message.  For an
+    array, the axes after the first one have its values.  Raises ValueError.
     """
     steps = max(len(each) for each in columns.values())
     sample = _Zero(Definition(definition), columns).message("", "")
@@ -42,21 +42,25 @@ def pack(definition: str, columns: Mapping[str, npt.NDArray[np.generic]]) -> lis
         count = 1 if leaf.count is None else leaf.count
         if values.shape[1] != count:
             raise ValueError(
-                f"{path + ': ' if path else ''}{values.shape[1]} values a cycle, {count} are needed"
+                f"{path + ': ' if path else ''}"
+                f"{values.shape[1]} values per cycle instead of {count}"
             )
         size = count * ros_layout.size_of(leaf.format)
-        with np.errstate(invalid="ignore"):  # what is no integer is found below
+        with np.errstate(invalid="ignore"):  # inexact conversions are rejected below
             exact = np.ascontiguousarray(values.astype(leaf.format, casting="unsafe"))
         if exact.dtype.kind in "iub" and not np.array_equal(exact.astype(float), values):
-            raise ValueError(f"{path + ': ' if path else ''}not every value is a {exact.dtype}")
+            raise ValueError(f"{path + ': ' if path else ''}some values do not fit {exact.dtype}")
         rows[:, leaf.offset : leaf.offset + size] = exact.view("u1").reshape(steps, size)
     return [row.tobytes() for row in rows]
 
 
 def unpack(definition: str, messages: Sequence[bytes]) -> dict[str, npt.NDArray[np.generic]]:
-    """Return the columns of messages, by path as for pack().  ValueError: they differ in length."""
+    """Return the columns of messages, by path as in pack().
+
+    Raises ValueError if the messages differ in length.
+    """
     if len({len(each) for each in messages}) > 1:
-        raise ValueError("the messages are not of one length")
+        raise ValueError("the messages differ in length")
     rows = np.frombuffer(b"".join(messages), "u1").reshape(len(messages), -1)
     columns = {}
     for leaf in ros_layout.leaves(definition, messages[0]):
@@ -68,7 +72,7 @@ def unpack(definition: str, messages: Sequence[bytes]) -> dict[str, npt.NDArray[
 
 
 class _Zero:
-    """A message of zeros, whose arrays are as long as the columns for them are wide."""
+    """A message of zeros, with array lengths according to the widths of the columns."""
 
     def __init__(self, types: Definition, columns: Mapping[str, npt.NDArray[np.generic]]) -> None:
         self._types = types

@@ -1,4 +1,7 @@
-"""A pytest plugin: `pytest_plugins = ["rtcf.testing.plugin"]` in conftest.py."""
+"""A pytest plugin with the fixture `bench`.
+
+Enable it by `pytest_plugins = ["rtcf.testing.plugin"]` in conftest.py.
+"""
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -11,7 +14,7 @@ from rtcf.testing.bench import Bench
 
 @pytest.fixture
 def bench() -> Iterator[Callable[..., Bench]]:
-    """Make benches, with the arguments of rtcf.testing.Bench, that end with the test."""
+    """Create benches, by a function with the arguments of Bench; they end with the test."""
     with ExitStack() as open_benches:
 
         def make(what: str, **arguments: Any) -> Bench:

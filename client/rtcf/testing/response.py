@@ -1,4 +1,4 @@
-"""What a graph under test has written."""
+"""The outputs of a graph under test."""
 
 from __future__ import annotations
 
@@ -11,10 +11,12 @@ from rtcf_shared.naming import listing, suggestion
 
 
 class Response(Mapping[str, npt.NDArray[np.generic]]):
-    """The values of outputs, by name: a row for each cycle, the value that a reader has after it.
+    """The values of outputs by name, with a row per cycle: the value at the end of the cycle.
 
-    `time` is that of the cycles, s from 0; `written` tells by output in which cycles it was
-    written.  Before its first value a number is NaN, an integer 0.
+    time     the times of the cycles, in seconds from 0
+    written  for each output, whether it was written in each cycle
+
+    Before an output is written for the first time, it is NaN, or 0 for integers and bool.
     """
 
     def __init__(
@@ -46,7 +48,7 @@ class Response(Mapping[str, npt.NDArray[np.generic]]):
 def held(
     values: npt.NDArray[np.generic], cycles: npt.NDArray[np.int64], steps: int
 ) -> npt.NDArray[np.generic]:
-    """Return values, written in some cycles, for each cycle: held until the next one."""
+    """Return values written in `cycles` for all `steps` cycles, each held until the next one."""
     result = np.zeros((steps, *values.shape[1:]), values.dtype)
     if values.dtype.kind == "f":
         result[:] = np.nan

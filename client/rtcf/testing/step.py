@@ -1,4 +1,4 @@
-"""What tests of controllers measure: the response to a step, in the usual terms of control."""
+"""Measures of a step response: rise time, settling time, overshoot and final error."""
 
 from __future__ import annotations
 
@@ -11,16 +11,19 @@ import numpy.typing as npt
 
 @dataclass(frozen=True)
 class StepResponse:
-    """How a value followed a step; times are in seconds since the first sample."""
+    """The measures of a step response; times are in seconds."""
 
     rise_time: float
-    """From 10 % to 90 % of the step."""
+    """The time from 10 % to 90 % of the step."""
     settling_time: float
-    """After it the value stays within the tolerance; infinite if the last sample is outside."""
+    """The time, since the first sample, after which the value stays within the tolerance.
+
+    Infinite if the last sample is outside.
+    """
     overshoot: float
-    """How far the value goes beyond the target, as a share of the step; 0 if it does not."""
+    """The maximum distance beyond the target, as a fraction of the step; 0 without overshoot."""
     final_error: float
-    """The target less the last value, in units of the value."""
+    """The target minus the last value, in units of the value."""
 
 
 def step_response(
@@ -30,25 +33,28 @@ def step_response(
     initial: float = 0.0,
     tolerance: float = 0.02,
 ) -> StepResponse:
-    """Measure how a value follows a step from `initial` to `target` at the first sample.
+    """Measure the response to a step from `initial` to `target` at the first sample.
 
-    `time` (s, increasing) and `value` are of one length; `tolerance` is a share of the step. A
-    value that never reaches 90 % has an infinite rise time. ValueError: what cannot be measured,
-    in one line.
+    time       increasing times, in seconds
+    value      the response, of the same length as `time`
+    tolerance  of the settling time, as a fraction of the step
+
+    The rise time is infinite if the value never reaches 90 % of the step. Raises ValueError for
+    invalid arguments.
     """
     seconds, values = np.asarray(time, dtype=float), np.asarray(value, dtype=float)
     if seconds.ndim != 1 or seconds.shape != values.shape or seconds.size < 2:
         raise ValueError(
-            "time and value have to be two lists of the same length, of at least 2 samples"
+            "time and value must be two lists of the same length, with at least 2 samples"
         )
     if not (np.isfinite(seconds).all() and np.isfinite(values).all()):
-        raise ValueError("time and value have to be finite in all samples")
+        raise ValueError("time and value must be finite in all samples")
     if not (np.diff(seconds) > 0).all():
-        raise ValueError("time has to increase from sample to sample")
+        raise ValueError("time must increase from sample to sample")
     if not np.isfinite(target - initial) or target == initial:
-        raise ValueError("a step needs a finite target that is not its initial value")
+        raise ValueError("a step needs a finite target other than its initial value")
     if not 0 < tolerance < 1:
-        raise ValueError("tolerance has to be a share of the step between 0 and 1")
+        raise ValueError("tolerance must be a fraction of the step between 0 and 1")
     share = (values - initial) / (target - initial)
     outside = np.flatnonzero(np.abs(share - 1) > tolerance)
     since = seconds - seconds[0]
@@ -66,7 +72,7 @@ def step_response(
 def _first(
     time: npt.NDArray[np.float64], share: npt.NDArray[np.floating[Any]], level: float
 ) -> float:
-    """When `share` reaches `level` first, between two samples by a straight line."""
+    """Return when `share` first reaches `level`, by linear interpolation between samples."""
     after = int(np.argmax(share >= level))
     if after == 0:
         return float(time[0])

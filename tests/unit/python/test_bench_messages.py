@@ -71,10 +71,10 @@ def test_what_ros_wrote_is_read() -> None:
     [
         (Twist, {"linear.w": np.zeros(2)}, "no field linear.w; did you mean"),
         (Float64, {"x": np.zeros(2)}, "no field x (fields: (the value itself))"),
-        (Float64, {"": np.zeros((2, 3))}, "3 values a cycle, 1 are needed"),
-        (Int32, {"": np.array([0.5, 1.0])}, "not every value is a int32"),
-        (Int32, {"": np.array([2.0**31, 1.0])}, "not every value is a int32"),
-        (Int32, {"": np.array([np.nan, 1.0])}, "not every value is a int32"),
+        (Float64, {"": np.zeros((2, 3))}, "3 values per cycle instead of 1"),
+        (Int32, {"": np.array([0.5, 1.0])}, "some values do not fit int32"),
+        (Int32, {"": np.array([2.0**31, 1.0])}, "some values do not fit int32"),
+        (Int32, {"": np.array([np.nan, 1.0])}, "some values do not fit int32"),
     ],
 )
 def test_what_does_not_fit_is_refused(kind: Any, columns: dict[str, Any], said: str) -> None:
@@ -86,7 +86,7 @@ def test_what_does_not_fit_is_refused(kind: Any, columns: dict[str, Any], said: 
 
 def test_messages_that_differ_in_length_are_no_columns() -> None:
     two = [_serialised(JointState(position=[0.0] * n)) for n in (1, 2)]
-    with pytest.raises(ValueError, match="not of one length"):
+    with pytest.raises(ValueError, match="messages differ in length"):
         unpack(_text(JointState), two)
 
 

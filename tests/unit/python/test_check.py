@@ -120,7 +120,7 @@ def test_what_cannot_be_checked_is_refused(
 
 
 def test_no_executor_in_a_build_tree_names_the_command_that_builds_it(tmp_path: Path) -> None:
-    with pytest.raises(RtcfError, match=f"`make -C {tmp_path} checker` builds it"):
+    with pytest.raises(RtcfError, match=f"build it with `make -C {tmp_path} checker`"):
         checking.check(
             checking.executor_of(tmp_path / "build"), "pkg", "T", 1, build_tree=tmp_path / "build"
         )

@@ -50,21 +50,21 @@ def test_a_bool_is_a_condition() -> None:
     ("text", "said"),
     [
         ("", "no condition"),
-        ("a.x >", "is no condition"),
-        ("a.x > 1)", "is no condition"),
-        ("phase > 1", '"phase" in "phase > 1" is no signal'),
+        ("a.x >", "is not a condition"),
+        ("a.x > 1)", "is not a condition"),
+        ("phase > 1", '"phase" in "phase > 1" is not a signal'),
         ("a.x + 1", "is a number: compare it"),
         ("1 > 0", "names no signal"),
         ("a.x > $", '"$" in'),
         ("a.x = 1", '"= 1" in'),
         ("abs(a.x, 1) > 1", "abs() takes 1 value"),
         ("max(a.x) > 1", "max() takes 2 values"),
-        ("abs(a=a.x) > 1", "is no signal"),
+        ("abs(a=a.x) > 1", "is not a signal"),
         ("abs > a.x", "abs is a function: write abs(…)"),
         ("inf(a.x) > 1", "the functions of a condition are abs, min, max, sqrt, isnan"),
         ("a.x(1) > 1", "the functions of a condition are"),
         ("-" * 900 + "a.x > 1", "parentheses"),
-        ("a.x > __import__", "is no signal"),
+        ("a.x > __import__", "is not a signal"),
         ("a.x > 1" + " and a.x > 1" * 200, "at most 1000"),
         ("(" * 90 + "a.x > 1" + ")" * 90 + "> " + "-" * 100 + "1", "parentheses"),
     ],
@@ -98,8 +98,8 @@ def test_signals_are_looked_for_in_the_stream() -> None:
     for text, said in (
         ("a.v > 0", "is an array of 3: name one number, as in /a.v[0]"),
         ("a.v[3] > 0", "has 3 numbers, from [0]"),
-        ("a.m > 0", "there is /a.m.p.x"),
-        ("b.z > 0", "/b.z is no number of this stream; there is /a.m.p.x, /a.v"),
+        ("a.m > 0", "it has /a.m.p.x"),
+        ("b.z > 0", "/b.z is not a number of this stream; it has /a.m.p.x, /a.v"),
     ):
         with pytest.raises(ConditionError) as refused:
             Condition(text).check(schema)

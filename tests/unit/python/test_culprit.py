@@ -463,7 +463,7 @@ def test_pages_of_the_kernel_are_read() -> None:
 
 
 def test_a_format_of_another_kind_is_refused() -> None:
-    with pytest.raises(ValueError, match="without an ID"):
+    with pytest.raises(ValueError, match="has no ID"):
         Decoder({"sched_switch": "nothing"}, HEADER)
     with pytest.raises(KeyError):
         Decoder(FORMATS, "nothing")

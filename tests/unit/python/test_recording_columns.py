@@ -268,9 +268,9 @@ def test_a_repair_writes_over_nothing(tmp_path: Path) -> None:
     whole.write_text("mine")
     with read_recording(killed) as recording:
         for to, said in (
-            (whole, "is there already: --force writes over it"),
+            (whole, "already exists: --force overwrites it"),
             (killed, "is the recording itself"),
-            (tmp_path / "run.bag", "end its name in .mcap"),
+            (tmp_path / "run.bag", "the suffix must be .mcap"),
         ):
             with pytest.raises(ValueError, match=said):
                 repair(recording, to)

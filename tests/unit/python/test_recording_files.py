@@ -31,6 +31,6 @@ def test_a_file_is_as_before_where_the_one_over_it_has_not_begun(tmp_path: Path)
     ):
         files.Files(path, "runner", force=True)
     assert path.read_bytes() == before
-    with pytest.raises(ValueError, match="there already"):
+    with pytest.raises(ValueError, match="already exists"):
         files.Files(path, "runner")
     assert [path] == list(tmp_path.iterdir())

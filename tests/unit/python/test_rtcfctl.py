@@ -124,8 +124,8 @@ def test_a_socket_whose_path_no_socket_can_have_is_said_in_a_line() -> None:
     [
         (0o660, "daemon", "join its group (`sudo adduser nobody daemon`) and log in again"),
         # No group that gives more than this socket, or nothing.
-        (0o660, "root", "it is the own rtcfd of user root"),
-        (0o600, "daemon", "it is the own rtcfd of user root"),
+        (0o660, "root", "it belongs to the private rtcfd of user root"),
+        (0o600, "daemon", "it belongs to the private rtcfd of user root"),
     ],
 )
 def test_no_permission_is_exit_code_3_and_names_the_group(

@@ -93,6 +93,6 @@ def test_a_part_is_told_closely_and_one_beyond_the_end_is_refused(tmp_path: Path
     assert each == 1
     assert columns[4].tolist() == [float(i) for i in range(500, 600)]
     assert columns[0][0] == pytest.approx(0.5)
-    with pytest.raises(RecordingError, match="run.mcap has no cycles then"):
+    with pytest.raises(RecordingError, match="run.mcap has no cycles in this range"):
         _told(file, 5.0, 6.0)
     assert Recordings([file], None).describe("run.mcap")["seconds"] == pytest.approx(1.999)

@@ -62,23 +62,23 @@ def test_a_condition_hits_where_it_becomes_true(size: int) -> None:
 
 
 def test_a_condition_that_is_none_is_refused() -> None:
-    with pytest.raises(TriggerError, match="is no condition"):
+    with pytest.raises(TriggerError, match="is not a condition"):
         parse(_BASE | {"kind": "condition", "condition": "a.x >"})
 
 
 def test_a_slope_that_a_kind_has_not_is_refused() -> None:
-    with pytest.raises(TriggerError, match="edge 'above': one of rising, falling, either"):
+    with pytest.raises(TriggerError, match="edge 'above': must be one of rising, falling, either"):
         parse(_BASE | {"kind": "edge", "slope": "above"})
 
 
 @pytest.mark.parametrize(
     ("told", "said"),
     [
-        ({"low": "high"}, "a trigger's numbers"),
-        ({"low": _NAN}, "a trigger's level is a number"),
-        ({"after": 0}, "at least one cycle"),
-        ({"before": -1}, "at least one cycle"),
-        ({"holdoff": -1}, "at least one cycle"),
+        ({"low": "high"}, "invalid number in the trigger"),
+        ({"low": _NAN}, "levels of a trigger must be finite"),
+        ({"after": 0}, "after must be at least 1 cycle"),
+        ({"before": -1}, "after must be at least 1 cycle"),
+        ({"holdoff": -1}, "after must be at least 1 cycle"),
     ],
 )
 def test_numbers_that_cannot_be_are_refused(told: dict[str, object], said: str) -> None:

@@ -41,7 +41,7 @@ def test_what_never_arrives_has_no_times() -> None:
         ([0, 1], [0], 1.0, 0.02, "same length"),
         ([0, 1], [0, math.nan], 1.0, 0.02, "finite in all samples"),
         ([0, 0], [0, 1], 1.0, 0.02, "increase"),
-        ([0, 1], [0, 1], 0.0, 0.02, "not its initial value"),
+        ([0, 1], [0, 1], 0.0, 0.02, "other than its initial value"),
         ([0, 1], [0, 1], 1.0, 0.0, "between 0 and 1"),
     ],
 )

@@ -35,7 +35,7 @@ def test_rtcfd_is_asked_where_the_executors_cannot_be(
     assert client.get_status().runners[0].state == runner_pb2.RUNNER_STATE_STOPPED
     daemon.end()
     (failed,) = client.stop_all()
-    assert str(failed.error).startswith("cannot look for loops: ")
+    assert str(failed.error).startswith("cannot find the loops: ")
     assert "rtcfd is not running at" in str(failed.error)
     assert main(["--socket", str(daemon.socket), "stop", "--all"]) == 3
 
@@ -44,10 +44,10 @@ def test_a_folder_that_cannot_be_read_keeps_none_from_the_other(tmp_path: Path) 
     socket = str(tmp_path / "s")
     ours, beside = direct_stop.folders(socket)
     make_unreadable(beside)
-    with pytest.raises(rtcf.DaemonUnreachableError, match="cannot look for loops"):
+    with pytest.raises(rtcf.DaemonUnreachableError, match="cannot find the loops"):
         direct_stop.stop_all(socket)
     ours.mkdir(parents=True)
     (ours / "arm").touch()  # nobody listens
     (failed,) = direct_stop.stop_all(socket)
     assert failed == Stopped("arm", failed.error)
-    assert "no executor of runner arm can be stopped" in str(failed.error)
+    assert "no executor of runner arm found in " in str(failed.error)
