@@ -45,8 +45,8 @@ inline void bump(std::atomic<std::uint64_t>& number, std::uint64_t by = 1) noexc
     number.store(number.load(std::memory_order_relaxed) + by, std::memory_order_relaxed);
 }
 
-/// When the last cycle that exchanged something, or whose components are timed, began and had
-/// taken over what comes from outside. Ticks of the cycle counter; of whoever runs cycles.
+/// Times in the last cycle that exchanged values or timed its components: its begin, and the end of
+/// the exchange. Ticks of the cycle counter. Owned by the cycle thread.
 struct CycleMarks {
     std::int64_t begin = INT64_MIN;
     std::int64_t ready = INT64_MIN;
@@ -116,7 +116,7 @@ class Cycle {
         stamp_offset_ns_.store(offset_ns, std::memory_order_relaxed);
     }
     const CycleCounter& counter() const noexcept { return counter_; }
-    /// For frames of timed components, which whoever runs cycles copies.
+    /// For the frames of timed components. Cycle thread.
     const CycleMarks& marks() const noexcept { return marks_; }
     SpscRing<CycleRecord, 16384>& records() noexcept { return records_; }
     const SpscRing<CycleRecord, 16384>& records() const noexcept { return records_; }

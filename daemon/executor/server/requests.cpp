@@ -272,7 +272,7 @@ void Server::beginWatch(std::uint64_t connection, const v1::Request& request) {
     const pb::WatchPortsRequest& asked = request.watch_ports();
     if (asked.component_times() && asked.min_max()) {
         throw Refusal(RefusalKind::InvalidArgument,
-                      "what components take is told of cycles, not of windows: ask for min_max "
+                      "component_times are available per cycle, not per window: request min_max "
                       "without component_times");
     }
     const auto& patterns = asked.selection();

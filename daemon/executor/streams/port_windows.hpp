@@ -41,7 +41,7 @@ class PortWindows {
     std::size_t bytes_ = 64;
     std::string value_;
     std::uint64_t first_ = 0;
-    std::uint64_t earliest_ = 0;  // of the cycles that have come
+    std::uint64_t earliest_ = 0;  // first and last cycle added so far
     std::uint64_t latest_ = 0;
     std::uint32_t count_ = 0;
     bool whole_ = false;

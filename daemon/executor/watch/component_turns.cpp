@@ -38,7 +38,7 @@ void ComponentTurns::appendSources(const Schedule& schedule, const Cycle& cycle,
 }
 
 void ComponentTurns::pack(const Frame& frame, std::string& to) const {
-    // In the last cycle of a loop components make safe, which nothing times.
+    // The last cycle of a loop runs safe(), which is not timed.
     const std::int64_t begin = ticksAt(frame, offsets_[0]);
     const bool timed = !frame.lastOfLoop();
     appendNumber(timed ? counter_.toNs(ticksAt(frame, offsets_[1]) - begin) : kDidNotRun, to);

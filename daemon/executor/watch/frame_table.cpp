@@ -54,7 +54,8 @@ std::vector<Candidate> candidatesOf(const Plan& plan) {
     return found;
 }
 
-// PortSelection::kNone of what nobody watches.
+// The best rank of a candidate in the selections of all watches; PortSelection::kNone = not
+// watched.
 std::size_t rankOf(const Candidate& candidate, const Watches& watches) {
     const std::string name = candidate.column.fullName();
     std::size_t least = PortSelection::kNone;

@@ -18,9 +18,6 @@ class PortSelection {
     /// characters, `?` one character, [abc] and [a-z] one of these. A pattern without '.' matches
     /// all outputs and states of the components. Empty = everything
     /// @throws Refusal if a pattern is empty or too long
-    ///                 [abc] and [a-z] one of these. Without '.' it means all of such components.
-    ///                 Empty = everything
-    /// @throws Refusal of one that is empty or too long
     explicit PortSelection(const std::vector<std::string>& patterns);
 
     /// A pattern for whole names.
@@ -44,7 +41,7 @@ class PortSelection {
 
         std::string given_;
         std::string name_;
-        std::vector<Element> elements_;  // none of a name
+        std::vector<Element> elements_;  // empty for a single name
     };
     const std::vector<Pattern>& patterns() const noexcept { return patterns_; }
     /// @param name full name of the component, '.', and name of the output or state
@@ -56,8 +53,9 @@ class PortSelection {
 
    private:
     std::vector<Pattern> patterns_;
-    std::vector<std::size_t> wild_;                       // places of those that are no names
-    std::unordered_map<std::string, std::size_t> names_;  // thousands cost as little as one
+    std::vector<std::size_t> wild_;  // indices of patterns that are not single names
+    // Index by single name, so that a look-up among thousands costs as little as among a few.
+    std::unordered_map<std::string, std::size_t> names_;
 };
 
 }  // namespace rtcf::executor

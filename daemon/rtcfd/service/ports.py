@@ -107,5 +107,5 @@ async def watch_ports(
 
 
 def _is_pattern(selection: str) -> bool:
-    """Tell whether it may match several outputs or states."""
+    """Return whether a selection may match several outputs or states."""
     return "." not in selection.rpartition("/")[2] or not _WILD.isdisjoint(selection)

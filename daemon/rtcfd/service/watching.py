@@ -23,7 +23,7 @@ class _Piece(Generic[Entry]):
 
     entries: list[Entry]
     lost: int  # number of entries lost before the first one
-    upto: int  # number of the last entry, or of the last one before if there is none
+    last: int  # number of the last entry, or of the last one before if there is none
 
 
 async def _follow(
@@ -67,7 +67,7 @@ async def watch(
         ]  # fmt: skip
         if first or told or piece.lost:
             yield control_pb2.WatchEventsResponse(
-                log_id=log.log_id, sequence=piece.upto, lost=piece.lost, events=told
+                log_id=log.log_id, sequence=piece.last, lost=piece.lost, events=told
             )
         first = False
 
@@ -91,7 +91,7 @@ async def watch_logs(
 
     first = True
     async for piece in _follow(log, request, check):
-        begin = piece.upto - len(piece.entries) + 1
+        begin = piece.last - len(piece.entries) + 1
         told = [
             _told(record, number)
             for number, record in enumerate(piece.entries, begin)
@@ -99,7 +99,7 @@ async def watch_logs(
         ]
         if first or told or piece.lost:
             yield control_pb2.WatchLogsResponse(
-                log_id=log.log_id, sequence=piece.upto, lost=piece.lost, records=told
+                log_id=log.log_id, sequence=piece.last, lost=piece.lost, records=told
             )
         first = False
 
