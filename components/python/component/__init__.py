@@ -1,7 +1,7 @@
-"""Components in Python: a class with typed ports, parameters and state.
+"""Components in Python: classes with typed ports, parameters and state.
 
-`rtcf-compile` makes an ordinary library of components of it, which needs no Python when it runs.
-The same class runs in the interpreter, for tests.
+`rtcf-compile` compiles them to an ordinary library of components, which runs without Python. For
+tests, the same class runs in the interpreter.
 """
 
 import sys
@@ -35,10 +35,10 @@ __all__ = [
 
 
 class _Callable(ModuleType):
-    """The client library has a function rtcf.component(), whose name this module hides."""
+    """Makes the module callable: it hides the function rtcf.component() of the client library."""
 
     def __call__(self, *arguments: Any, **options: Any) -> Any:
-        """Return what a component is to be loaded as; see rtcf_shared.spec."""
+        """Return the specification of a component to load; see rtcf_shared.spec."""
         from rtcf_shared.spec import component
 
         return component(*arguments, **options)

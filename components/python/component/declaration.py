@@ -1,7 +1,8 @@
-"""What a component declares: ports, parameters and state, as annotations of its class.
+"""Declarations of a component: ports, parameters and state, as annotations of its class.
 
-`x: Output[np.float64, 2] = Output(unit="rad")` is kept as a Member with the layout of all members
-as one NumPy record, which compiled code sees as one C struct and the interpreter as views.
+A declaration such as `x: Output[np.float64, 2] = Output(unit="rad")` becomes a Member. All members
+of a component lie in one NumPy record: compiled code accesses it as a C struct, the interpreter
+through views.
 """
 
 import inspect
@@ -18,7 +19,7 @@ from rtcf.component.message_type import Leaf, MessageType, is_message, message_t
 from rtcf.component.ros_name import advice, is_member_name
 from rtcf.component.value_type import DeclarationError, ValueType, value_type
 
-# Fields of the record that every component has, beside those of its members.
+# Fields in the record of every component, in addition to those of its members.
 TIME_FIELDS = {
     "time": np.dtype(np.int64),
     "stamp": np.dtype(np.int64),
@@ -34,42 +35,45 @@ _RESERVED = {*TIME_FIELDS, *HOOKS, *LOG_LEVELS, "configure", "stop", "cleanup", 
 
 
 class MemberAttribute:
-    """Base of what stands for a member in a class that has been instantiated."""
+    """Base class of the attributes that replace declarations when a class is instantiated."""
 
 
 @dataclass(frozen=True)
 class Declared:
-    """`Input[float]`: a kind and a type."""
+    """A kind and a type, as in `Input[float]`."""
 
     kind: "type[Declarable]"
     declared: object
 
     def __getitem__(self, size: object) -> Any:
-        """Refuse `State[float][3]`."""
+        """Raise DeclarationError for `State[float][3]`."""
         kind = self.kind.__name__
-        raise DeclarationError(f"{kind} has two brackets: write {kind}[np.float64, 3]")
+        raise DeclarationError(f"{kind} has two pairs of brackets: write {kind}[np.float64, 3]")
 
 
 class Declarable:
-    """Base of Input, Output, Parameter and State."""
+    """Base class of Input, Queue, Output, Parameter, State and Derived."""
 
     allowed: ClassVar[tuple[str, ...]] = ()
 
     def __class_getitem__(cls, declared: object) -> Any:
-        """Give the annotation; what it says is looked at with the class."""
+        """Return the annotation; describe() checks it with the class."""
         return Declared(cls, declared)
 
     def __init__(self, initial: Any = None, **options: Any) -> None:
-        """Take an initial value, where the kind has one, and options."""
+        """Set the initial value, if the kind has one, and the options.
+
+        Raises DeclarationError for an unknown option, or an initial value of a port or of Derived.
+        """
         for option in options:
             if option not in self.allowed:
                 has = ", ".join(self.allowed)
                 raise DeclarationError(
-                    f"{type(self).__name__} knows no option {option!r}: "
-                    f"{f'use {has}' if has else 'leave it out'}"
+                    f"{type(self).__name__} has no option {option!r}: "
+                    f"{f'use {has}' if has else 'remove it'}"
                 )
         if initial is not None and type(self) in (*PORTS, Derived):
-            raise DeclarationError(f"{_a(type(self))} has no initial value: leave it out")
+            raise DeclarationError(f"{_a(type(self))} has no initial value: remove it")
         self.initial = initial
         self.options = options
 
@@ -79,36 +83,38 @@ class Input(Declarable):
 
 
 class Queue(Declarable):
-    """An input that keeps up to `size` messages, in order: `self.goals.size`, `.front`, `.pop()`,
-    `.age` (ns, of the front one), `.dropped`, `.connected`.
+    """An input that keeps up to `size` messages, in order: `self.goals.size`, `.front` (the oldest
+    message), `.pop()`, `.age` (of the oldest message, ns), `.dropped`, `.connected`.
     """
 
     allowed = ("size",)
 
 
 class Output(Declarable):
-    """An output: `self.x.write(value)`; of a message `self.x.value.linear.x = …`, and then
-    `self.x.publish()`. `finite=True` has values checked for NaN and infinity; `texts` are those of
-    a message, `{"header.frame_id": "base"}`.
+    """An output: `self.x.write(value)`, or, for a message, `self.x.value.linear.x = …` followed by
+    `self.x.publish()`.
+
+    With `finite=True`, readers never see NaN or infinity. `texts` sets the constant strings of a
+    message: `{"header.frame_id": "base"}`.
     """
 
     allowed = ("unit", "finite", "texts")
 
 
 class Parameter(Declarable):
-    """A parameter, constant during a cycle: `self.kp`. Set from outside, within its bounds."""
+    """A parameter: `self.kp`. Users set it within its bounds; it is constant during a cycle."""
 
     allowed = ("unit", "doc", "min", "max")
 
 
 class State(Declarable):
-    """What is remembered from cycle to cycle: `self.integral += …`."""
+    """A value that the component keeps from one cycle to the next: `self.integral += …`."""
 
     allowed = ("unit", "doc")
 
 
 class Derived(Declarable):
-    """What prepare() computes of parameters, and only it sets; constant during a cycle."""
+    """A value that prepare() computes from parameters; it is constant during a cycle."""
 
 
 PORTS = (Input, Output, Queue)
@@ -116,7 +122,7 @@ PORTS = (Input, Output, Queue)
 
 @dataclass(frozen=True)
 class Member:
-    """One port, parameter or state of a class."""
+    """One port, parameter, state or derived member of a class."""
 
     name: str
     kind: type[Declarable]
@@ -124,17 +130,17 @@ class Member:
     initial: np.ndarray[Any, Any]
     options: dict[str, Any]
     line: int
-    message: MessageType | None = None  # then `type` says nothing
-    is_none: bool = False  # at the beginning
+    message: MessageType | None = None  # if set, `type` has no meaning
+    is_none: bool = False  # initially
 
     @property
     def leaves(self) -> tuple[Leaf, ...]:
-        """Return the numbers, and arrays of numbers, of a value."""
+        """Return the numbers and arrays of numbers in a value."""
         return self.message.leaves if self.message else (Leaf((), self.type),)
 
     @property
     def elements(self) -> list[str]:
-        """Return the names by which a parameter is set: those of an array's elements, `gain_0`."""
+        """Return the names by which a parameter is set; `gain_0`, `gain_1` … for an array."""
         if not self.type.shape:
             return [self.name]
         places = np.ndindex(self.type.shape)
@@ -142,18 +148,18 @@ class Member:
 
     @property
     def known(self) -> str:
-        """Return the name of the state that says whether an optional one is not None."""
+        """Return the name of the bool state that is true if an optional state is not None."""
         return f"{self.name}__known"
 
     @property
     def size(self) -> int:
-        """Return how many messages a queue keeps."""
+        """Return the capacity of a queue, in messages."""
         return int(self.options["size"])
 
 
 @dataclass
 class Description:
-    """All that a component class declares."""
+    """All declarations of a component class."""
 
     name: str
     doc: str
@@ -161,12 +167,12 @@ class Description:
     constants: dict[str, Any] = field(default_factory=dict)
 
     def of(self, kind: type[Declarable]) -> list[Member]:
-        """Return the members of a kind in order of their declaration."""
+        """Return the members of a kind, in the order of their declarations."""
         return [member for member in self.members.values() if member.kind is kind]
 
     @property
     def record(self) -> np.dtype[Any]:
-        """Return the layout of a component's memory: that of a C struct."""
+        """Return the layout of a component's memory, which is that of a C struct."""
         fields: list[tuple[Any, ...]] = [("_component", np.int64)]
         fields += [(f"_{name}", dtype) for name, dtype in TIME_FIELDS.items()]
         fields.append(("_line", np.int64))
@@ -185,13 +191,16 @@ class Description:
                 ]
             elif member.kind is Output:
                 fields.append((f"{member.name}__written", np.bool_))
-        # Last: compiled code and the runtime find it from the end.
+        # Must be last: compiled code and the runtime compute its place from the end of the record.
         fields.append(("_raised", np.int64, (2,)))
         return np.dtype(fields, align=True)
 
 
 def describe(cls: type) -> Description:
-    """Return what a class declares, its bases' members first; raise DeclarationError."""
+    """Return the declarations of a class, those of its base classes first.
+
+    Raises DeclarationError, with file and line.
+    """
     result = Description(cls.__name__, _first_line(cls.__doc__) or cls.__name__)
     for base in reversed(cls.__mro__):
         if base in (object,) or base.__module__.startswith("rtcf.component"):
@@ -237,19 +246,19 @@ def describe(cls: type) -> Description:
 
 def _member(owner: type, name: str, annotation: object, line: int) -> Member:
     if isinstance(annotation, type) and issubclass(annotation, Declarable):
-        raise DeclarationError(f"says no type: write {annotation.__name__}[float]")
+        raise DeclarationError(f"has no type: write {annotation.__name__}[float]")
     if not isinstance(annotation, Declared):
         raise DeclarationError(
             f"is neither Input, Queue, Output, Parameter, Derived nor State: write {name}: "
-            f"State[…] for a value that is kept, {name} = … for a constant"
+            f"State[…] for a value that changes, {name} = … for a constant"
         )
-    # Derived members have no name outside the component.
+    # Names of Derived members are not visible outside the component.
     if not name.isascii() and annotation.kind is not Derived:
-        raise DeclarationError(f"is no name in ROS, which has ASCII letters alone: {advice(name)}")
+        raise DeclarationError(f"is not a valid name in ROS (ASCII letters only): {advice(name)}")
     if "__" in name or name.startswith("_") or (name.isascii() and not is_member_name(name)):
-        raise DeclarationError("is no name: use a letter, then letters, digits and single _")
+        raise DeclarationError("is not a valid name: use a letter, then letters, digits, single _")
     if name in _RESERVED:
-        raise DeclarationError("is a word that every component has: take another name")
+        raise DeclarationError("is a reserved name: take another name")
     kind, message = annotation.kind, _message(annotation)
     declared = ValueType(np.dtype(np.bool_)) if message else value_type(annotation.declared)
     given = vars(owner).get(f"_declared_{name}", vars(owner).get(name))
@@ -264,22 +273,22 @@ def _member(owner: type, name: str, annotation: object, line: int) -> Member:
             )
         options, initial = given.options, given.initial
     elif f"_declared_{name}" in vars(owner) and given is None and not declared.optional:
-        raise DeclarationError("is None: declare State[float | None], or give it a number")
+        raise DeclarationError("is None: declare State[float | None], or set a number")
     elif given is not None:
         if kind in (*PORTS, Derived):
-            way_out = "set it in prepare" if kind is Derived else "leave the value out"
-            raise DeclarationError(f"is {_a(kind)} and has no initial value: {way_out}")
+            way_out = "set it in prepare" if kind is Derived else "remove the value"
+            raise DeclarationError(f"is {_a(kind)}, which has no initial value: {way_out}")
         initial = given
     if declared.optional and kind is not State:
-        raise DeclarationError("may be None, as a State alone may: use .valid of an Input")
+        raise DeclarationError("may be None, but only a State may be None: use .valid of an Input")
     if kind is Parameter and initial is None:
         raise DeclarationError(f"has no default: write {name}: Parameter[…] = Parameter(1.0)")
     if kind is Parameter and declared.enumeration and {"min", "max"} & set(options):
-        raise DeclarationError("is an enum, which is set by name: leave min and max out")
+        raise DeclarationError("is an enum, which is set by name: remove min and max")
     if kind is Queue:
         _check_size(name, options.get("size"))
     if kind is Parameter and declared.shape and declared.is_bool:
-        raise DeclarationError("is an array of bools: declare single ones, or an array of ints")
+        raise DeclarationError("is an array of bools: declare single bools, or an array of ints")
     if options.get("texts") is not None:
         _check_texts(message, options["texts"])
     value = _initial(declared, initial)
@@ -287,38 +296,41 @@ def _member(owner: type, name: str, annotation: object, line: int) -> Member:
         _check_bounds(value, options)
     for option in ("unit", "doc"):
         if not isinstance(options.get(option, ""), str):
-            raise DeclarationError(f"has {option}={options[option]!r}: give it a text")
+            raise DeclarationError(f"has {option}={options[option]!r}: use a string")
     return Member(
         name, kind, declared, value, options, line, message, declared.optional and initial is None
     )
 
 
 def is_constant(annotation: object) -> bool:
-    """Tell whether an annotation is ClassVar, as it is or as text."""
+    """Return True if an annotation is ClassVar, also if it is a string."""
     if isinstance(annotation, str):
         return "ClassVar" in annotation.partition("[")[0]
     return ClassVar in (annotation, typing.get_origin(annotation))
 
 
 def _known(member: Member) -> Member:
-    """Return the state that says whether another one is not None."""
+    """Return the bool state that is true if an optional state is not None."""
     known = ValueType(np.dtype(np.bool_))
     return Member(member.known, State, known, np.array(not member.is_none), {}, member.line)
 
 
 def _message(annotation: Declared) -> MessageType | None:
-    """Return the message type of a port; `JointState, 7` says the size of its arrays."""
+    """Return the message type of a port; None if it carries no message.
+
+    `JointState, 7` declares 7 as the largest size of its arrays.
+    """
     declared = annotation.declared
     cls, *sizes = declared if isinstance(declared, tuple) else (declared,)
     if not is_message(cls):
         return None
     if annotation.kind not in (Input, Output):
         raise DeclarationError(
-            f"{cls._type}: a message is carried by an Input or an Output: declare one"
+            f"has the message type {cls._type}: declare an Input or an Output"
         )
     if len(sizes) > 1 or not all(type(each) is int and each > 0 for each in sizes):
         raise DeclarationError(
-            f"{cls._type} takes one size, of all its arrays: write {cls.__name__}, 6"
+            f"needs one size for all arrays of {cls._type}: write {cls.__name__}, 6"
         )
     return message_type(cls, sizes[0] if sizes else None)
 
@@ -327,13 +339,13 @@ def _check_texts(message: MessageType | None, texts: Any) -> None:
     known = [".".join(each) for each in message.texts] if message else []
     if not isinstance(texts, dict) or not all(each in known for each in texts):
         raise DeclarationError(
-            "texts are not of this message: give {name: text} of: "
+            "texts do not match the strings of the message: write {name: string} for names of: "
             f"{', '.join(known) or 'a message'}"
         )
 
 
 def _queue_fields(member: Member) -> list[tuple[Any, ...]]:
-    """Return a ring of messages, when each was written, and how many of them count."""
+    """Return the fields of a queue: the ring of its messages, their times, and its counters."""
     name, size = member.name, member.size
     return [
         (name, member.type.scalar, (size, *member.type.shape)),
@@ -346,14 +358,14 @@ def _queue_fields(member: Member) -> list[tuple[Any, ...]]:
 def _check_size(name: str, size: Any) -> None:
     if size is None:
         raise DeclarationError(
-            f"says not how many it keeps: write {name}: Queue[…] = Queue(size=8)"
+            f"has no size, in messages: write {name}: Queue[…] = Queue(size=8)"
         )
     if not isinstance(size, int) or isinstance(size, bool) or not 1 <= size <= 1024:
-        raise DeclarationError(f"keeps 1 to 1024 messages, not {size!r}: give a size within")
+        raise DeclarationError(f"has size={size!r}: use 1 to 1024 messages")
 
 
 def _a(kind: type) -> str:
-    """Return the kind with its article."""
+    """Return the name of a kind with its article."""
     return f"{'an' if kind.__name__[0] in 'IO' else 'a'} {kind.__name__}"
 
 
@@ -366,50 +378,53 @@ def _initial(declared: ValueType, given: Any) -> np.ndarray[Any, Any]:
     try:
         value = np.asarray(given)
     except ValueError:
-        raise DeclarationError("has rows of different length: make them fit") from None
+        raise DeclarationError("has rows of different lengths: make them equal") from None
     if value.dtype.kind in "USO":
-        raise DeclarationError(f"is {_number(declared)}, not {given!r}: give it a number")
+        raise DeclarationError(f"is {_number(declared)}, not {given!r}: use a number")
     if declared.enumeration and value not in list(declared.enumeration):
         names = ", ".join(each.name for each in declared.enumeration)
         enumeration = declared.enumeration.__name__
-        raise DeclarationError(f"{given!r} is no {enumeration}: use one of {names}")
+        raise DeclarationError(
+            f"has the value {given!r}, which is not in {enumeration}: use one of {names}"
+        )
     if declared.shape and value.shape == ():
         value = np.full(declared.shape, value)
     if value.shape != declared.shape:
         raise DeclarationError(
-            f"has shape {declared.shape}, its value {value.shape}: make them the same"
+            f"has shape {declared.shape}, but its value has {value.shape}: make them equal"
         )
     if not np.can_cast(value.dtype, declared.scalar, "same_kind"):
         raise DeclarationError(
-            f"is {_number(declared)}, its value {value.dtype.name}: give it {_number(declared)}"
+            f"is {_number(declared)}, but its value is {value.dtype.name}: use {_number(declared)}"
         )
     if value.dtype.kind in "iu" and declared.scalar.kind in "iu":
         limits = np.iinfo(declared.scalar)
         if np.any(value < limits.min) or np.any(value > limits.max):
             raise DeclarationError(
-                f"{given} does not fit {declared.scalar.name}: use {limits.min} to {limits.max}"
+                f"has the value {given}, which does not fit {declared.scalar.name}: "
+                f"use {limits.min} to {limits.max}"
             )
     return value.astype(declared.scalar)
 
 
 def _number(declared: ValueType) -> str:
-    """Return a type of numbers in words, as Python's where it is one."""
+    """Return the name of a scalar type with its article, Python's name if it has one."""
     name = declared.scalar.name
     return {"float64": "a float", "int64": "an int", "bool": "a bool"}.get(name, f"a {name}")
 
 
 def _check_bounds(initial: Any, options: dict[str, Any]) -> None:
-    """Refuse bounds that are no numbers, and a default outside them."""
+    """Raise DeclarationError for bounds that are not numbers, and for a default outside them."""
     bounds = {each: options[each] for each in ("min", "max") if options.get(each) is not None}
     for name, value in bounds.items():
         if not isinstance(value, int | float | np.number):
-            raise DeclarationError(f"has {name}={value!r}: give it a number")
+            raise DeclarationError(f"has {name}={value!r}: use a number")
     low, high = bounds.get("min", -np.inf), bounds.get("max", np.inf)
     if low > high:
         raise DeclarationError(f"has min={low} above max={high}: exchange them")
     if np.any(initial < low) or np.any(initial > high):
         within = ", ".join(f"{name}={value}" for name, value in bounds.items())
-        raise DeclarationError(f"has a default outside {within}: choose one within")
+        raise DeclarationError(f"has a default outside {within}: choose a default within")
 
 
 def _first_line(doc: str | None) -> str:
@@ -417,14 +432,14 @@ def _first_line(doc: str | None) -> str:
 
 
 def _lines(cls: type) -> dict[str, int]:
-    """Return the lines of a class's names, as far as its source is there."""
+    """Return the source line of each name in a class; empty if there is no source."""
     try:
         source, begin = inspect.getsourcelines(cls)
     except (OSError, TypeError):
         return {}
     found: dict[str, int] = {}
     for number, line in enumerate(source, begin):
-        # As Python has names: the sign of micro is the Greek letter.
+        # Python normalises names: the micro sign becomes the Greek letter.
         if match := re.match(r"\s+(\w+)\s*[:=]", unicodedata.normalize("NFKC", line)):
             found.setdefault(match[1], number)
     return found

@@ -1,6 +1,6 @@
-"""A component in the interpreter: its members are views of one record, as in compiled code.
+"""Component in the interpreter, for tests: its members are views of one record.
 
-For tests and for looking: the same class, the same names, one cycle by `update()`.
+Compiled code has the same record. Each call of `cycle()` runs one `update()`.
 """
 
 import enum
@@ -27,11 +27,11 @@ from rtcf.component.value_type import ValueType
 
 
 class Fault(Exception):
-    """What `self.fault(…)` raises: the loop ends in order, or goes on without an optional one."""
+    """Raised by `self.fault(…)`: the loop ends, or continues without an optional component."""
 
 
 class _Value:
-    """A value in the record, as Python's own number or as a view of an array."""
+    """A value in the record: a Python number, or a view of an array or a message."""
 
     def __init__(self, record: Any, member: Member) -> None:
         self._record, self._member = record, member
@@ -81,38 +81,41 @@ class _Value:
 
 
 class InputPort:
-    """An input as the interpreter sees it."""
+    """An input in the interpreter."""
 
     def __init__(self, record: Any, member: Member) -> None:
         self._value, self._record, self._name = _Value(record, member), record, member.name
 
     @property
     def value(self) -> Any:
-        """Return the newest value; zero before there was one."""
+        """Return the newest value; zero if none has been written."""
         return self._value.get()
 
     @property
     def new(self) -> bool:
-        """Tell whether it was written since this component's last update."""
+        """Return True if a value was written since this component's last update."""
         return bool(self._record[f"{self._name}__new"])
 
     @property
     def valid(self) -> bool:
-        """Tell whether there is a value at all."""
+        """Return True if a value has been written."""
         return bool(self._record[f"{self._name}__valid"])
 
     @property
     def connected(self) -> bool:
-        """Tell whether something feeds it."""
+        """Return True if a component or a topic writes it."""
         return bool(self._record[f"{self._name}__connected"])
 
     @property
     def age(self) -> int:
-        """Return how long ago it was written, ns; -1 without a value."""
+        """Return the time since the value was written, ns; -1 without a value."""
         return int(self._record[f"{self._name}__age"])
 
     def put(self, value: Any) -> None:
-        """For tests: write it as another component would."""
+        """For tests: write a value, as another component does.
+
+        A message with too many elements is ignored.
+        """
         if not self._value.put(named(value, self._value.type, self._name)):
             return
         self._record[f"{self._name}__new"] = self._record[f"{self._name}__valid"] = True
@@ -121,19 +124,19 @@ class InputPort:
 
 
 class QueuePort:
-    """A queue as the interpreter sees it."""
+    """A queue in the interpreter."""
 
     def __init__(self, record: Any, member: Member) -> None:
         self._record, self._member, self._name = record, member, member.name
 
     @property
     def size(self) -> int:
-        """Return how many messages there are."""
+        """Return the number of messages."""
         return int(self._record[f"{self._name}__count"])
 
     @property
     def front(self) -> Any:
-        """Return the oldest message; IndexError without one."""
+        """Return the oldest message; raise IndexError if the queue is empty."""
         if self.size == 0:
             raise IndexError("front of an empty queue")
         value = self._record[self._name][self._record[f"{self._name}__oldest"]]
@@ -141,7 +144,7 @@ class QueuePort:
 
     @property
     def age(self) -> int:
-        """Return how long ago the oldest was written, ns; -1 without one."""
+        """Return the time since the oldest message was written, ns; -1 if the queue is empty."""
         if self.size == 0:
             return -1
         written = self._record[f"{self._name}__times"][self._record[f"{self._name}__oldest"]]
@@ -149,23 +152,23 @@ class QueuePort:
 
     @property
     def dropped(self) -> int:
-        """Return how many came while it was full."""
+        """Return the number of messages that arrived at a full queue."""
         return int(self._record[f"{self._name}__dropped"])
 
     @property
     def connected(self) -> bool:
-        """Tell whether something feeds it."""
+        """Return True if a component or a topic writes it."""
         return bool(self._record[f"{self._name}__connected"])
 
     def pop(self) -> None:
-        """Remove the oldest message, if there is one."""
+        """Remove the oldest message, if any."""
         if self.size:
             oldest = self._record[f"{self._name}__oldest"] + 1
             self._record[f"{self._name}__oldest"] = oldest % self._member.size
             self._record[f"{self._name}__count"] -= 1
 
     def put(self, value: Any) -> None:
-        """For tests: write one message more, as another component would."""
+        """For tests: add a message, as another component does."""
         name, size = self._name, self._member.size
         self._record[f"{name}__connected"] = True
         if self.size == size:
@@ -179,36 +182,35 @@ class QueuePort:
 
 
 class OutputPort:
-    """An output as the interpreter sees it."""
+    """An output in the interpreter."""
 
     def __init__(self, record: Any, member: Member, kept: Any = None) -> None:
-        """`kept`: a record with what readers have where that is not the component's own value."""
+        """Create the port. `kept` is a record with the value that readers see, if it differs."""
         self._value, self._record, self._name = _Value(record, member), record, member.name
         self._seen = self._value if kept is None else _Value(kept, member)
 
     def write(self, value: Any) -> None:
-        """Write a value; it is seen when the hook has ended."""
+        """Write a value; readers see it after the hook has returned."""
         self._value.set(value)
         self._record[f"{self._name}__written"] = True
 
     def publish(self) -> None:
-        """Make what `.value` was set to the new value."""
+        """Publish `.value`, which the hook has changed in place."""
         self._record[f"{self._name}__written"] = True
 
     @property
     def value(self) -> Any:
-        """Return the value that was written last; after a cycle that of readers, which is the last
-        finite one of an output that is declared finite."""
+        """Return the newest value. After a cycle, a finite output returns its last finite value."""
         return self._seen.get()
 
     @property
     def written(self) -> bool:
-        """For tests: tell whether it was written in this cycle."""
+        """For tests: return True if the output was written in this cycle."""
         return bool(self._record[f"{self._name}__written"])
 
 
 class _Attribute(MemberAttribute):
-    """A member of a component by its name."""
+    """The attribute of a component that accesses a member."""
 
     def __init__(self, member: Member) -> None:
         self._member = member
@@ -229,22 +231,22 @@ class _Attribute(MemberAttribute):
         if self._member.kind in (State, Derived):
             _Value(component._record, self._member).set(value)
         elif self._member.kind is Parameter:
-            raise AttributeError(f"{self._member.name} is a parameter: it is set from outside")
+            raise AttributeError(f"{self._member.name} is a parameter, which hooks cannot set")
         else:
             raise AttributeError(f"{self._member.name} is a port: use .write(…)")
 
 
 class Component:
-    """Base class of components in Python."""
+    """Base class of components in Python. Derived classes declare members and implement hooks."""
 
     _record: Any
     _finite: list[Member]
-    _kept: Any  # a record with finite values of these outputs
-    _not_finite: set[str]  # names of those that readers have from there
+    _kept: Any  # a record with the last finite values of these outputs
+    _not_finite: set[str]  # names of the outputs whose readers see the value of _kept
     log: list[tuple[str, str]]
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """Keep what was declared beside the names that instances use."""
+        """Rename the declarations to `_declared_NAME`: instances use their names."""
         super().__init_subclass__(**options)
         for name, annotation in dict(vars(cls).get("__annotations__", {})).items():
             if name in vars(cls) and not is_constant(annotation):
@@ -252,7 +254,7 @@ class Component:
                 delattr(cls, name)
 
     def __init__(self, **parameters: Any) -> None:
-        """Make one in the interpreter, with parameters that differ from their defaults."""
+        """Create a component in the interpreter. `parameters` override defaults."""
         description: Description = describe(type(self))
         for name, member in description.members.items():
             setattr(type(self), name, _Attribute(member))
@@ -275,11 +277,11 @@ class Component:
         self.prepare()
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Refuse what is not declared."""
+        """Set a state or a derived member; raise AttributeError for any other name."""
         if isinstance(getattr(type(self), name, None), property):
             raise AttributeError(
-                f"{name} is a property, which is only read: set the members that it is computed "
-                f"from, or write a method: self.set_{name}(…)"
+                f"{name} is a read-only property: set the members that it is computed from, "
+                f"or write a method: self.set_{name}(…)"
             )
         if not isinstance(getattr(type(self), name, None), _Attribute):
             raise AttributeError(
@@ -289,24 +291,24 @@ class Component:
         object.__setattr__(self, name, value)
 
     def prepare(self) -> None:
-        """Compute what derives from parameters; not in the real-time thread."""
+        """Compute Derived members from parameters; not in the real-time thread."""
 
     def start(self) -> None:
-        """Prepare for the loop to run; not in the real-time thread."""
+        """Prepare for the start of the loop; not in the real-time thread."""
 
     def update(self) -> None:
         """Compute one cycle; in the real-time thread."""
         raise NotImplementedError
 
     def safe(self) -> None:
-        """Write safe commands, in the component's last cycle; in the real-time thread."""
+        """Write safe commands in the component's last cycle; in the real-time thread."""
 
     def fault(self, text: str) -> None:
-        """End this component's part in the loop, and say why."""
+        """Raise Fault with a reason: ends this component's part in the loop."""
         raise Fault(text)
 
     def cycle(self) -> None:
-        """For tests: run one cycle, and let time go on."""
+        """For tests: run `update()` once and advance the time by one period."""
         record = self._record
         for name in record.dtype.names:
             if name.endswith("__written"):
@@ -321,7 +323,7 @@ class Component:
                 record[name] = False
 
     def _keep_finite(self) -> None:
-        """Let readers have the last finite value of outputs that are declared so."""
+        """Show readers the last finite value of outputs declared with `finite=True`."""
         for member in self._finite:
             name = member.name
             fields = [name + leaf.field for leaf in member.leaves]
@@ -347,7 +349,7 @@ def _log(level: str) -> Any:
         plain = [each.value if isinstance(each, enum.Enum) else each for each in values]
         self.log.append((level, text.format(*plain)))
 
-    log.__doc__ = f"Log at level {level}; the text is made outside the real-time thread."
+    log.__doc__ = f"Log at level {level}; the text is formatted outside the real-time thread."
     return log
 
 

@@ -1,4 +1,4 @@
-"""A port's message in the interpreter: `self.twist.value.linear.x`, as fields of the record."""
+"""Access to a port's message in the interpreter, `self.twist.value.linear.x`, in the record."""
 
 import operator
 from typing import Any
@@ -16,7 +16,7 @@ class MessageView:
     def __init__(
         self, record: Any, port: str, message: MessageType, is_output: bool, path: Any = ()
     ) -> None:
-        """Look at a port's fields, below a path."""
+        """Create a view of a port's message, or of the part at a path."""
         for name, value in (
             ("_record", record),
             ("_port", port),
@@ -27,12 +27,12 @@ class MessageView:
             object.__setattr__(self, name, value)
 
     def __getattr__(self, name: str) -> Any:
-        """Return a number, an array or a part."""
+        """Return a number, an array or a nested message."""
         path = (*self._path, name)
         leaf = self._message.leaf(path)
         if leaf is None:
             if not self._message.below(path):
-                raise AttributeError(f"{'.'.join(path)} is no number of {self._message.name}")
+                raise AttributeError(f"{self._message.name} has no number {'.'.join(path)}")
             return MessageView(self._record, self._port, self._message, self._is_output, path)
         value = self._record[self._port + leaf.field]
         if leaf.is_variable and not self._is_output:
@@ -40,21 +40,24 @@ class MessageView:
         return value if leaf.type.shape else value.item()
 
     def __setattr__(self, name: str, value: Any) -> None:
-        """Set a number or an array of an output's message."""
+        """Set a number, an array or a nested message of an output."""
         path = (*self._path, name)
         leaf = self._message.leaf(path)
         if not self._is_output:
-            raise AttributeError(f"{self._port} is an input: it is only read")
+            raise AttributeError(f"{self._port} is an input, which is read-only")
         if leaf is None and isinstance(value, MessageView):
             copy(self._record, self._port, self._message, path, value)
             return
         if leaf is None:
-            raise AttributeError(f"{'.'.join(path)} is no number of {self._message.name}")
+            raise AttributeError(f"{self._message.name} has no number {'.'.join(path)}")
         self._record[self._port + leaf.field] = checked(value, leaf.type, ".".join(path))
 
 
 def copy(record: Any, port: str, message: MessageType, path: Any, source: MessageView) -> None:
-    """Set a part of an output's message, or all of it, from another message."""
+    """Copy a message to an output's message, or to a part of it.
+
+    Raises TypeError as MessageType.pairs() does.
+    """
     for leaf, theirs in message.pairs(path, source._message, source._path):
         value: Any = source
         for name in theirs.path[len(source._path) :]:
@@ -63,7 +66,7 @@ def copy(record: Any, port: str, message: MessageType, path: Any, source: Messag
 
 
 def put(record: Any, port: str, message: MessageType, given: Any) -> bool:
-    """For tests: take a message over; False if it has more elements than are declared."""
+    """For tests: write a message to an input; return False if it has too many elements."""
     found = {}
     for leaf in message.leaves:
         value = operator.attrgetter(".".join(leaf.path))(given)
@@ -84,7 +87,10 @@ def put(record: Any, port: str, message: MessageType, given: Any) -> bool:
 
 
 def named(value: Any, kind: ValueType, name: str) -> Any:
-    """Return a value from outside; an enum's may be given by name, as to `rtcfctl set`."""
+    """Return a value that a test sets; names of enumerators become their values.
+
+    Raises ValueError if the enum does not have the name or value.
+    """
     if kind.enumeration is None:
         return value
     known = ", ".join(each.name for each in kind.enumeration)
@@ -95,7 +101,11 @@ def named(value: Any, kind: ValueType, name: str) -> Any:
 
 
 def checked(value: Any, kind: ValueType, name: str) -> Any:
-    """Return a value that fits a type; raise what Python would."""
+    """Return a value as an array or scalar of a type.
+
+    Raises ValueError for another shape, TypeError for another type, OverflowError for an int beyond
+    64 bits.
+    """
     new = np.asarray(value)
     if new.shape not in (kind.shape, ()):
         raise ValueError(f"{name} has shape {kind.shape}, not {new.shape}")

@@ -1,34 +1,34 @@
-"""Names that ROS allows: of classes, ports, parameters and states, as for components in C++."""
+"""Checks names of classes, ports, parameters and states against the rules of ROS."""
 
 import re
 import unicodedata
 
-_LONGEST = 64  # characters of a class's name; rtcfd loads no type with a longer one
+_LONGEST = 64  # characters; rtcfd does not load a type with a longer name
 _WORDS = {"ß": "ss", "ẞ": "SS"}
 
 
 def class_name_error(name: str) -> str:
-    """Return why rtcfd loads no class of that name, and the way out; "" if it does."""
+    """Return why rtcfd does not load a class of that name, with a remedy; "" if it does."""
     if not name.isascii():
-        return f"is no name in ROS, which has ASCII letters alone: {advice(name)}"
+        return f"is not a valid name in ROS (ASCII letters only): {advice(name)}"
     if len(name) > _LONGEST:
-        return f"has {len(name)} characters: take a name of at most {_LONGEST}"
+        return f"has {len(name)} characters: choose a name of at most {_LONGEST}"
     return ""
 
 
 def is_member_name(name: str) -> bool:
-    """Tell whether a port, a parameter or a state may have a name."""
+    """Return True if a port, a parameter or a state may have the name."""
     return "__" not in name and re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name) is not None
 
 
 def advice(name: str) -> str:
-    """Return the advice to take another name: that of its letters where Unicode knows them."""
+    """Return a remedy for a name: its transliteration to ASCII if there is one."""
     plain = "".join(_WORDS.get(each) or _letter(each) for each in name)
     return f"write {plain}" if is_member_name(plain) else "take another name"
 
 
 def _letter(character: str) -> str:
-    """Return `o` for `ö`, `theta` for `θ`, `Delta` for `Δ`; "" for others."""
+    """Return `o` for `ö`, `theta` for `θ`, `Delta` for `Δ`; "" without a transliteration."""
     if character.isascii():
         return character
     # LATIN SMALL LETTER O WITH DIAERESIS, GREEK CAPITAL LETTER DELTA

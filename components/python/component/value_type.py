@@ -1,4 +1,4 @@
-"""What a port, a parameter or a state carries: a number, a bool, an enum, or an array of these."""
+"""Types of ports, parameters and states: numbers, bools, enums, and arrays of numbers or bools."""
 
 import enum
 import types
@@ -10,7 +10,7 @@ import numpy as np
 
 
 class DeclarationError(Exception):
-    """A declaration that cannot be; its text says what to write."""
+    """A wrong declaration; the text contains a remedy."""
 
 
 _PYTHON = {float: np.float64, int: np.int64, bool: np.bool_}
@@ -32,12 +32,12 @@ _LARGEST = 4096  # elements; as many doubles are 32 KiB
 
 @dataclass(frozen=True)
 class ValueType:
-    """A scalar of NumPy, by what C++ calls it, and a shape; () is a single value."""
+    """A scalar type of NumPy and a shape; () is a single value."""
 
     scalar: np.dtype[Any]
     shape: tuple[int, ...] = ()
     enumeration: type[enum.IntEnum] | None = None
-    optional: bool = False  # it may be None
+    optional: bool = False  # the value may be None
 
     @property
     def cpp(self) -> str:
@@ -46,12 +46,12 @@ class ValueType:
 
     @property
     def is_float(self) -> bool:
-        """Tell whether elements are floating-point numbers."""
+        """Return True if the elements are floating-point numbers."""
         return self.scalar.kind == "f"
 
     @property
     def is_bool(self) -> bool:
-        """Tell whether elements are bools."""
+        """Return True if the elements are bools."""
         return self.scalar.kind == "b"
 
     @property
@@ -60,14 +60,17 @@ class ValueType:
         return int(np.prod(self.shape, dtype=np.int64))
 
     def __str__(self) -> str:
-        """Return it as a declaration has it."""
+        """Return the type as written in a declaration."""
         name = self.enumeration.__name__ if self.enumeration else self.scalar.name
         name += " | None" if self.optional else ""
         return ", ".join([name, *map(str, self.shape)])
 
 
 def value_type(declared: Any) -> ValueType:
-    """Return the type of `X` in `Input[X]`, where X is `type` or `type, size, …`."""
+    """Return the type of `X` in `Input[X]`, where X is `type` or `type, size, …`.
+
+    Raises DeclarationError.
+    """
     element, *sizes = declared if isinstance(declared, tuple) else (declared,)
     origin: Any = typing.get_origin(element)
     if origin in (typing.Union, types.UnionType):
@@ -80,30 +83,32 @@ def value_type(declared: Any) -> ValueType:
         if not isinstance(size, int) or isinstance(size, bool) or size < 1:
             given = getattr(size, "__name__", repr(size))
             raise DeclarationError(
-                f"a size is a whole number above 0, not {given}: write np.float64, 3"
+                f"has the size {given}: use an integer above 0, as in np.float64, 3"
             )
     if len(sizes) > 2:
-        raise DeclarationError(f"{len(sizes)} dimensions: declare one or two sizes")
+        raise DeclarationError(f"has {len(sizes)} dimensions: declare one or two sizes")
     if isinstance(element, type) and issubclass(element, enum.IntEnum):
         if sizes:
-            raise DeclarationError("an array of enums: declare an array of np.int64")
+            raise DeclarationError("is an array of enums: declare an array of np.int64")
         _check_members(element)
         return ValueType(np.dtype(np.int64), (), element)
     if isinstance(element, type) and issubclass(element, enum.Enum):
-        raise DeclarationError(f"enum {element.__name__}: derive it from enum.IntEnum")
+        raise DeclarationError(f"is an enum {element.__name__}: derive it from enum.IntEnum")
     result = ValueType(_scalar(element), tuple(sizes))
     if result.count > _LARGEST:
-        raise DeclarationError(f"{result.count} elements: declare at most {_LARGEST}")
+        raise DeclarationError(f"has {result.count} elements: declare at most {_LARGEST}")
     return result
 
 
 def _check_members(enumeration: type[enum.IntEnum]) -> None:
     name, limits = enumeration.__name__, np.iinfo(np.int64)
     if not list(enumeration):
-        raise DeclarationError(f"enum {name} has no members: write `IDLE = 0` in it")
+        raise DeclarationError(f"is an enum {name}, which has no members: write `IDLE = 0` in it")
     for each in enumeration:
         if not limits.min <= each <= limits.max:
-            raise DeclarationError(f"{name}.{each.name} does not fit 64 bits: take a smaller value")
+            raise DeclarationError(
+                f"has {name}.{each.name}, which does not fit 64 bits: use a smaller value"
+            )
 
 
 def _scalar(element: Any) -> np.dtype[Any]:
@@ -112,9 +117,9 @@ def _scalar(element: Any) -> np.dtype[Any]:
         if issubclass(element, np.generic) and np.dtype(element).name in _CPP:
             return np.dtype(element)
     if element in (list, np.ndarray):
-        raise DeclarationError("an array says its elements and its size: write np.float64, 3")
+        raise DeclarationError("is an array without element type and size: write np.float64, 3")
     name = getattr(element, "__name__", repr(element))
     raise DeclarationError(
-        f"{name} is no type of a value: use float, int, bool, an enum.IntEnum, or a NumPy type "
-        "with a size, as np.float64, 3"
+        f"has the unsupported type {name}: use float, int, bool, an enum.IntEnum, or a NumPy type "
+        "with a size, such as np.float64, 3"
     )

@@ -21,8 +21,7 @@ std::size_t countOf(const TypeTable& type) noexcept {
     return static_cast<std::size_t>(type.rows * type.columns);
 }
 
-/// Eigen aligns a matrix to the largest power of two, within bounds, that its size is a multiple
-/// of.
+/// Eigen aligns a matrix to the largest power of two that divides its size, within bounds.
 std::size_t alignmentOf(const TypeTable& type) noexcept {
     const std::size_t size = sizeOf(type);
     if (isMatrix(type)) {
@@ -46,7 +45,7 @@ const std::byte* valueOf(const TypeTable& type, const SlotHeader* slot) {
     return reinterpret_cast<const std::byte*>(slot) + valueOffset(type);
 }
 
-/// Where the element of a row and a column is, in elements.
+/// Index of the element at a row and a column.
 std::size_t placeOf(const TypeTable& type, std::int64_t row, std::int64_t column) noexcept {
     return static_cast<std::size_t>(isTransposed(type) ? column * type.rows + row
                                                        : row * type.columns + column);
@@ -62,7 +61,7 @@ Layout matrixOf(const TypeTable& type, const void* value) {
     return Layout(static_cast<const T*>(value), type.rows, type.columns);
 }
 
-/// The name of `std::array<T, count>`, as C++ spells it.
+/// The C++ name of `std::array<T, count>`.
 template <typename T>
 std::string nameOfArray(std::size_t count) {
     constexpr std::size_t kAnother = 7;
@@ -84,7 +83,7 @@ struct FreeSlot {
     }
 };
 
-/// A type's description with the texts that it refers to.
+/// The description of a type, and the name that it points to.
 struct Described {
     std::string name;
     TypeInfo info;
@@ -166,7 +165,7 @@ const TypeInfo& typeInfoOf(const TypeTable& type) {
     }
     if (type.scalar == Scalar::Double && type.rows == 3 && type.columns == 1)
         return typeInfo<Eigen::Vector3d>();
-    static std::map<const TypeTable*, Described> known;  // components are made one at a time
+    static std::map<const TypeTable*, Described> known;  // components are constructed one at a time
     const auto [entry, is_new] = known.try_emplace(&type);
     if (is_new) {
         entry->second = describe(type);
@@ -321,7 +320,7 @@ std::string rtcf_python_print_state(const TypeTable* type, const void* value) {
     return withScalar(type->scalar, [&](auto scalar) {
         using T = decltype(scalar);
         std::string text;
-        // The bytes may lie anywhere.
+        // The bytes may be unaligned.
         const auto elements = std::make_unique<T[]>(countOf(*type));
         std::memcpy(elements.get(), value, sizeOf(*type));
         if constexpr (std::is_floating_point_v<T>) {

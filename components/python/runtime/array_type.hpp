@@ -1,7 +1,7 @@
 /// @file
-/// Arrays of any size as types of ports and of state: the same types that C++ components have by
-/// Eigen::Matrix (of float and double) and by std::array (of others), from a table instead of a
-/// template. Real-time safe where TypeInfo says so.
+/// Arrays of any size as types of ports and of state. A table describes each type, which is
+/// identical to a type of C++ components: Eigen::Matrix for float and double, std::array for other
+/// elements. The functions are real-time safe if TypeInfo requires it.
 #pragma once
 
 #include <cstddef>
@@ -13,26 +13,26 @@
 
 namespace rtcf::python {
 
-/// True if C++ components have an Eigen::Matrix in its place.
+/// @return whether the type is an Eigen::Matrix for C++ components
 inline bool isMatrix(const TypeTable& type) noexcept {
     return type.scalar == Scalar::Float || type.scalar == Scalar::Double;
 }
 
-/// True if C++ components have the elements in another order than the record: column by column.
+/// @return whether a port stores the elements column by column; the record stores them row by row
 inline bool isTransposed(const TypeTable& type) noexcept {
     return isMatrix(type) && type.rows > 1 && type.columns > 1;
 }
 
-/// Bytes of a value, or of a single number. Real-time safe.
+/// Size of a value in bytes. Real-time safe.
 std::size_t sizeOf(const TypeTable& type) noexcept;
 
-/// The type of ports. Not real-time safe. @return lives as long as the library
+/// The type of ports that carry it. Not real-time safe. @return lives as long as the library
 const TypeInfo& typeInfoOf(const TypeTable& type);
 
-/// A state of the type, without a name and a place. Not real-time safe.
+/// Declaration of a state of the type, without name and address. Not real-time safe.
 StateDeclaration stateOf(const TypeTable& type);
 
-/// The functions of TypeInfo and StateDeclaration, for an array.
+/// Functions of TypeInfo and StateDeclaration for arrays.
 /// @{
 extern "C" {
 std::shared_ptr<SlotHeader> rtcf_python_make_slot(const TypeTable* type, const SlotHeader* sample);

@@ -1,5 +1,5 @@
 /// @file
-/// memcpy() for sizes that values have: without a call for the small ones. Real-time safe.
+/// memcpy() that inlines the copies of common small sizes. Real-time safe.
 #pragma once
 
 #include <cstddef>

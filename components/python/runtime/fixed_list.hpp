@@ -1,6 +1,6 @@
 /// @file
-/// Objects of one class that stay where they were made, one behind the other: ports cannot be
-/// moved, and a cycle goes through them.
+/// List of objects that are contiguous in memory and never move: ports cannot be moved, and a cycle
+/// iterates over them.
 #pragma once
 
 #include <cstddef>
@@ -20,12 +20,12 @@ class FixedList {
         while (size_ > 0) begin()[--size_].~T();
     }
 
-    /// Makes room, once, for all that will be added. Not real-time safe.
+    /// Allocates memory for all objects. Called once, before add(). Not real-time safe.
     void reserve(std::size_t count) {
         if (count > 0) memory_ = std::make_unique<Place[]>(count);
     }
 
-    /// Makes another object. Not real-time safe.
+    /// Constructs an object at the end. Not real-time safe.
     template <typename... Arguments>
     T& add(Arguments&&... arguments) {
         T* const made = new (&memory_[size_]) T(std::forward<Arguments>(arguments)...);

@@ -1,6 +1,6 @@
 /// @file
-/// The functions and the list of types of a library of components in Python, by the tables that
-/// rtcf-compile has written.
+/// Functions of a library of components in Python, and its list of types, which comes from the
+/// tables that rtcf-compile writes.
 #include <fmt/args.h>
 
 #include <algorithm>
@@ -11,7 +11,7 @@
 
 #define RTCF_PYTHON_JOINED_(name, number) name##number
 #define RTCF_PYTHON_NAME_(name, number) RTCF_PYTHON_JOINED_(name, number)
-/// The library's tables, by a name that says their form.
+/// The library's tables; the symbol contains the version of their format.
 #define RTCF_PYTHON_LIBRARY RTCF_PYTHON_NAME_(rtcf_python_library_, RTCF_PYTHON_TABLES)
 
 extern "C" {
@@ -38,7 +38,7 @@ std::vector<ComponentRecord> recordsOf(const LibraryTable& library) {
     return records;
 }
 
-/// The types of this library, in the list that its entry point gives.
+/// Registers the types of this library in the list that its entry point returns.
 class Types {
    public:
     Types() : records_(recordsOf(RTCF_PYTHON_LIBRARY)) {
@@ -50,7 +50,7 @@ class Types {
 };
 const Types types;
 
-/// Makes the text of a log call. Not real-time safe.
+/// Formats the text of a log call. Not real-time safe.
 void renderCall(const LogRecord& record, std::string& text) {
     const auto& table = *reinterpret_cast<const LogTable*>(record.site);
     fmt::dynamic_format_arg_store<fmt::format_context> arguments;
@@ -85,7 +85,7 @@ rtcf::Component* rtcf_python_create(const rtcf::python::ComponentTable* table,
     return rtcf::detail::construct<rtcf::python::PythonComponent>(context, *table);
 }
 
-/// Stores a log call; each value has 64 bits. Real-time safe.
+/// Stores a log record; each value has 64 bits. Real-time safe.
 void rtcf_python_log(const rtcf::python::LogTable* table, rtcf::Component* component,
                      const std::int64_t* values) noexcept {
     if (!component->logs(table->site.level)) return;
@@ -99,13 +99,13 @@ void rtcf_python_log(const rtcf::python::LogTable* table, rtcf::Component* compo
     component->logSink().commit(record);
 }
 
-/// Takes note of an input's newest value; machine code does the same by itself where it is that of
-/// the present writer. Real-time safe. @return the DataStatus
+/// Reads the newest value of an input. Machine code does this itself while the writer of the input
+/// does not change, and calls this function otherwise. Real-time safe. @return the DataStatus
 std::int64_t rtcf_python_read(rtcf::python::ValueInput* input) noexcept {
     return static_cast<std::int64_t>(input->read());
 }
 
-/// Gives the rest that hooks ask for; null: they do not. Real-time safe.
+/// Stores the age and the connection of an input; null: no hook uses it. Real-time safe.
 void rtcf_python_read_more(const rtcf::python::ValueInput* input, std::int64_t* age,
                            bool* connected) noexcept {
     if (age != nullptr) *age = input->age();

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::int64_t kSecond = 1'000'000'000;
 
-/// In messages a bool is a byte.
+/// Calls `use` with the C++ type of a message's elements: a bool is a byte.
 template <typename Use>
 decltype(auto) withMessageScalar(Scalar scalar, Use&& use) {
     return withScalar(scalar, [&](auto value) -> decltype(auto) {
@@ -34,7 +34,7 @@ std::int64_t timeOf(const std::byte* field, bool is_duration) noexcept {
     return static_cast<std::uint32_t>(parts[0]) * kSecond + static_cast<std::uint32_t>(parts[1]);
 }
 
-/// A time that the field has no room for is its nearest.
+/// Writes a time, clamped to the range of the field.
 template <typename Seconds>
 void setTime(std::byte* field, std::int64_t ns) noexcept {
     using Limits = std::numeric_limits<Seconds>;
@@ -46,8 +46,8 @@ void setTime(std::byte* field, std::int64_t ns) noexcept {
     std::memcpy(field + sizeof seconds, &nanoseconds, sizeof nanoseconds);
 }
 
-/// The elements of a sequence: any std::vector but one of bools, which messages do not have, begins
-/// by where they begin and end.
+/// The elements of a sequence. A std::vector begins with the pointers to its begin and end;
+/// messages do not contain std::vector<bool>, which differs.
 struct Elements {
     std::byte* begin;
     std::byte* end;
@@ -92,7 +92,8 @@ MessageFields::MessageFields(const MessageTable& message, const LeafTable* leave
     }
 }
 
-/// What follows each other in both is copied at once: the six numbers of a twist.
+/// Merges fields that are adjacent in the message and in the record, such as the six numbers of a
+/// twist, so that they are copied at once.
 void MessageFields::addNumbers(const Numbers& field) {
     if (!numbers_.empty()) {
         Numbers& last = numbers_.back();

@@ -1,6 +1,6 @@
 /// @file
-/// Ports of ROS messages, by the adapter of the message. In the cycle the numbers that hooks use go
-/// between the message and the component's record.
+/// Ports of ROS messages. In each cycle they copy the numbers that hooks use between the message
+/// and the component's record. The adapter of the message provides its tables.
 #pragma once
 
 #include <atomic>
@@ -15,7 +15,7 @@
 
 namespace rtcf::python {
 
-/// An input whose newest message counts.
+/// Input that provides the newest message.
 class MessageInput final : public InputBase {
    public:
     MessageInput(Component* owner, const InputTable& table, std::byte* record)
@@ -28,8 +28,8 @@ class MessageInput final : public InputBase {
           connected_(placeIn<bool>(record, table.connected)),
           too_large_(table.too_large) {}
 
-    /// Brings the newest message into the record; one with too many elements is not taken.
-    /// Real-time safe.
+    /// Copies the newest message to the record; ignores a message with too many elements, and logs
+    /// a warning. Real-time safe.
     void read() noexcept {
         const DataStatus status = readStatus();
         const void* const message = reinterpret_cast<const std::byte*>(current()) + offset_;
@@ -46,7 +46,7 @@ class MessageInput final : public InputBase {
     }
 
    private:
-    // At most once a second.
+    // Logs at most once a second.
     void warn() noexcept {
         const Component& component = owner();
         if (component.logs(too_large_.level) &&
@@ -62,11 +62,11 @@ class MessageInput final : public InputBase {
     bool* flags_;
     std::int64_t* age_;
     bool* connected_;
-    const LogSite& too_large_;  // in the library: records refer to it
+    const LogSite& too_large_;  // in the library's tables: log records point to it
     std::atomic<std::int64_t> next_warning_ns_{std::numeric_limits<std::int64_t>::min()};
 };
 
-/// An output.
+/// Output of messages.
 class MessageOutput final : public OutputBase {
    public:
     MessageOutput(Component* owner, const OutputTable& table, std::byte* record)
@@ -74,7 +74,7 @@ class MessageOutput final : public OutputBase {
         reserve(table);
     }
 
-    /// Publishes the record's message, if a hook has said so. Real-time safe.
+    /// Publishes the message of the record if a hook called publish(). Real-time safe.
     void write() noexcept {
         if (!*written_) return;
         fields_.toMessage(reinterpret_cast<std::byte*>(raw_) + offset_, record_);
@@ -82,7 +82,7 @@ class MessageOutput final : public OutputBase {
         *written_ = false;
     }
 
-    /// Forgets what a hook has published. Real-time safe.
+    /// Discards a publish() of a hook. Real-time safe.
     void forget() noexcept { *written_ = false; }
 
    private:
@@ -95,7 +95,7 @@ class MessageOutput final : public OutputBase {
           record_(record),
           written_(placeIn<bool>(record, table.written)) {}
 
-    /// Gives the message its sizes and constant texts, as rtcf::Output::reserve() does.
+    /// Sets the sizes of the message and its constant strings, as rtcf::Output::reserve() does.
     void reserve(const OutputTable& table) {
         const std::shared_ptr<SlotHeader> sample = type().make_slot(nullptr);
         void* const message = reinterpret_cast<std::byte*>(sample.get()) + offset_;

@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::align_val_t kCacheLine{64};
 
-/// What compiled code gives for a raise: constant bytes that tell what and where.
+/// Result of a hook that raises: constant bytes that identify the exception and its line.
 struct Raised {
     const char* bytes;
     std::int32_t size;
@@ -127,11 +127,11 @@ bool PythonComponent::start() {
     takeDt();
     takeTimes();
     const void* const raised = table_.start(record_.bytes());
-    forgetWrites();  // a cycle alone writes
+    forgetWrites();  // only hooks of the cycle may write outputs
     return raised == nullptr || fail("{}", said(raised, record_));
 }
 
-// Work that few components have, or no good cycle, is not in line.
+// Rare work is not inlined, to keep the code of a usual cycle small.
 
 void PythonComponent::update() {
     takeDt();
@@ -184,7 +184,8 @@ void PythonComponent::forgetWrites() noexcept {
     for (MessageOutput& output : message_outputs_) output.forget();
 }
 
-/// "my.py:12: `x = 1 / y`: ZeroDivisionError: division by zero". Not real-time safe: the loop ends.
+/// Formats an exception: "my.py:12: `x = 1 / y`: ZeroDivisionError: division by zero". Not
+/// real-time safe: called outside the cycle, or after a fault.
 std::string PythonComponent::said(const void* raised, Record& record) const {
     Raised what{};
     std::memcpy(&what, raised, sizeof what);

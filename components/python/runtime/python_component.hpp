@@ -1,6 +1,6 @@
 /// @file
-/// A component written in Python: the ports, parameters and state that its table declares, around
-/// the machine code of its hooks, which works on the component's record.
+/// Component written in Python: has the ports, parameters and state that its table declares, and
+/// calls the machine code of its hooks, which works on the component's record.
 #pragma once
 
 #include <cstddef>
@@ -27,7 +27,8 @@ class PythonComponent final : public Component {
     void safe() noexcept override;
 
    private:
-    /// Memory of its own, aligned as a cache line: what changes there is no member of this object.
+    /// Memory of the members, in a separate block aligned to cache lines: `rtcfctl check` reports
+    /// changes of undeclared members of the object, and the record is not part of it.
     class Record {
        public:
         explicit Record(const ComponentTable& table);
@@ -61,11 +62,11 @@ class PythonComponent final : public Component {
     FixedList<QueuePort> queues_;
     FixedList<ParameterField> parameters_;
     FixedList<DerivedField> derived_;
-    std::unique_ptr<void*[]> ports_;    // those of values, as hooks get them
-    bool takes_dt_ = false;             // a hook looks at it
-    bool has_more_ = false;             // hooks look at other times, queues, inputs of messages
-    bool has_other_outputs_ = false;    // of messages
-    std::unique_ptr<Record> proposed_;  // what prepare() works on; null without it
+    std::unique_ptr<void*[]> ports_;    // ports of values, argument of hooks
+    bool takes_dt_ = false;             // a hook uses dt
+    bool has_more_ = false;             // hooks use other times, queues, or inputs of messages
+    bool has_other_outputs_ = false;    // outputs of messages
+    std::unique_ptr<Record> proposed_;  // record for prepare(); null without prepare()
 };
 
 }  // namespace rtcf::python

@@ -1,5 +1,5 @@
 /// @file
-/// From the number of an element's type to the C++ type.
+/// Maps the enumerator of an element's type to the C++ type.
 #pragma once
 
 #include <array>
@@ -11,7 +11,7 @@
 
 namespace rtcf::python {
 
-/// Calls `use(T())` with a value of that type, and returns what it returns.
+/// Calls `use(T())`, where T is the C++ type of the scalar. @return the result of `use`
 template <typename Use>
 decltype(auto) withScalar(Scalar scalar, Use&& use) {
     // NOLINTBEGIN(bugprone-branch-clone): branches differ by type
@@ -40,17 +40,17 @@ decltype(auto) withScalar(Scalar scalar, Use&& use) {
             return use(double());
     }
     // NOLINTEND(bugprone-branch-clone)
-    throw std::logic_error("no scalar of this number");
+    throw std::logic_error("unknown scalar type");
 }
 
-/// Calls `use(float())` or `use(double())`.
+/// Calls `use(float())` or `use(double())`. @return the result of `use`
 template <typename Use>
 decltype(auto) withFloat(Scalar scalar, Use&& use) {
     if (scalar == Scalar::Float) return use(float());
     return use(double());
 }
 
-/// Bytes of an element. Real-time safe.
+/// Size of an element in bytes. Real-time safe.
 inline std::size_t sizeOf(Scalar scalar) noexcept {
     constexpr std::array<std::size_t, 11> kSizes{1, 1, 2, 4, 8, 1, 2, 4, 8, 4, 8};
     return kSizes[static_cast<std::size_t>(scalar)];

@@ -1,6 +1,6 @@
 /// @file
-/// Parameters, and what derives from them: their values lie in the component's record, where
-/// commit() puts them at the cycle boundary in which they are adopted.
+/// Parameters and derived members. Their values are in the component's record; commit() writes new
+/// values to it at the cycle boundary at which the loop adopts them.
 #pragma once
 
 #include <algorithm>
@@ -17,10 +17,10 @@
 
 namespace rtcf::python {
 
-/// A parameter, or an element of one that is an array.
+/// A parameter, or an element of an array parameter.
 class ParameterField final : public ParameterBase {
    public:
-    /// @param record has its default
+    /// @param record the component's record, which contains the default
     ParameterField(Component* owner, const ParameterTable& table, std::byte* record)
         : ParameterBase(owner, declarationOf(table, record)),
           scalar_(table.scalar),
@@ -60,7 +60,7 @@ class ParameterField final : public ParameterBase {
     }
     void release() noexcept override { is_staged_ = false; }
 
-    /// Puts the value that prepare() is about into another record.
+    /// Copies the proposed value, or else the current one, to the record for prepare().
     void propose(std::byte* record) const noexcept {
         std::memcpy(record + offset_, is_staged_ ? staged_ : value_, size_);
     }
@@ -93,7 +93,7 @@ class ParameterField final : public ParameterBase {
             declaration.type = "double";
             declaration.default_value = static_cast<double>(initial);
         }
-        // A value must fit the type, whatever bounds were declared.
+        // Values must fit the type, even if the declared bounds are wider.
         constexpr bool kSmaller = sizeof(T) < sizeof(std::int64_t) && !std::is_same_v<T, bool>;
         constexpr auto kLowest = static_cast<double>(std::numeric_limits<T>::lowest());
         constexpr auto kHighest = static_cast<double>(std::numeric_limits<T>::max());
@@ -103,14 +103,14 @@ class ParameterField final : public ParameterBase {
             declaration.maximum = std::min(kHighest, declaration.maximum.value_or(kHighest));
     }
 
-    /// A choice by name, as of an enum in C++.
+    /// Adds the choices of an enum parameter, as for an enum in C++.
     static void describeChoices(ParameterDeclaration& declaration, const ParameterTable& table) {
         const auto initial = std::get<std::int64_t>(declaration.default_value);
         declaration.type = "enum";
         for (std::int64_t i = 0; i < table.choice_count; ++i) {
             const ChoiceTable& choice = table.choices[i];
             declaration.choices.emplace_back(choice.name, choice.value);
-            // The first of several names of a value is its own.
+            // If a value has several names, the first one is its name.
             if (choice.value == initial &&
                 !std::holds_alternative<std::string>(declaration.default_value))
                 declaration.default_value = std::string(choice.name);
@@ -127,7 +127,7 @@ class ParameterField final : public ParameterBase {
     alignas(std::int64_t) Bytes staged_{};
 };
 
-/// What prepare() computes.
+/// A derived member, which prepare() computes.
 class DerivedField final : public DerivedBase {
    public:
     DerivedField(Component* owner, const DerivedTable& table, std::byte* record)
@@ -136,7 +136,7 @@ class DerivedField final : public DerivedBase {
           field_(record + table.offset),
           staged_(static_cast<std::size_t>(table.size)) {}
 
-    /// Takes the successor from the record that prepare() has worked on. Not real-time safe.
+    /// Copies the new value from the record of prepare(). Not real-time safe.
     void stage(const std::byte* record) noexcept {
         std::memcpy(staged_.data(), record + offset_, staged_.size());
         is_staged_ = true;

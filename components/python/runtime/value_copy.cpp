@@ -8,7 +8,7 @@ namespace rtcf::python {
 
 namespace {
 
-/// Writes a matrix row by row that lies column by column.
+/// Copies a matrix that is stored column by column to a matrix stored row by row.
 template <typename T>
 void transposeAs(void* to, const void* from, std::size_t rows, std::size_t columns) noexcept {
     const T* const source = static_cast<const T*>(from);

@@ -1,6 +1,6 @@
 /// @file
-/// Copies a value between a port, which has what C++ components have, and the record, which has
-/// arrays row by row.
+/// Copies a value between a port, which has the layout of C++ components, and the record, which
+/// stores arrays row by row.
 #pragma once
 
 #include <cstddef>
@@ -41,9 +41,9 @@ class ValueCopy {
 
     std::size_t size_;
     std::size_t scalar_size_;
-    std::size_t rows_;  // 0: the same order in both
+    std::size_t rows_;  // 0: the order of elements is the same in both
     std::size_t columns_;
-    bool is_word_;  // 8 bytes, as most values are
+    bool is_word_;  // 8 bytes, the most frequent size
 };
 
 }  // namespace rtcf::python

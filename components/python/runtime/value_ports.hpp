@@ -1,5 +1,6 @@
 /// @file
-/// Ports of numbers and arrays. In the cycle they go between slots and the component's record.
+/// Ports of numbers and arrays. In each cycle, values are copied between slots and the component's
+/// record.
 #pragma once
 
 #include <atomic>
@@ -16,43 +17,43 @@
 
 namespace rtcf::python {
 
-/// A place in the record, null for an offset of -1.
+/// Address of a field in the record; null for an offset of -1.
 template <typename T>
 T* placeIn(std::byte* record, std::int64_t offset) noexcept {
     return offset < 0 ? nullptr : reinterpret_cast<T*>(record + offset);
 }
 
-// Machine code finds values and stamps there: port_access.py.
+// Machine code accesses values and stamps at these offsets: port_access.py.
 static_assert(AbiProbe::portPlaces() == PortPlaces{0, 8, 16, 0, 8});
 static_assert(offsetof(SlotHeader, sequence) == 0 && offsetof(SlotHeader, time_ns) == 8);
 static_assert(offsetof(LoopClock, time_ns) == 8 && sizeof(std::atomic<std::int64_t>) == 8);
 constexpr std::size_t kSlotValue = 16;
 
-/// Not real-time safe. @throws std::logic_error for a type whose values lie elsewhere in a slot
+/// Not real-time safe. @throws std::logic_error for a type with another offset of values in a slot
 inline const TypeInfo& valueTypeOf(const TypeTable& table) {
     const TypeInfo& type = typeInfoOf(table);
-    if (valueOffset(type) != kSlotValue) throw std::logic_error("a slot of another layout");
+    if (valueOffset(type) != kSlotValue) throw std::logic_error("unexpected layout of a slot");
     return type;
 }
 
-/// An input whose newest value counts. Machine code reads it.
+/// Input that provides the newest value. Machine code reads it.
 class ValueInput final : public InputBase {
    public:
     ValueInput(Component* owner, const InputTable& table)
         : InputBase(owner, table.name, valueTypeOf(*table.type),
                     emptySlot(valueTypeOf(*table.type))) {}
 
-    /// Takes note of the newest value. Real-time safe.
+    /// Reads the newest value. Real-time safe.
     DataStatus read() noexcept { return readStatus(); }
 };
 
-/// An output. Machine code writes it.
+/// Output of values. Machine code writes it.
 class ValueOutput final : public OutputBase {
    public:
     ValueOutput(Component* owner, const OutputTable& table, std::byte* record)
         : ValueOutput(owner, table, record, Finite()) {}
 
-    /// Forgets what a hook has written. Real-time safe.
+    /// Discards the write of a hook. Real-time safe.
     void forget() noexcept { *written_ = false; }
 
    private:
@@ -64,13 +65,13 @@ class ValueOutput final : public OutputBase {
     bool* written_;
 };
 
-/// An input that keeps each message, as a ring in the record, which hooks take from.
+/// Input that keeps each message, in a ring in the record, from which hooks take messages.
 class QueuePort final : public QueueBase {
    public:
     QueuePort(Component* owner, const InputTable& table, std::byte* record)
         : QueuePort(owner, table, record, slotsOf(table)) {}
 
-    /// Moves new messages into the record's ring; those that find it full are lost. Real-time safe.
+    /// Moves new messages to the ring; drops and counts messages if it is full. Real-time safe.
     void read() noexcept {
         const std::int64_t now_ns = owner().time();
         for (const SlotHeader* slot = oldest(); slot != nullptr; slot = oldest()) {

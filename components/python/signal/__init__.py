@@ -1,4 +1,4 @@
-"""Linear systems for components in Python: compiled where a hook calls it, else plain NumPy."""
+"""Linear systems for components in Python: compiled when a hook calls them, else plain NumPy."""
 
 from typing import Any
 
@@ -8,20 +8,20 @@ Array = np.ndarray[Any, Any]
 
 
 def expm(a: Array) -> Array:
-    """Return e to the power of a square matrix, by a Padé approximant of order 6 and squaring.
+    """Return the exponential of a square matrix, by a Padé approximant of order 6 and squaring.
 
-    Raises ValueError if the matrix is not square, or not finite.
+    Raises ValueError if the matrix is not square or not finite.
     """
     n = a.shape[0]
     if a.shape[1] != n:
-        raise ValueError("expm of a matrix that is not square")
+        raise ValueError("the matrix of expm is not square")
     norm = 0.0
     for i in range(n):
         row = 0.0
         for j in range(n):
             row += abs(a[i, j])
         if not np.isfinite(row):
-            raise ValueError("expm of a matrix that is not finite")
+            raise ValueError("the matrix of expm is not finite")
         norm = max(norm, row)
     factor = 1.0
     squarings = 0
@@ -47,9 +47,10 @@ def expm(a: Array) -> Array:
 
 
 def c2d(a: Array, b: Array, dt: float) -> tuple[Array, Array]:
-    """Return a and b of x' = a x + b u for steps of dt seconds in which u is held.
+    """Discretise x' = a x + b u with zero-order hold; dt in seconds.
 
-    Both are matrices. Raises ValueError as expm does.
+    `a` is (n, n), `b` is (n, inputs); returns matrices of the same shapes. Raises ValueError as
+    expm does.
     """
     n, inputs = b.shape
     both = np.zeros((n + inputs, n + inputs))
@@ -60,9 +61,10 @@ def c2d(a: Array, b: Array, dt: float) -> tuple[Array, Array]:
 
 
 def tustin(a: Array, b: Array, dt: float) -> tuple[Array, Array]:
-    """Return a and b of x' = a x + b u for steps of dt seconds by the trapezoidal rule.
+    """Discretise x' = a x + b u by the trapezoidal rule; dt in seconds.
 
-    Both are matrices. Raises ValueError if dt is at a pole: no step of that size.
+    `a` is (n, n), `b` is (n, inputs); returns matrices of the same shapes. Raises ValueError if
+    2 / dt is an eigenvalue of `a`.
     """
     n = a.shape[0]
     left = np.eye(n) - (0.5 * dt) * a

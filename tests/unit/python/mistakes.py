@@ -481,7 +481,7 @@ CLASS: dict[str, tuple[str, str]] = {
     "list of floats as a state": ("v: State[list[float]]", "list"),
     "dict as a state": ("v: State[dict]", "dict"),
     "array without a size": ("v: State[np.ndarray]", "size"),
-    "size in another bracket": ("v: State[np.float64][3]", "two brackets"),
+    "size in another bracket": ("v: State[np.float64][3]", "two pairs of brackets"),
     "size of 0": ("v: State[np.float64, 0]", "size"),
     "size as a float": ("v: State[np.float64, 2.0]", "size"),
     "three sizes": ("v: State[np.float64, 2, 2, 2]", "size"),

@@ -67,7 +67,7 @@ def test_what_is_not_declared_is_refused() -> None:
     ramp = made("Ramp")
     with pytest.raises(AttributeError, match="is not declared"):
         ramp.other = 1.0
-    with pytest.raises(AttributeError, match="is set from outside"):
+    with pytest.raises(AttributeError, match="hooks cannot set"):
         ramp.step = 2
     with pytest.raises(AttributeError, match="is a port"):
         ramp.count = 2
@@ -142,11 +142,11 @@ def test_a_message_with_more_than_is_declared_is_not_taken() -> None:
 
 def test_what_a_message_has_not_is_refused() -> None:
     arm = ARM()
-    with pytest.raises(AttributeError, match="linear.w is no number of geometry_msgs/Twist"):
+    with pytest.raises(AttributeError, match="TwistStamped has no number twist.linear.w"):
         _ = arm.wanted.value.twist.linear.w
     with pytest.raises(AttributeError, match="is an input"):
         arm.wanted.value.twist.linear.x = 1.0
-    with pytest.raises(AttributeError, match="twist is no number"):
+    with pytest.raises(AttributeError, match="no number twist"):
         arm.tip.value.twist = 1.0
     with pytest.raises(TypeError, match="seq is uint32"):
         arm.command.value.header.seq = 0.5

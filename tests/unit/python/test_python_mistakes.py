@@ -213,28 +213,31 @@ IN_PREPARE = {
     "period in prepare": ("self.d = self.twice_dt()", "prepare runs beside the loop"),
 }
 IN_CLASS = {
-    "port that may be None": ("    v: Input[float | None]", "a State alone may"),
+    "port that may be None": ("    v: Input[float | None]", "only a State may be None"),
     "method __init__": (
         "    def __init__(self):\n        super().__init__()",
         "__init__ is not compiled",
     ),
     "missing annotation": ("    v = State(0.0)", "has no annotation"),
-    "annotation without a type": ("    v: State", "says no type"),
+    "annotation without a type": ("    v: State", "has no type"),
     "annotation of another kind": ("    v: float = 0.0", "is neither Input, Queue"),
-    "list as a type": ("    v: State[list]", "says its elements and its size"),
-    "size of a variable": ("    v: State[np.float64, -1]", "a size is a whole number"),
+    "list as a type": ("    v: State[list]", "without element type and size"),
+    "size of a variable": ("    v: State[np.float64, -1]", "use an integer above 0"),
     "parameter without default": ("    v: Parameter[float]", "has no default"),
     "initial value of another shape": ("    v: State[np.float64, 3] = State([1.0, 2.0])", "shape"),
     "initial value of another type": ("    v: State[int] = State(0.5)", "is an int"),
-    "unknown option": ("    v: State[int] = State(unitt='m')", "knows no option"),
-    "queue without size": ("    v: Queue[float]", "says not how many it keeps"),
-    "queue of no size": ("    v: Queue[float] = Queue(size=0)", "keeps 1 to 1024 messages"),
-    "message of any size": ("    v: Input[Float64MultiArray]", "of any size: declare the largest"),
+    "unknown option": ("    v: State[int] = State(unitt='m')", "has no option"),
+    "queue without size": ("    v: Queue[float]", "has no size"),
+    "queue of no size": ("    v: Queue[float] = Queue(size=0)", "use 1 to 1024 messages"),
+    "message of any size": (
+        "    v: Input[Float64MultiArray]",
+        "of variable size: write its largest size",
+    ),
     "size of a fixed message": ("    v: Input[Twist, 3]", "has no array of variable size"),
-    "message as state": ("    v: State[Twist]", "a message is carried by an Input or an Output"),
+    "message as state": ("    v: State[Twist]", "declare an Input or an Output"),
     "unknown text of a message": (
         "    v: Output[Twist] = Output(texts={'frame': 'base'})",
-        "texts are",
+        "texts do not match",
     ),
     "parameter's name taken": (
         "    g_0: Parameter[float] = Parameter(1.0)",
@@ -244,9 +247,9 @@ IN_CLASS = {
     "enum without members": ("    v: State[enum.IntEnum('Empty', [])]", "has no members"),
     "enum of more than 64 bits": (
         "    v: State[enum.IntEnum('Large', {'A': 2**63})]",
-        "Large.A does not fit 64 bits",
+        "Large.A, which does not fit 64 bits",
     ),
-    "reserved name": ("    dt: State[float]", "a word that every component has"),
+    "reserved name": ("    dt: State[float]", "is a reserved name"),
 }
 
 

@@ -163,7 +163,7 @@ def test_a_name_that_ros_forbids_is_refused_with_another(
     tmp_path: Path, declared: str, name: str, advice: str
 ) -> None:
     file = written(tmp_path, DECLARING.format(name="Plain", declared=declared))
-    what = f"{file}:6: `{declared}`: Plain.{name} is no name in ROS, which has ASCII letters alone"
+    what = f"{file}:6: `{declared}`: Plain.{name} is not a valid name in ROS (ASCII letters only)"
     what += f": {advice}"
     with pytest.raises(DeclarationError) as refused:
         compiled(file)
@@ -175,8 +175,8 @@ def test_a_name_that_ros_forbids_is_refused_with_another(
 @pytest.mark.parametrize(
     ("name", "what"),
     [
-        ("Größe", "Größe is no name in ROS, which has ASCII letters alone: write Grosse"),
-        ("R" * 100, "has 100 characters: take a name of at most 64"),
+        ("Größe", "Größe is not a valid name in ROS (ASCII letters only): write Grosse"),
+        ("R" * 100, "has 100 characters: choose a name of at most 64"),
     ],
 )
 def test_a_class_that_no_daemon_would_load_is_refused(tmp_path: Path, name: str, what: str) -> None:
