@@ -1,7 +1,7 @@
-"""Property tests: one pace for all, and no second chance for what a counterexample shows.
+"""Property tests: no time limits, and no repetition of a test with a counterexample.
 
-A counterexample is kept in build/hypothesis/, from which the next run tries it first.  It is also
-noted in build/test/counterexamples: tests/run does not repeat such a test, as other draws may pass.
+A counterexample is kept in build/hypothesis/; the next run tries it first. Its test is also listed
+in build/test/counterexamples: tests/run does not repeat it, since other draws may pass.
 """
 
 from pathlib import Path
@@ -13,7 +13,7 @@ from hypothesis.database import DirectoryBasedExampleDatabase
 _BUILD = Path(__file__).resolve().parents[1] / "build"
 _NOTED = _BUILD / "test" / "counterexamples"
 
-# How fast this machine draws and tries is no property of the code under test.
+# The speed of this machine is no property of the code under test.
 settings.register_profile(
     "any pace",
     deadline=None,
@@ -26,8 +26,8 @@ settings.load_profile("any pace")
 def pytest_exception_interact(
     node: pytest.Item, call: pytest.CallInfo[None], report: pytest.TestReport
 ) -> None:
-    """Note a property test that has found a counterexample."""
-    # Hypothesis repeats a failure; Flaky says that it did not come back.
+    """Record a property test that has found a counterexample."""
+    # Hypothesis repeats a failure; Flaky means that the repetition passed.
     by_chance = (errors.Flaky, errors.FailedHealthCheck)
     if report.when != "call" or call.excinfo is None or isinstance(call.excinfo.value, by_chance):
         return

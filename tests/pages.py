@@ -1,4 +1,4 @@
-"""What README, docs and manual pages tell a reader to type, for the tests that type it."""
+"""The commands of README, docs and manual pages, for the tests that run them."""
 
 import re
 import shlex

@@ -1,6 +1,6 @@
-// What any difference in the past makes different for ever: of its inputs, of what it had read of
-// them and when, of its own values. All that it remembers is declared, but for a diary that nobody
-// reads in the cycle.
+// A component whose values depend on every detail of the past: on its inputs, the times of its
+// reads, and its own values. All of this is declared state, except for a diary that is not read in
+// the cycle.
 #include <std_msgs/Float64MultiArray.h>
 
 #include <Eigen/Geometry>
@@ -34,8 +34,8 @@ class Chaos final : public rtcf::Component {
     rtcf::Output<double> checked{this, "checked", "", rtcf::Finite()};
     rtcf::Output<Eigen::Isometry3d> turned{this, "turned"};
     rtcf::Output<std_msgs::Float64MultiArray> listed{this, "listed"};
-    rtcf::Output<double> low{this, "low"};    // of the digest after the cycle `ask`: its lower
-    rtcf::Output<double> high{this, "high"};  // and its upper 32 bits
+    rtcf::Output<double> low{this, "low"};    // digest after the cycle `ask`: lower
+    rtcf::Output<double> high{this, "high"};  // upper 32 bits
 
     rtcf::Parameter<double> rate{this, "rate", 3.9, rtcf::Min(3.6), rtcf::Max(4.0)};
     rtcf::Parameter<std::int64_t> ask{this, "ask", -1};
@@ -68,7 +68,7 @@ class Chaos final : public rtcf::Component {
         digest = (digest.value() ^ bits) * 6364136223846793005U + 1442695040888963407U;
     }
 
-    // What was read counts, and how new it was.
+    // Adds the value read, and its status.
     template <typename T>
     bool readAny(rtcf::Input<T>& input) {
         const rtcf::DataStatus status = input.read();
@@ -105,7 +105,7 @@ class Chaos final : public rtcf::Component {
         }
     }
 
-    // In some cycles this, in some that.
+    // Writes different outputs in different cycles.
     void writeSome() {
         if ((digest >> 40U) % 3 != 0) x.write(value);
         if ((digest >> 42U) % 4 != 0) checked.write(1.0 - value);
@@ -125,4 +125,4 @@ class Chaos final : public rtcf::Component {
 
 }  // namespace
 
-RTCF_COMPONENT(Chaos, "Remembers everything")
+RTCF_COMPONENT(Chaos, "Computes a digest of all past inputs")

@@ -1,5 +1,5 @@
-// Counts its cycles: tells whether the loop has missed one, and whether a
-// change elsewhere has touched this component.
+// Counts its cycles, to detect a missed cycle, or a side effect of changes to other
+// components.
 #include <cstdint>
 
 #include <rtcf/component.hpp>

@@ -1,4 +1,4 @@
-// Talks to a device in each cycle, as RTCF_DEVICE_IO allows it.
+// Communicates with a device in each cycle, permitted by RTCF_DEVICE_IO.
 #include <fcntl.h>
 #include <unistd.h>
 

@@ -1,4 +1,4 @@
-// Components whose hooks refuse, in every way a hook can.
+// Components whose hooks fail in every possible way.
 #include <stdexcept>
 
 #include <rtcf/component.hpp>
@@ -38,9 +38,9 @@ class ThrowingConstructor final : public Idle {
 
 }  // namespace
 
-RTCF_COMPONENT(FailingConfigure, "configure() says why it fails")
-RTCF_COMPONENT(SilentConfigure, "configure() returns false and says nothing")
+RTCF_COMPONENT(FailingConfigure, "configure() fails with a reason")
+RTCF_COMPONENT(SilentConfigure, "configure() fails without a reason")
 RTCF_COMPONENT(ThrowingConfigure, "configure() throws")
-RTCF_COMPONENT(OddlyThrowingConfigure, "configure() throws what is no std::exception")
+RTCF_COMPONENT(OddlyThrowingConfigure, "configure() throws something other than a std::exception")
 RTCF_COMPONENT(FailingStart, "start() fails")
 RTCF_COMPONENT(ThrowingConstructor, "the constructor throws")

@@ -1,4 +1,4 @@
-// As many inputs as a graph of five components can have into one.
+// The most inputs that a component can have in a graph of five components.
 #include <cstdint>
 
 #include <rtcf/component.hpp>

@@ -1,4 +1,4 @@
-// Has values of one cycle among many, for streams that tell few cycles.
+// Has glitches of one cycle, for streams that send only some cycles.
 #include <cstdint>
 
 #include <Eigen/Core>
@@ -13,7 +13,7 @@ class Glitch final : public rtcf::Component {
     rtcf::State<std::int32_t> state{this, "state", 0};
     std::uint64_t random_ = 88172645463325252;
 
-    // One cycle of each thousand is another one each time.
+    // A different cycle of each thousand.
     void update() override {
         if (iteration() % 1000 == 0) {
             random_ ^= random_ << 13;
@@ -30,4 +30,4 @@ class Glitch final : public rtcf::Component {
 
 }  // namespace
 
-RTCF_COMPONENT(Glitch, "Has values of one cycle among many")
+RTCF_COMPONENT(Glitch, "Has glitches of one cycle")

@@ -1,4 +1,4 @@
-// A parameter of each type, with bounds; what was set is seen at the outputs.
+// A parameter of each type, with bounds; its outputs show the values.
 #include <cstdint>
 #include <string>
 

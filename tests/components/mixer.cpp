@@ -1,5 +1,5 @@
-// Mixes what it reads, in integers, so that a model of the graph can follow each
-// value exactly. It refuses whatever a hook can refuse.
+// Mixes its inputs, in integers, so that a model of the graph can compute each value
+// exactly. Each of its hooks can fail on demand.
 #include <cstdint>
 #include <string>
 
@@ -19,7 +19,7 @@ class Mixer final : public rtcf::Component {
     rtcf::Parameter<std::int32_t> gain{this, "gain", 1, rtcf::Min(0), rtcf::Max(9)};
     rtcf::Parameter<std::string> unwilling{this, "unwilling", "",
                                            rtcf::Doc("configure or start, which then refuses")};
-    // What prepare() made of the parameters: it must change in the same cycle as they do.
+    // Derived from the parameters in prepare(); changes in the same cycle as they do.
     rtcf::Derived<std::int64_t> product{this};
     rtcf::State<std::int32_t> updates_{this, "updates", 0};
 
@@ -49,7 +49,7 @@ class Mixer final : public rtcf::Component {
 
     static constexpr std::int32_t kUnlucky = 13;
     static constexpr std::int64_t kModulus = 100'003;
-    static constexpr std::int64_t kTorn = 50'000;  // no model expects that
+    static constexpr std::int64_t kTorn = 50'000;  // never expected by the model
 };
 
 }  // namespace

@@ -1,5 +1,5 @@
-// Has values that are a function of the cycle's number, and that look random: whoever knows the
-// function knows what a stream has to tell.
+// Its values are a pseudorandom function of the cycle number, so that a test can compute the
+// expected content of a stream.
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -13,7 +13,7 @@ class Noise final : public rtcf::Component {
     rtcf::Output<double> gaps{this, "gaps"};
     rtcf::State<std::int32_t> steps{this, "steps", 0};
 
-    // SplitMix64's.
+    // SplitMix64.
     static std::uint64_t mixed(std::uint64_t number) {
         number += 0x9e3779b97f4a7c15;
         number = (number ^ (number >> 30U)) * 0xbf58476d1ce4e5b9;
@@ -32,4 +32,4 @@ class Noise final : public rtcf::Component {
 
 }  // namespace
 
-RTCF_COMPONENT(Noise, "Has values that look random and follow from the cycle's number")
+RTCF_COMPONENT(Noise, "Has pseudorandom values that depend on the cycle number")

@@ -1,5 +1,5 @@
-// A library as headers of another release would have made it. It includes none
-// of ours: only the first two members of the descriptor never change.
+// A library as built with headers of another release. It includes none of rtcf's
+// headers: only the first two members of the descriptor never change.
 #include <cstdint>
 
 namespace {

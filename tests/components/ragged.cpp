@@ -1,5 +1,5 @@
-// Has what a drawing must not lose: spikes of one cycle, stretches that are no numbers, and small
-// changes of a large value.
+// Signals that a drawing must show: spikes of one cycle, stretches of NaN, and small changes of a
+// large value.
 #include <cmath>
 #include <cstdint>
 #include <limits>

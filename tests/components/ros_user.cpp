@@ -1,4 +1,4 @@
-// Uses ROS in its hooks by standard node handles, as any node would.
+// Uses ROS in its hooks through standard node handles, like any node.
 #include <ros/param.h>
 #include <std_msgs/Float64.h>
 #include <rtcf/component.hpp>
@@ -11,8 +11,8 @@ namespace {
 class RosUser final : public rtcf::Component {
     rtcf::Output<double> heard{this, "heard"};
     rtcf::Output<double> gain{this, "gain"};
-    // Which hook calls the master: configure, start, or start without a look at what comes of it;
-    // or configure has a handle, and calls nobody.
+    // The hook that calls the master: configure, start, or start ignoring the result; or
+    // configure creates a handle without a call.
     rtcf::Parameter<std::string> in{this, "in", "configure",
                                     rtcf::Doc("configure, start, careless or handle")};
 
@@ -22,7 +22,7 @@ class RosUser final : public rtcf::Component {
     }
     bool start() override {
         if (in.value() == "start" && !meet()) return false;
-        // As it stands in somebody's code: what getParam() says is not looked at.
+        // As in users' code: the result of getParam() is ignored.
         if (in.value() == "careless") ros::param::get("/something", gain_);
         return true;
     }
@@ -57,4 +57,4 @@ class RosUser final : public rtcf::Component {
 
 }  // namespace
 
-RTCF_COMPONENT(RosUser, "Talks to ROS in its hooks")
+RTCF_COMPONENT(RosUser, "Uses ROS in its hooks")

@@ -1,6 +1,6 @@
-// Forbids its thread all system calls but the wait for the next cycle, and
-// those by which a thread ends: the kernel then ends the process at any other
-// one. Needs no permission (seccomp(2)).
+// Forbids its thread all system calls except the wait for the next cycle, and those that
+// end a thread: the kernel then kills the process at any other one. Needs no permission
+// (seccomp(2)).
 #include <linux/audit.h>
 #include <linux/filter.h>
 #include <linux/seccomp.h>
@@ -16,13 +16,13 @@
 
 namespace {
 
-constexpr std::uint32_t kWords = 2;  // of an argument, the lower one first
+constexpr std::uint32_t kWords = 2;  // per argument, the lower one first
 
 constexpr sock_filter load(std::size_t offset) {
     return BPF_STMT(BPF_LD | BPF_W | BPF_ABS, static_cast<std::uint32_t>(offset));
 }
 constexpr sock_filter answer(std::uint32_t verdict) { return BPF_STMT(BPF_RET | BPF_K, verdict); }
-// Goes on with the next one if equal, else leaves out so many.
+// Continues with the next instruction if equal, else skips `leave_out` of them.
 constexpr sock_filter unlessEqual(std::uint32_t value, std::uint8_t leave_out) {
     return BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, value, 0, leave_out);
 }
@@ -66,4 +66,4 @@ class Sealed final : public rtcf::Component {
 
 }  // namespace
 
-RTCF_COMPONENT(Sealed, "Lets the real-time thread call the kernel only to wait")
+RTCF_COMPONENT(Sealed, "Restricts the real-time thread to the system call that waits")

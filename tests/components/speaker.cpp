@@ -1,4 +1,4 @@
-// Logs in every way there is, from each thread it may run in.
+// Logs in every possible way, from each thread in which it may run.
 #include <ros/console.h>
 
 #include <rtcf/component.hpp>
@@ -20,4 +20,4 @@ class Speaker final : public rtcf::Component {
 
 }  // namespace
 
-RTCF_COMPONENT(Speaker, "Logs in every way there is")
+RTCF_COMPONENT(Speaker, "Logs in every possible way")

@@ -1,4 +1,4 @@
-// A component of a library that does not load: nobody has the symbol it needs.
+// A component of a library that does not load: an undefined symbol.
 #include <rtcf/component.hpp>
 
 extern "C" void rtcf_test_symbol_that_nobody_has();

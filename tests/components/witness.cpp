@@ -1,5 +1,5 @@
-// Says in the log which hook is called; and, for whoever looks when nobody takes logs any more,
-// in a file. And one whose start waits for the test.
+// Logs each hook and, for tests without logs, also writes it to a file. And components whose
+// hooks wait for the test.
 #include <chrono>
 #include <filesystem>
 #include <fstream>
@@ -39,7 +39,7 @@ class Witness final : public rtcf::Component {
     }
     void stop() override {
         RTCF_INFO(this, "hook {}", "stop");
-        // Files are not for the real-time thread: its hooks are noted afterwards.
+        // The real-time thread must not write files, so its hooks are recorded afterwards.
         if (updated_) note("update");
         if (safe_) note("safe");
         note("stop");
@@ -50,7 +50,7 @@ class Witness final : public rtcf::Component {
     }
 };
 
-// Waits for a file. Not real-time safe.
+// Waits for a file to appear. Not real-time safe.
 bool comes(const std::string& file) {
     const auto until = std::chrono::steady_clock::now() + std::chrono::minutes(1);
     while (!std::filesystem::exists(file)) {
@@ -81,4 +81,4 @@ class ConfiguresOnceThereIs final : public rtcf::Component {
 
 RTCF_COMPONENT(ConfiguresOnceThereIs, "Waits in configure() for a file")
 RTCF_COMPONENT(StartsOnceThereIs, "Waits in start() for a file")
-RTCF_COMPONENT(Witness, "Tells of each hook")
+RTCF_COMPONENT(Witness, "Logs each hook")

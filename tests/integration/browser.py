@@ -1,4 +1,4 @@
-"""Debian's Chromium without a screen, driven by its DevTools protocol."""
+"""Debian's Chromium in headless mode, controlled by its DevTools protocol."""
 
 import asyncio
 import base64
@@ -16,11 +16,11 @@ _POLL_S = 0.05
 
 
 class Browser(Closing):
-    """One browser with pages of a profile of its own; ends at the end of its `with`."""
+    """A browser with its own profile; ends with its `with` block."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder / "chromium"
-        # A renderer that may not open namespaces, as in containers, has no sandbox to be in.
+        # Chromium's sandbox does not work where it may not create namespaces, as in containers.
         sandbox = ["--no-sandbox"] if os.geteuid() == 0 else []
         self._process = subprocess.Popen(
             ["chromium", "--headless=new", *sandbox, "--disable-gpu", "--disable-dev-shm-usage",
@@ -35,7 +35,7 @@ class Browser(Closing):
 
     @property
     def pid(self) -> int:
-        """Return the first of its processes, which begins the others."""
+        """Return the pid of its first process, the parent of the others."""
         return self._process.pid
 
     def close(self) -> None:
@@ -46,7 +46,7 @@ class Browser(Closing):
         self.kill()
 
     def kill(self) -> None:
-        """End it as a power cut does."""
+        """Kill it, as a power cut does."""
         self._process.kill()
         self._process.wait()
 
@@ -76,7 +76,7 @@ class Browser(Closing):
 
 
 class Page:
-    """One page."""
+    """One page of the browser."""
 
     def __init__(
         self, loop: asyncio.AbstractEventLoop, socket: aiohttp.ClientWebSocketResponse
@@ -84,20 +84,20 @@ class Page:
         self._loop = loop
         self._socket = socket
         self._number = 0
-        self.errors: list[str] = []  # of scripts, and what was refused
+        self.errors: list[str] = []  # errors of scripts and failed requests
 
     def close(self) -> None:
-        """Close it: what is behind another page is not drawn."""
+        """Close it: Chromium does not draw a page behind another one."""
         self.call("Page.close")
 
     def call(self, method: str, **words: Any) -> Any:
-        """Call a method of the protocol; return its result."""
+        """Call a method of the DevTools protocol; return its result."""
         return self._loop.run_until_complete(
             asyncio.wait_for(self._call(method, words), DEADLINE_S)
         )
 
     def ask(self, expression: str) -> Any:
-        """Return the value of an expression of JavaScript, which may be a promise."""
+        """Return the value of a JavaScript expression, which may be a promise."""
         told = self.call(
             "Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True
         )
@@ -105,7 +105,7 @@ class Page:
         return told["result"].get("value")
 
     def wait(self, expression: str) -> Any:
-        """Return the value of an expression as soon as it is true."""
+        """Return the value of an expression once it is true."""
         deadline = time.monotonic() + DEADLINE_S
         while not (found := self.ask(f"(() => {{ try {{ return {expression} }} catch {{ }} }})()")):
             assert time.monotonic() < deadline, f"waited for {expression}; the page says: " + str(
@@ -115,11 +115,11 @@ class Page:
         return found
 
     def picture(self, file: Path) -> None:
-        """Write what is seen, as PNG."""
+        """Write a screenshot as PNG."""
         file.write_bytes(base64.b64decode(self.call("Page.captureScreenshot")["data"]))
 
     def trace(self, seconds: float, categories: list[str]) -> list[dict[str, Any]]:
-        """Return what the browser does meanwhile, as events for about:tracing."""
+        """Record the browser for some seconds; return events for about:tracing."""
         self.call("Tracing.start", transferMode="ReportEvents",
                   traceConfig={"includedCategories": categories})  # fmt: skip
         time.sleep(seconds)

@@ -1,4 +1,4 @@
-"""A loop beside the one that a test is about, which must not notice anything of the test."""
+"""A second loop that must run undisturbed during a test."""
 
 import rtcf
 from realtime_thread import RealtimeThread, Usage
@@ -23,11 +23,11 @@ class Bystander:
         self._thread = RealtimeThread(client, _NAME)
 
     def usage(self) -> Usage:
-        """Return what its real-time thread has used so far."""
+        """Return the resource usage of its real-time thread so far."""
         return self._thread.usage()
 
     def check(self) -> None:
-        """See that it has run on all the time, and end it."""
+        """Check that it ran all the time, and end it."""
         status = self._client.get_status(_NAME).runners[0]
         assert status.state == runner_pb2.RUNNER_STATE_RUNNING, status.status
         assert (status.pid, status.realtime_tid) == (self._thread.process, self._thread.id)

@@ -1,10 +1,10 @@
-"""The clock of a simulation; the tests start it as a program of its own.
+"""The clock of a simulation; the tests start it as a separate program.
 
-clock_peer.py tick      publishes /clock: each line of its input, in ns, is a tick
-clock_peer.py record    prints each tick of /clock it receives, in ns
+clock_peer.py tick      publishes a tick on /clock for each line of its input, in ns
+clock_peer.py record    prints each tick of /clock that it receives, in ns
 
-Both print `connected`: `tick` when all who have subscribed hear it (/rosout is one of them),
-`record` when it hears a clock.
+Both print `connected`: `tick` when all subscribers are connected (/rosout is one of them),
+`record` when it is connected to a clock.
 """
 
 import sys
@@ -18,7 +18,7 @@ _POLL_S = 0.01
 
 
 def _say(line: object) -> None:
-    # In one piece, as several threads do it.
+    # A single write, since several threads call this.
     sys.stdout.write(f"{line}\n")
     sys.stdout.flush()
 

@@ -1,4 +1,4 @@
-"""A daemon, a client and a ROS master for each test that asks for one."""
+"""Fixtures: a daemon, a client and a ROS master."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,13 +12,13 @@ from ros_processes import Master
 
 @pytest.fixture
 def settings() -> str:
-    """Give the settings of `daemon`; modules that need others have their own."""
+    """Return the settings of `daemon`; modules may override them."""
     return NO_ROS
 
 
 @pytest.fixture
 def daemon(tmp_path: Path, settings: str) -> Iterator[Daemon]:
-    """Give an rtcfd whose loops have no ROS node."""
+    """Yield an rtcfd whose loops have no ROS node."""
     daemon = Daemon(tmp_path, settings)
     daemon.start()
     yield daemon
@@ -28,14 +28,14 @@ def daemon(tmp_path: Path, settings: str) -> Iterator[Daemon]:
 
 @pytest.fixture
 def client(daemon: Daemon) -> Iterator[rtcf.Client]:
-    """Give a client of `daemon`."""
+    """Yield a client of `daemon`."""
     with rtcf.Client(daemon.socket) as client:
         yield client
 
 
 @pytest.fixture
 def running(daemon: Daemon, client: rtcf.Client) -> Iterator[Daemon]:
-    """Give `daemon` with a loop of two components that runs."""
+    """Yield `daemon` with a running loop of two components."""
     client.load(rtcf.component("rtcf_examples", "Wave", name="wave", parameters=["rate:=1.0"]))
     client.load(rtcf.component("rtcf_examples", "Mimo", name="mimo"))
     client.start()
@@ -45,7 +45,7 @@ def running(daemon: Daemon, client: rtcf.Client) -> Iterator[Daemon]:
 
 @pytest.fixture(scope="module")
 def master(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Master]:
-    """Give a ROS master on a port of its own, shared by the tests of a module."""
+    """Yield a ROS master on its own port, shared by the tests of a module."""
     master = Master(tmp_path_factory.mktemp("master"))
     master.start()
     yield master
@@ -54,7 +54,7 @@ def master(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Master]:
 
 @pytest.fixture
 def launching(tmp_path: Path, master: Master) -> Iterator[Launching]:
-    """Start launch nodes at the module's master; end them."""
+    """Yield a starter of launch nodes at the module's master; end the nodes afterwards."""
     launching = Launching(master, tmp_path)
     launching.forget()
     yield launching

@@ -1,7 +1,7 @@
-// What the tests of drawing do in the page: cycles that are made here, or the loop's, drawn piece by
-// piece and at once.
+// Helpers of the drawing tests within the page: cycles, generated here or from the loop, drawn
+// incrementally and at once.
 
-// Numbers that look random, the same for a seed.
+// Pseudorandom numbers, identical for a seed.
 export function randomOf(seed) {
   let state = seed >>> 0;
   return () => {
@@ -12,7 +12,7 @@ export function randomOf(seed) {
   };
 }
 
-// A scope over the whole page, of which the cycles are pushed by hand.
+// A scope over the whole page; the test pushes its cycles.
 export async function scopeOf(panes) {
   const { Scope } = await import("/page/scope.js");
   const box = document.createElement("div");
@@ -27,7 +27,7 @@ export async function scopeOf(panes) {
   return scope;
 }
 
-// All pixels of the traces in sight, pane by pane, as columns by their number.
+// All visible pixels of the traces, pane by pane, as columns by number.
 export function pixels(scope) {
   return scope.panes.map((pane) => {
     const { first, width, height } = pane.sight, found = new Map();
@@ -44,11 +44,11 @@ export function pixels(scope) {
   });
 }
 
-// Draws what is in sight once more, as a whole; returns the columns that it changes.
+// Draws the visible part again at once; returns the columns that change.
 export function differences(scope, now = performance.now()) {
   scope.frame(now);
   const { view } = scope, end = view.end, follows = view.follows;
-  view.follows = false; // no step on between two pictures
+  view.follows = false; // the view must not move between the two drawings
   const grown = pixels(scope);
   for (const pane of scope.panes) pane.tiles.forget();
   scope.dirty = true;
@@ -68,7 +68,7 @@ export function differences(scope, now = performance.now()) {
   return found;
 }
 
-// The cycles in sight at which a trace is not seen where its value is.
+// The visible cycles whose value is not drawn in the trace's colour at its position.
 export async function unseen(scope, name, isWanted) {
   const { colour, ink: inkOf, pixel } = await import("/page/drawing/palette.js");
   const ground = pixel(inkOf("paper"));
@@ -87,7 +87,7 @@ export async function unseen(scope, name, isWanted) {
   return { count, found };
 }
 
-// Cycles of some traces in pieces, with spikes, holes and cycles that are missing.
+// Cycles of some traces in pieces, with spikes, holes and missing cycles.
 export class Source {
   constructor(names, rate, random) {
     Object.assign(this, { names, rate, random, cycle: 0, time: 0, hole: 0, level: 0 });

@@ -1,4 +1,4 @@
-"""Fig. 1 of the paper: its wires, and what it computes, independently of the loop."""
+"""Fig. 1 of the paper: its connections, and its values, computed independently of the loop."""
 
 from collections.abc import Iterable, Iterator
 
@@ -9,7 +9,7 @@ ORDER = ["/H1", "/F1", "/R1", "/R2", "/R3"]
 WHITELIST = ".*R3_G2H1|.*R1_H1R2|.*G2_R2"
 PORTS = ("in1", "in2", "in3", "in4", "out1", "out2")
 
-# Ports and the connections they belong to.
+# Ports and their connections.
 WIRES: dict[str, dict[str, str]] = {
     "H1": {"in1": "/R3_G2H1", "in2": "/R1_H1R2", "out1": "/H1_F1", "out2": "/H1_R1R2"},
     "F1": {"in1": "/H1_F1", "out1": "/F1_R2R3"},
@@ -21,7 +21,7 @@ WIRES: dict[str, dict[str, str]] = {
 
 
 def mimo(name: str, wires: dict[str, str], *, first: bool = False) -> graph_pb2.ComponentSpec:
-    """Return a Mimo; ports that are not wired get names of its own."""
+    """Return a Mimo; ports without a connection get private names."""
     remaps = [f"{port}:={wires.get(port, f'~{port}')}" for port in PORTS]
     return rtcf.component("rtcf_examples", "Mimo", name=name, remaps=remaps, first=first)
 
@@ -35,7 +35,7 @@ def load(client: rtcf.Client, names: Iterable[str] = ("H1", "F1", "R1", "R2", "R
 def mimo_sum(
     in1: float | None, in2: float | None, in3: float | None = None, in4: float | None = None
 ) -> float:
-    """Return what a Mimo writes; None is an input without new data."""
+    """Return the value that a Mimo writes; None is an input without new data."""
     total = 1.0 if in1 is None else in1
     for value in (in2, in3, in4):
         total += 0.0 if value is None else value
@@ -43,14 +43,14 @@ def mimo_sum(
 
 
 def simulate(g2: float | None = None) -> Iterator[dict[str, float]]:
-    """Yield what the components write in each cycle; G2's value is there in the first."""
+    """Yield the values that the components write in each cycle; G2's value is new in the first."""
     r1: float | None = None
     r3: float | None = None
     while True:
-        h1 = mimo_sum(r3, r1)  # of the cycle before
+        h1 = mimo_sum(r3, r1)  # of the previous cycle
         f1 = mimo_sum(h1, None)
         r1 = mimo_sum(h1, None)
         r2 = mimo_sum(f1, h1, r1, g2)
         r3 = mimo_sum(f1, r2)
-        g2 = None  # not new any more
+        g2 = None  # no longer new
         yield {"H1": h1, "F1": f1, "R1": r1, "R2": r2, "R3": r3}

@@ -1,6 +1,6 @@
-"""A user who may only look takes all that rtcfd gives, in every way: `flood.py SOCKET STOP`.
+"""An observer that uses up every resource rtcfd grants: `flood.py SOCKET STOP`.
 
-Ends when it is killed; says `there` when it has begun.
+Runs until it is killed; prints `there` when the flood has begun.
 """
 
 import contextlib
@@ -19,7 +19,7 @@ PING = bytes([0, 0, 8, 6, 0, 0, 0, 0, 0]) + b"12345678"
 
 
 def connected(path: str) -> socket.socket:
-    """Return a connection, or a socket that found no place."""
+    """Return a connection, or an unconnected socket if rtcfd accepts no more."""
     peer = socket.socket(socket.AF_UNIX)
     peer.settimeout(0.2)
     with contextlib.suppress(OSError):
@@ -28,7 +28,7 @@ def connected(path: str) -> socket.socket:
 
 
 def stubs(path: str) -> Iterator[control_pb2_grpc.ControlStub]:
-    """Give stubs with connections of their own."""
+    """Yield stubs, each with its own connection."""
     while True:
         options = (("grpc.use_local_subchannel_pool", 1), ("grpc.max_metadata_size", 1 << 20))
         channel = grpc.insecure_channel(f"unix:{path}", options=options)
@@ -36,7 +36,7 @@ def stubs(path: str) -> Iterator[control_pb2_grpc.ControlStub]:
 
 
 def again(work: Callable[[], object]) -> None:
-    """Do it for ever, whatever comes of it."""
+    """Repeat `work` forever, ignoring errors."""
 
     def loop() -> None:
         while True:
@@ -49,7 +49,7 @@ def again(work: Callable[[], object]) -> None:
 
 
 def idle(path: str, _: str) -> None:
-    """Connections that say nothing."""
+    """Connections without requests."""
     peers = [connected(path) for _ in range(300)]
 
     def exchange() -> None:
@@ -61,12 +61,12 @@ def idle(path: str, _: str) -> None:
 
 
 def reconnects(path: str, _: str) -> None:
-    """Connections that come and go."""
+    """Connections that are opened and closed."""
     again(lambda: connected(path).close())
 
 
 def names(path: str, _: str) -> None:
-    """Names as long as a message may be, and longer."""
+    """Names of the maximum message size, and longer ones."""
     clients = stubs(path)
     lock = threading.Lock()
     lengths = itertools.cycle((4000, 900_000, 16_000_000))
@@ -82,7 +82,7 @@ def names(path: str, _: str) -> None:
 
 
 def watches(path: str, _: str) -> None:
-    """More streams of figures than anybody reads."""
+    """More statistics streams than can be served."""
     clients = stubs(path)
     request = control_pb2.WatchStatisticsRequest(interval_ms=1)
     kept = [
@@ -99,7 +99,7 @@ def watches(path: str, _: str) -> None:
 
 
 def half_closed(path: str, _: str) -> None:
-    """Connections that ask much, say that they are done, and read nothing."""
+    """Connections that send many requests, shut down their sending side and read nothing."""
     peers = []
 
     def ask() -> None:
@@ -114,7 +114,7 @@ def half_closed(path: str, _: str) -> None:
 
 
 def calls(path: str, _: str) -> None:
-    """All there is to be asked."""
+    """All read-only calls."""
     stub = next(stubs(path))
 
     def ask() -> None:
@@ -128,12 +128,12 @@ def calls(path: str, _: str) -> None:
 
 
 def noise(path: str, _: str) -> None:
-    """No protocol at all."""
+    """Random bytes."""
     again(lambda: connected(path).sendall(PREFACE + b"\xff" * 100_000))
 
 
 def stops(_: str, stop: str) -> None:
-    """The executor's own socket."""
+    """Random bytes to the executor's stop socket."""
 
     def ask() -> None:
         with connected(stop) as peer:

@@ -1,8 +1,8 @@
-"""A reference model of a runner's graph of Mixers: what a change must make of it, or that it
-is refused; and what the components compute.
+"""A reference model of a runner's graph of Mixers: the expected result of a change, or its
+rejection, and the values that the components compute.
 
-Written from the documentation of graphs, with none of the executor's algorithms: the order is
-found by trying, loops by following connections.
+Written from the documentation of graphs, without the executor's algorithms: it finds the
+order by trial, and loops by following connections.
 """
 
 from collections.abc import Iterable, Mapping
@@ -15,23 +15,23 @@ INPUTS = {"in1": "int32", "in2": "int32", "level": "double"}
 OUTPUTS = {"out": "int32", "half": "double", "updates": "int32"}
 TYPES = INPUTS | OUTPUTS
 MODULUS = 100_003
-UNLUCKY = 13  # an offset that prepare() refuses
+UNLUCKY = 13  # an offset that prepare() rejects
 RANGES = {"offset": range(-100, 101), "gain": range(0, 10)}
 DEFAULTS = {"offset": 1, "gain": 1}
 
 
 class Refused(Exception):
-    """The change must be refused."""
+    """The change must be rejected."""
 
 
 @dataclass(frozen=True)
 class Mixer:
-    """A component as it is asked for, and as it is."""
+    """A component: its specification and its present parameters."""
 
-    name: str  # full
+    name: str  # full name
     wires: Mapping[str, str] = field(default_factory=dict)  # remaps, port -> absolute name
     parameters: Mapping[str, int] = field(default_factory=dict)
-    unwilling: str = ""  # the hook that refuses
+    unwilling: str = ""  # the hook that fails
     first: bool = False
     breaks: frozenset[str] = frozenset()
     every: int = 1
@@ -42,7 +42,7 @@ class Mixer:
         return self.wires.get(port, f"{self.name}/{port}")
 
     def broken(self, port: str) -> bool:
-        """Tell whether an input reads the previous cycle."""
+        """Return whether an input reads the previous cycle."""
         return self.first or port in self.breaks
 
     def value(self, parameter: str) -> int:
@@ -50,7 +50,7 @@ class Mixer:
         return self.parameters.get(parameter, DEFAULTS[parameter])
 
     def spec(self) -> graph_pb2.ComponentSpec:
-        """Return what a client asks for."""
+        """Return the component specification that a client sends."""
         ns, _, name = self.name.rpartition("/")
         parameters = [f"{each}:={value}" for each, value in self.parameters.items()]
         if self.unwilling:
@@ -74,7 +74,7 @@ Graph = Mapping[str, Mixer]
 
 
 def load(graph: Graph, mixer: Mixer) -> Graph:
-    """Return the graph with a component more."""
+    """Return the graph with an additional component."""
     if mixer.name in graph:
         raise Refused(f"{mixer.name} is there")
     _check_hooks(mixer)
@@ -91,8 +91,8 @@ def unload(graph: Graph, names: Iterable[str]) -> Graph:
 
 
 def replaced(graph: Graph, old: str, mixer: Mixer) -> Graph:
-    """Return the graph with another component in the place of an old one, whose flags, breaks
-    and parameters it takes over unless it has its own."""
+    """Return the graph with a component replaced. The new one takes over the flags, breaks
+    and parameters that it does not set itself."""
     if old not in graph:
         raise Refused(f"no {old}")
     if mixer.name != old and mixer.name in graph:
@@ -121,7 +121,7 @@ def set_breaks(graph: Graph, ports: Iterable[tuple[str, str]], broken: bool) -> 
 
 
 def set_parameters(graph: Graph, name: str, batch: Mapping[str, int]) -> Graph:
-    """Return the graph with other values of a component's parameters."""
+    """Return the graph with new values of a component's parameters."""
     if name not in graph:
         raise Refused(f"no {name}")
     mixer = replace(graph[name], parameters={**graph[name].parameters, **batch})
@@ -130,7 +130,7 @@ def set_parameters(graph: Graph, name: str, batch: Mapping[str, int]) -> Graph:
 
 
 def applied(graph: Graph, wanted: Iterable[Mixer]) -> Graph:
-    """Return what a whole graph becomes: with each name once."""
+    """Return the result of applying a whole graph, in which each name occurs once."""
     result: dict[str, Mixer] = {}
     for mixer in wanted:
         if mixer.name in result:
@@ -179,8 +179,8 @@ def _checked(graph: Graph) -> Graph:
 
 
 def writers(graph: Graph, name: str) -> set[tuple[str, str]]:
-    """Return the components and ports that write a connection; where an input reads it, one at
-    most."""
+    """Return the components and ports that write a connection; at most one if an input
+    reads it."""
     return {
         (mixer.name, port)
         for mixer in graph.values()
@@ -190,7 +190,7 @@ def writers(graph: Graph, name: str) -> set[tuple[str, str]]:
 
 
 def sources(graph: Graph, mixer: Mixer) -> set[str]:
-    """Return the components that must run before this one."""
+    """Return the components that must run before `mixer`."""
     found = set()
     for port in INPUTS:
         if not mixer.broken(port):
@@ -199,14 +199,14 @@ def sources(graph: Graph, mixer: Mixer) -> set[str]:
 
 
 def order(graph: Graph) -> list[str]:
-    """Return the order of execution; Refused if there is none."""
+    """Return the order of execution; raises Refused if there is none."""
     waiting = {name: sources(graph, mixer) for name, mixer in graph.items()}
     done: list[str] = []
     while waiting:
         ready = [name for name, before in waiting.items() if before.issubset(done)]
         if not ready:
             raise Refused(f"a loop among {sorted(waiting)}")
-        # One at a time: what it sets free may go before others by its name.
+        # One at a time: a component that becomes ready may precede others by its name.
         done.append(min(ready, key=lambda name: (not graph[name].first, name)))
         del waiting[done[-1]]
     return done
@@ -214,7 +214,7 @@ def order(graph: Graph) -> list[str]:
 
 @dataclass(frozen=True)
 class Connection:
-    """A mapped name and its ends; of several writers none goes before the others."""
+    """A mapped name and its ends; several writers have no order among each other."""
 
     writers: frozenset[tuple[str, str]]
     readers: frozenset[tuple[str, str, bool]]
@@ -241,7 +241,7 @@ Values = dict[tuple[str, str], float]  # by component and port; 0 without a valu
 
 
 def run_cycle(graph: Graph, iteration: int, values: Values) -> Values:
-    """Return the values of outputs, and of inputs that nobody writes, after one cycle more."""
+    """Return the values of outputs, and of inputs without a writer, after one more cycle."""
     before, now = values, dict(values)
     for name in order(graph):
         mixer = graph[name]

@@ -1,4 +1,4 @@
-"""Graphs of many components, to be drawn."""
+"""Large graphs for drawings."""
 
 import fig_1
 import rtcf
@@ -6,7 +6,7 @@ from rtcf.v1 import graph_pb2
 
 
 def mimo(number: int, wires: dict[str, str], *, breaks: str = "") -> graph_pb2.ComponentSpec:
-    """Return /m000 and so on; ports that are not wired have names of their own."""
+    """Return a Mimo /m000, /m001, …; ports without a connection get private names."""
     return rtcf.component(
         "rtcf_examples", "Mimo", name=f"m{number:03}",
         remaps=[f"{port}:={wires.get(port, f'~{port}')}" for port in fig_1.PORTS],
@@ -20,7 +20,7 @@ def name(number: int) -> str:
 
 
 def chain(count: int, begin: int = 0, *, closed: bool = False) -> list[graph_pb2.ComponentSpec]:
-    """Each reads the one before it; of a closed one the first reads the last, late."""
+    """Each reads its predecessor; in a closed chain the first reads the last, one cycle late."""
     end = begin + count
     specs = []
     for number in range(begin, end):
@@ -34,12 +34,12 @@ def chain(count: int, begin: int = 0, *, closed: bool = False) -> list[graph_pb2
 
 
 def chains(several: int, count: int) -> list[graph_pb2.ComponentSpec]:
-    """Each closed, beside each other."""
+    """Several closed chains, independent of each other."""
     return [each for at in range(several) for each in chain(count, at * count, closed=True)]
 
 
 def star(count: int) -> list[graph_pb2.ComponentSpec]:
-    """All read the first one, which reads the last one late."""
+    """All read the first one, which reads the last one, one cycle late."""
     hub = mimo(0, {"out1": "/s0", "in2": f"/s{count - 1}"}, breaks="in2")
     rays = [mimo(at, {"in1": "/s0", "out1": f"/s{at}"}) for at in range(1, count)]
     return [hub, *rays]
@@ -51,7 +51,7 @@ GRAPHS = {
     "star": star(200),
     "chains": chains(20, 10),
 }
-# Ends of the lines that are to be drawn: writer and reader, and which of them are loop breaks.
+# Ends of the expected lines: writer and reader, and which of them are loop breaks.
 LINES = {
     "chain": [(at, at + 1) for at in range(199)],
     "closed": [(at, (at + 1) % 200) for at in range(200)],
@@ -61,5 +61,5 @@ LINES = {
 
 
 def is_break(writer: int, reader: int) -> bool:
-    """Tell whether a line goes back."""
+    """Return whether a line goes back."""
     return reader < writer

@@ -1,4 +1,4 @@
-"""A disk of a test's own that can hang: an ext4 file system in a file, frozen by the kernel."""
+"""A disk that can hang: an ext4 file system in a file, frozen by the kernel."""
 
 import contextlib
 import subprocess
@@ -9,14 +9,14 @@ import pytest
 
 
 class HangingDisk:
-    """Mounted at `folder`; root needed."""
+    """A disk mounted at `folder`; requires root."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
     @contextlib.contextmanager
     def hanging(self) -> Iterator[None]:
-        """Inside, whoever changes a file there waits in the kernel, and no signal ends that."""
+        """Within the block, a write to the disk waits in the kernel, uninterruptible by signals."""
         _run("fsfreeze", "--freeze", str(self.folder))
         try:
             yield
@@ -26,7 +26,7 @@ class HangingDisk:
 
 @contextlib.contextmanager
 def mounted(folder: Path, image: Path) -> Iterator[HangingDisk]:
-    """Mount one; skip the test where that is not allowed."""
+    """Mount a disk; skip the test without the permission to mount."""
     folder.mkdir(parents=True)
     with image.open("wb") as file:
         file.truncate(8 * 1024 * 1024)

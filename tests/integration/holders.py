@@ -1,4 +1,4 @@
-"""Clients that hold a runner or a component, as rt_runner and rt_launcher do."""
+"""Clients that lease a runner or a component, like rt_runner and rt_launcher."""
 
 import threading
 from typing import Any
@@ -11,7 +11,7 @@ STOP = control_pb2.ON_LEASE_LOST_STOP
 
 
 class Holder:
-    """Reads a tenancy's messages in a thread of its own."""
+    """Reads the messages of a lease in its own thread."""
 
     def __init__(self, tenancy: rtcf.Tenancy) -> None:
         self.tenancy = tenancy
@@ -28,11 +28,11 @@ class Holder:
             self.error = error
 
     def of(self, kind: str) -> list[Any]:
-        """Return the messages of a kind that have come."""
+        """Return the messages of a kind received so far."""
         return [getattr(m, kind) for m in list(self.messages) if m.WhichOneof("kind") == kind]
 
     def wait(self, kind: str) -> Any:
-        """Return the first message of a kind; fails at a refusal."""
+        """Return the first message of a kind; fail if the call fails."""
 
         def come() -> Any:
             assert self.error is None, self.error
@@ -41,16 +41,16 @@ class Holder:
         return wait_for(come, f"a message {kind}")[0]
 
     def refusal(self) -> rtcf.RtcfError:
-        """Return why the call has failed."""
-        error: rtcf.RtcfError = wait_for(lambda: self.error, "a refusal")
+        """Return the error of the failed call."""
+        error: rtcf.RtcfError = wait_for(lambda: self.error, "an error")
         return error
 
     def why(self) -> int:
-        """Return why it has ended."""
+        """Return the reason for the end of the lease."""
         return int(self.wait("ended").why)
 
     def end(self) -> None:
-        """End it in order."""
+        """End the lease in order."""
         self.tenancy.end()
         assert self.why() == control_pb2.LeaseEnded.WHY_ASKED
 
@@ -62,7 +62,7 @@ def lease(
     run: str = "run",
     **fields: Any,
 ) -> Holder:
-    """Lease a component; does not wait for it."""
+    """Lease a component without waiting for it."""
     opening = control_pb2.OpenLease(
         component=spec, on_lost=on_lost, run_id=run, holder=f"holder of {spec.name}", **fields
     )
@@ -85,7 +85,7 @@ def hold(
     settings: runner_pb2.RunnerSettings | None = None,
     attach: bool = False,
 ) -> Holder:
-    """Hold a runner; does not wait for it."""
+    """Lease a runner without waiting for it."""
     opening = control_pb2.OpenHold(
         runner=runner, settings=settings, token=token, holder=f"holder {token}", attach=attach
     )
@@ -93,7 +93,7 @@ def hold(
 
 
 def held(client: rtcf.Client, *arguments: Any, **fields: Any) -> Holder:
-    """Hold a runner, and wait until it is taken."""
+    """Lease a runner, and wait for the lease."""
     holder = hold(client, *arguments, **fields)
     holder.wait("taken")
     return holder

@@ -1,4 +1,4 @@
-"""A way to a ROS master on which calls of one kind stand still for as long as a test likes."""
+"""A relay to a ROS master that can delay calls of one kind."""
 
 import select
 import socket
@@ -7,8 +7,8 @@ from contextlib import suppress
 
 
 class HoldingMaster:
-    """Relays to a real master, and counts the calls; withdrawals of publishers wait between
-    `hold` and `let_go`."""
+    """Relays to a real master and counts the calls. Between `hold` and `let_go`, calls that
+    unregister publishers wait."""
 
     def __init__(self, master_port: int) -> None:
         self._real = ("localhost", master_port)
@@ -21,24 +21,24 @@ class HoldingMaster:
         threading.Thread(target=self._accept, daemon=True).start()
 
     def hold(self) -> None:
-        """Let withdrawals wait from here on."""
+        """Delay unregistering calls from now on."""
         self._open.clear()
 
     def let_go(self) -> None:
-        """Let them reach the master."""
+        """Forward the delayed calls to the master."""
         self._open.set()
 
     @property
     def holding(self) -> bool:
-        """Whether somebody is waiting now for the answer to a withdrawal."""
+        """Whether a caller waits for the answer of an unregistering call."""
         return bool(self._held)
 
     def calls(self, *parts: bytes) -> int:
-        """Return how many calls there were that have all these in them."""
+        """Return the number of calls that contain all these parts."""
         return sum(all(part in call for part in parts) for call in list(self._calls))
 
     def close(self) -> None:
-        """Take no more calls."""
+        """Accept no more calls."""
         self._open.set()
         self._listener.close()
 

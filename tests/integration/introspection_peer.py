@@ -1,10 +1,10 @@
-"""A ROS node that listens to what a runner tells of itself; the tests start it.
+"""A ROS node that receives a runner's introspection topics; the tests start it.
 
 introspection_peer.py cycles TOPIC COUNT      prints `connected`, then iteration, stamp, latency
-                                              and duration (ns) of so many cycles
-introspection_peer.py info TOPIC COUNT        the same of RTCF 2021's messages: stamp and duration
-introspection_peer.py stamped TOPIC COUNT     stamp (ns) and value of so many rtcf_msgs/Int32Stamped
-introspection_peer.py diagnostics NAME LEVEL  prints all statuses, until that name has that level:
+                                              and duration (ns) of COUNT cycles
+introspection_peer.py info TOPIC COUNT        the same for RTCF 2021's messages: stamp, duration
+introspection_peer.py stamped TOPIC COUNT     stamp (ns) and value of COUNT rtcf_msgs/Int32Stamped
+introspection_peer.py diagnostics NAME LEVEL  prints all statuses until NAME has LEVEL, as
                                               name|level|message|key=value|...
 """
 
@@ -43,8 +43,8 @@ def _cycles(topic: str, kind: Any, count: int) -> None:
     peer = rospy.Subscriber(topic, kind, take, tcp_nodelay=True)
 
     def met() -> bool:
-        # rospy counts connections that it is about to make as well; the publisher's header, which
-        # names it, comes when it has accepted us.
+        # rospy also counts connections that it has not established yet. The publisher's header,
+        # which contains its name, arrives once it has accepted the connection.
         return any(each.callerid_pub != "unknown" for each in peer.impl.connections)
 
     while not met() and not rospy.is_shutdown():
@@ -63,7 +63,7 @@ def _diagnostics(name: str, level: int) -> None:
             if found.is_set():
                 return
             pairs = [f"{pair.key}={pair.value}" for pair in status.values]
-            # In one piece: several nodes are heard by as many threads.
+            # A single write, since several threads receive statuses.
             line = "|".join([status.name, str(status.level), status.message, *pairs])
             sys.stdout.write(f"{line}\n")
         found_now = any(each.name == name and each.level == level for each in message.status)
@@ -76,7 +76,7 @@ def _diagnostics(name: str, level: int) -> None:
 
 
 def main() -> None:
-    """Do what the command line says."""
+    """Run the command of the command line."""
     action, what, number = sys.argv[1:]
     rospy.init_node("introspection_peer", anonymous=True)
     if action in _KINDS:

@@ -1,4 +1,4 @@
-"""What the kernel counts of one thread: by perf where that is permitted, by /proc everywhere."""
+"""The kernel's counters of one thread: from perf where permitted, from /proc everywhere."""
 
 import os
 import platform
@@ -12,18 +12,18 @@ from types import TracebackType
 from daemon_process import DEADLINE_S
 
 _CLOCK_NANOSLEEP = {"x86_64": 230, "aarch64": 115}
-_SLEEPING = 1  # prev_state of a thread that gives the CPU up itself
+_SLEEPING = 1  # prev_state of a thread that yields the CPU voluntarily
 
 
 @dataclass(frozen=True)
 class ThreadCounters:
-    """Of /proc: proc(5), task/TID/stat and status."""
+    """Counters from /proc: proc(5), task/TID/stat and status."""
 
     page_faults: int
     voluntary_switches: int
 
     def __sub__(self, earlier: "ThreadCounters") -> "ThreadCounters":
-        """Return what was counted since."""
+        """Return the difference to earlier counters."""
         return ThreadCounters(
             self.page_faults - earlier.page_faults,
             self.voluntary_switches - earlier.voluntary_switches,
@@ -31,22 +31,22 @@ class ThreadCounters:
 
 
 def read_counters(pid: int, thread: int) -> ThreadCounters:
-    """Return the counters of now."""
+    """Return the present counters."""
     folder = Path(f"/proc/{pid}/task/{thread}")
     text = (folder / "stat").read_text()
-    fields = text[text.rindex(")") + 2 :].split()  # from the third on
+    fields = text[text.rindex(")") + 2 :].split()  # from the third field on
     switches = status_field(folder, "voluntary_ctxt_switches")
     return ThreadCounters(int(fields[7]) + int(fields[9]), int(switches))
 
 
 def status_field(folder: Path, name: str) -> str:
-    """Return one line of a `status` of /proc."""
+    """Return one field of a `status` of /proc."""
     lines = (folder / "status").read_text().splitlines()
     return next(line.split(":")[1].strip() for line in lines if line.startswith(f"{name}:"))
 
 
 class Perf:
-    """perf stat on one thread, from the beginning to the end of a block."""
+    """perf stat on one thread during the block."""
 
     def __init__(self, pid: int, thread: int, folder: Path) -> None:
         others = [name for name in os.listdir(f"/proc/{pid}/task") if int(name) != thread]
@@ -66,7 +66,7 @@ class Perf:
 
     @staticmethod
     def refusal(thread: int) -> str:
-        """Return why it cannot count; empty if it can."""
+        """Return the reason why perf cannot count; empty if it can."""
         if shutil.which("perf") is None:
             return "there is no perf (package linux-perf)"
         events = "page-faults,raw_syscalls:sys_enter,sched:sched_switch"

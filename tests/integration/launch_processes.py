@@ -1,5 +1,5 @@
 """roslaunch, rt_runner, rt_launcher and the rosrun tools as processes, with the build tree's
-packages; what they print is in files."""
+packages; their output goes to files."""
 
 import os
 import signal
@@ -20,14 +20,14 @@ _DEVEL = BUILD_TREE / "devel"
 
 
 def environment(master: Master, system_socket: Path | str = "/nonexistent") -> dict[str, str]:
-    """Return that of a user who has sourced the build tree's setup.sh, at a master."""
+    """Return the environment of a user who sourced the build tree's setup.sh, with a master."""
     return build_tree_environment(master.environment(), system_socket)
 
 
 def build_tree_environment(
     base: dict[str, str], system_socket: Path | str = "/nonexistent"
 ) -> dict[str, str]:
-    """Return that of a user who has sourced the build tree's setup.sh."""
+    """Return the environment of a user who sourced the build tree's setup.sh."""
     return base | {
         "CMAKE_PREFIX_PATH": str(_DEVEL),
         "ROS_PACKAGE_PATH": str(_DEVEL / "share"),
@@ -39,7 +39,7 @@ def build_tree_environment(
 
 
 class Process:
-    """A process in a session of its own."""
+    """A process in its own session."""
 
     def __init__(self, command: list[str], environment: dict[str, str], folder: Path) -> None:
         self.command = " ".join(command)
@@ -57,11 +57,11 @@ class Process:
         self.pid = self._process.pid
 
     def output(self) -> str:
-        """Return what it has printed so far."""
+        """Return its output so far."""
         return self._output.read_text(errors="replace")
 
     def wait_for_output(self, text: str) -> None:
-        """Return when it has printed a text."""
+        """Wait until its output contains a text."""
 
         def printed() -> bool:
             there = text in self.output()
@@ -76,11 +76,11 @@ class Process:
         return self.wait()
 
     def wait(self, deadline_s: float = DEADLINE_S) -> int:
-        """Return the exit status."""
+        """Wait for its end; return the exit status."""
         return self._process.wait(deadline_s)
 
     def make_sure(self) -> None:
-        """End it in any case."""
+        """Kill it if it still runs."""
         if self._process.poll() is None:
             self._process.send_signal(signal.SIGINT)
             try:
@@ -90,7 +90,7 @@ class Process:
                 self._process.wait()
 
     def children(self) -> dict[str, int]:
-        """Return the nodes that a roslaunch has started, by their names."""
+        """Return the nodes started by a roslaunch, by name."""
         found = {}
         for process in Path("/proc").glob("[0-9]*"):
             try:
@@ -106,7 +106,7 @@ class Process:
 
 
 class Launching:
-    """Starts processes at one master, and ends those that a test that failed has left."""
+    """Starts processes at one master, and ends those that a failed test leaves running."""
 
     def __init__(self, master: Master, folder: Path, system_socket: Path | str = "/nonexistent"):
         self.master = master
@@ -115,13 +115,13 @@ class Launching:
         self._processes: list[Process] = []
 
     def roslaunch(self, *words: str) -> Process:
-        """Start roslaunch with its words: a package and a file, or a file."""
+        """Start roslaunch with a package and a file, or with a file."""
         self.forget()
-        # It gives nodes 15 s to end, of which a busy machine may need more.
+        # The default gives nodes 15 s to end, which a busy machine may exceed.
         return self.start("/usr/bin/roslaunch", f"--sigint-timeout={DEADLINE_S / 2}", *words)
 
     def forget(self) -> None:
-        """Remove what an earlier launch has left on the parameter server."""
+        """Remove an earlier launch's parameters from the parameter server."""
         server = rosgraph.Master("/test", self.master.uri)
         for name in server.getParam("/"):
             if name not in ("run_id", "roslaunch", "rosversion", "rosdistro"):
@@ -156,7 +156,7 @@ class Launching:
 
     @contextmanager
     def client(self, node: str = "/rt_runner") -> Iterator[tuple[rtcf.Client, str]]:
-        """Give a client of the rtcfd that holds a node's runner, and the runner's name."""
+        """Yield a client of the rtcfd with a node's runner, and the runner's name."""
         parameters = Parameters(self.master.uri, "/test")
 
         def found() -> rendezvous.Meeting | None:
@@ -168,14 +168,14 @@ class Launching:
             yield client, meeting.runner
 
     def end(self) -> None:
-        """End what is left; show for a test that failed what was printed."""
+        """End all remaining processes; print their output if the test failed."""
         for process in reversed(self._processes):
             process.make_sure()
             print(f"--- {process.command}:\n{process.output()}")
 
 
 def left_over(marker: str) -> list[str]:
-    """Return the command lines of processes that have a text in them."""
+    """Return the command lines of processes that contain a text."""
     found = []
     for process in Path("/proc").glob("[0-9]*"):
         try:

@@ -1,20 +1,20 @@
-"""A ROS node beside a loop; the tests start it as a program of its own.
+"""A ROS node that communicates with a loop; the tests start it as a separate program.
 
 peer.py record TOPIC       prints each std_msgs/Float64 it receives, exactly (hexadecimal)
 peer.py latch TOPIC VALUE  publishes one std_msgs/Float64, latched
-peer.py text TOPIC SIZE    publishes one std_msgs/String of so many characters, latched
+peer.py text TOPIC SIZE    publishes one std_msgs/String of SIZE characters, latched
 peer.py sizes TOPIC        prints the length in characters of each std_msgs/String it receives
 peer.py numbers TOPIC       prints each std_msgs/Int32 it receives
 peer.py count TOPIC         prints 0 for each std_msgs/Int64 it receives
 peer.py rosout NODE        prints each record that NODE publishes on /rosout, as JSON
 peer.py any TOPIC...       receives messages of any type of all these topics
 
-peer.py console LOGGER      prints each record of a logger, as JSON, where rqt_console looks
-peer.py graph               prints once, as JSON, what rqt_graph draws between nodes
-peer.py tune NODE CHANGE    tunes a node (a JSON object) as rqt_reconfigure does; prints, as JSON,
-                            what can be tuned, and the values whenever they change
+peer.py console LOGGER      prints each record of a logger, as JSON, from rqt_console's topic
+peer.py graph               prints once, as JSON, the connections that rqt_graph draws
+peer.py tune NODE CHANGE    changes a node's parameters (a JSON object) as rqt_reconfigure does;
+                            prints, as JSON, their descriptions, and the values at each change
 
-Others print `connected` when they have met their peers.
+The others print `connected` when they are connected to their peers.
 """
 
 import json
@@ -34,8 +34,8 @@ _POLL_S = 0.01
 
 
 def _print(message: Any) -> None:
-    # In one piece, as several threads do it: print() writes the end of a line for itself.
-    # Messages come in bursts; flushed by _stay() instead of one by one.
+    # A single write, since several threads call this: print() writes the newline separately.
+    # Messages come in bursts; _stay() flushes them together.
     sys.stdout.write(f"{float(message.data).hex()}\n")
 
 
@@ -85,11 +85,11 @@ def _tune(node: str, change: str) -> None:
 
 
 def _connections(peer: Any, publisher: str = "") -> int:
-    """Return how many connections carry messages; of a subscriber, those to one node if named."""
+    """Return the number of established connections; for a subscriber, to `publisher` if named."""
     if isinstance(peer, rospy.Publisher):
         return int(peer.get_num_connections())
-    # rospy counts those that it is about to make as well. The publisher's header, which names it,
-    # comes when it has accepted us.
+    # rospy also counts connections that it has not established yet. The publisher's header, which
+    # contains its name, arrives once it has accepted the connection.
     met = [each.callerid_pub for each in peer.impl.connections if each.callerid_pub != "unknown"]
     return sum(not publisher or name == publisher for name in met)
 
@@ -102,12 +102,12 @@ def _stay(*peers: Any, publisher: str = "") -> None:
         sys.stdout.flush()
         time.sleep(_POLL_S)
     sys.stdout.flush()
-    # At once: threads that still write would make Python abort.
+    # Immediately: Python would abort on threads that still write.
     os._exit(0)
 
 
 def main() -> None:
-    """Do what the command line says until the end of the node."""
+    """Run the command of the command line until the end of the node."""
     action, topic, *values = sys.argv[1:] if len(sys.argv) > 2 else [sys.argv[1], ""]
     publisher: Any
     rospy.init_node("peer", anonymous=True)
@@ -120,7 +120,7 @@ def main() -> None:
     elif action == "count":
         _stay(rospy.Subscriber(topic, Int64, lambda _: sys.stdout.write("0x0p0\n")))
     elif action == "rosout":
-        # Every node publishes on /rosout, we too.
+        # Every node publishes on /rosout, including this one.
         records = rospy.Subscriber("/rosout", Log, _print_record, topic, tcp_nodelay=True)
         _stay(records, publisher=topic)
     elif action == "console":

@@ -1,4 +1,4 @@
-"""What the system says about a loop's real-time thread and its process, by proc(5)."""
+"""The system's data on a loop's real-time thread and its process, from proc(5)."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,15 +12,15 @@ _NO_LOCK = "memory is not locked"
 
 @dataclass(frozen=True)
 class Usage:
-    """What it has used since its start."""
+    """Resource usage since the start of the thread."""
 
     page_faults: int
-    preempted: int  # how often the CPU was taken from it
-    slept: int  # how often it gave the CPU up
+    preempted: int  # involuntary context switches
+    slept: int  # voluntary context switches
 
 
 class RealtimeThread:
-    """The thread of a loop that has just started; what it does from here on is counted."""
+    """The thread of a loop that has just started; counts from its construction on."""
 
     def __init__(self, client: rtcf.Client, runner: str = "rt_runner") -> None:
         self._client = client
@@ -38,10 +38,10 @@ class RealtimeThread:
         return status if status.realtime_tid and status.iteration else None
 
     def check(self) -> None:
-        """See that it has taken no page fault, and that no cycle was late of its own doing.
+        """Check that it had no page fault, and caused no late cycle itself.
 
-        Cycles and changes that the machine, or the machine's host, began late or interrupted are
-        not its doing: they are few, and come when they like.
+        It does not count late or interrupted cycles and changes that are due to the machine or
+        its host: these are few, and random.
         """
         found = self._client.get_statistics(self._runner)
         if self._locked:
@@ -51,7 +51,7 @@ class RealtimeThread:
             assert found.duration.p99_ns < self._period_ns, found.duration
 
     def usage(self) -> Usage:
-        """Return what it has used so far."""
+        """Return the resource usage so far."""
         folder = Path(f"/proc/{self.process}/task/{self.id}")
         text = (folder / "stat").read_text()
         fields = text[text.rindex(")") + 2 :].split()
@@ -64,6 +64,6 @@ class RealtimeThread:
 
 
 def resident_kb(process: int) -> int:
-    """Return the memory of a process, in KiB."""
+    """Return the resident memory of a process, in KiB."""
     lines = Path(f"/proc/{process}/status").read_text().splitlines()
     return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS:"))

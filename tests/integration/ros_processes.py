@@ -1,4 +1,4 @@
-"""A private ROS master, and nodes at it; each a process of its own."""
+"""A private ROS master and its nodes, each a process."""
 
 import json
 import os
@@ -24,10 +24,10 @@ _reserved: list[socket.socket] = []  # until this process ends
 
 
 def reserve_port() -> int:
-    """Return a TCP port that is this process's, also while nobody listens on it.
+    """Return a TCP port that is reserved for this process, even while nothing listens on it.
 
-    The kernel gives it to no connection, as it is outside of the range for these; other tests on
-    this machine see that its name is taken.
+    It is outside the kernel's range for outgoing connections. Other tests on this machine see
+    that its name is taken.
     """
     lowest, highest = map(int, _RANGE.read_text().split())
     ports: list[int] = [*range(10_000, lowest), *range(highest + 1, 65_536)]
@@ -37,7 +37,7 @@ def reserve_port() -> int:
         try:
             with socket.socket() as probe:
                 name.bind(f"\0rtcf-test-port-{port}")
-                # What has ended there may linger, as for a server that is started again.
+                # Old connections may linger, as for a server that restarts.
                 probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
                 probe.bind(("", port))
                 probe.listen()
@@ -50,7 +50,7 @@ def reserve_port() -> int:
 
 
 class Master:
-    """roscore; all its files are in `folder`."""
+    """roscore with its files in `folder`."""
 
     def __init__(self, folder: Path) -> None:
         self.port = reserve_port()
@@ -61,10 +61,10 @@ class Master:
         self._nodes: list[Node] = []
 
     def start(self) -> None:
-        """Start it and return as soon as it answers."""
+        """Start it and wait until it answers."""
 
         def answers() -> bool:
-            # It has less patience with its own master than a busy machine needs.
+            # roscore waits less long for its own master than a busy machine needs.
             if self._process is None or self._process.poll() is not None:
                 self._launch()
             return bool(rosgraph.is_master_online(self.uri))
@@ -83,13 +83,13 @@ class Master:
             )
 
     def end(self) -> None:
-        """End it, and nodes that a test that failed has left."""
+        """End it, and nodes that a failed test leaves running."""
         for node in self._nodes:
             node.kill()
         assert self._process is not None
-        # The master answers before roscore has begun to mind it. Later its exit status says
-        # whether it was interrupted while it did something, which is nothing to us.
-        wait_for(lambda: "started core service" in self._log.read_text(), "all of roscore")
+        # The master answers before roscore has started to watch it. Later, roscore's exit status
+        # depends on whether the signal interrupted an action; it is ignored.
+        wait_for(lambda: "started core service" in self._log.read_text(), "the start of roscore")
         self._process.send_signal(signal.SIGINT)
         self._process.wait(DEADLINE_S)
 
@@ -103,10 +103,10 @@ class Master:
         }
 
     def run(self, *command: str, ok: bool = True) -> str:
-        """Run a command of ROS; return what it prints."""
+        """Run a command of ROS; return its output."""
         done = subprocess.run(
             command,
-            # dynparam takes the first python3 there is, which must be Debian's.
+            # dynparam uses the first python3 on PATH, which must be Debian's.
             env=self.environment() | {"PATH": f"/usr/bin:{os.environ['PATH']}"},
             cwd=self._folder,
             capture_output=True,
@@ -122,28 +122,28 @@ class Master:
         return yaml.safe_load(self.run("rosservice", "call", service, request))
 
     def services(self) -> set[str]:
-        """Return the services there are."""
+        """Return the registered services."""
         return {name for name, _ in rosgraph.Master("/test", self.uri).getSystemState()[2]}
 
     def parameter(self, name: str) -> Any:
-        """Return a parameter's value; None if there is none."""
+        """Return a parameter's value; None if it is not set."""
         try:
             return rosgraph.Master("/test", self.uri).getParam(name)
         except rosgraph.MasterError:
             return None
 
     def topics(self) -> tuple[set[str], set[str]]:
-        """Return the topics that are published and those that are subscribed."""
+        """Return the published and the subscribed topics."""
         state = rosgraph.Master("/test", self.uri).getSystemState()
         return {topic for topic, _ in state[0]}, {topic for topic, _ in state[1]}
 
     def subscribers(self, topic: str) -> set[str]:
-        """Return the nodes that have told the master that they subscribe a topic."""
+        """Return the nodes that have registered a subscription of a topic."""
         _, subscribed, _ = rosgraph.Master("/test", self.uri).getSystemState()
         return {node for name, nodes in subscribed if name == topic for node in nodes}
 
     def listeners(self, node: str, topic: str) -> set[str]:
-        """Return the nodes to which what a node publishes on a topic goes now, as it says."""
+        """Return the nodes that now receive a node's messages on a topic, as the node reports."""
         uri = rosgraph.Master("/test", self.uri).lookupNode(node)
         asked: Any = xmlrpc.client.ServerProxy(uri)
         _, _, connections = asked.getBusInfo("/test")
@@ -157,7 +157,7 @@ class Master:
 
 
 class Node:
-    """A rospy node, see peer.py; what it prints is in a file."""
+    """A rospy node, see peer.py; its output goes to a file."""
 
     def __init__(self, environment: dict[str, str], folder: Path, *arguments: str) -> None:
         self._output = folder / f"node-{time.monotonic_ns()}"
@@ -171,23 +171,23 @@ class Node:
 
     @property
     def pid(self) -> int:
-        """Its process."""
+        """Its process id."""
         return self._process.pid
 
     def wait_until_connected(self) -> None:
-        """Return when it says that it has met its peer."""
+        """Wait until it reports its connection."""
         wait_for(lambda: "connected" in self._lines(), "the node's connection")
 
     def wait_for_values(self, count: int) -> None:
-        """Return when it has received so many."""
+        """Wait until it has received `count` values."""
         wait_for(lambda: len(self.values()) >= count, f"{count} messages")
 
     def values(self) -> list[float]:
-        """Return what it has received so far."""
+        """Return the values received so far."""
         return [float.fromhex(line) for line in self._lines() if line != "connected"]
 
     def records(self) -> list[dict[str, Any]]:
-        """Return the log records it has received so far."""
+        """Return the log records received so far."""
         return [json.loads(line) for line in self._lines() if line.startswith("{")]
 
     def end(self) -> None:
@@ -196,10 +196,10 @@ class Node:
         assert self._process.wait(DEADLINE_S) == 0
 
     def kill(self) -> None:
-        """End it at once, if it has not ended."""
+        """Kill it if it still runs."""
         self._process.kill()
         self._process.wait()
 
     def _lines(self) -> list[str]:
-        # The last one may be half written.
+        # The last line may be incomplete.
         return self._output.read_text().split("\n")[:-1]

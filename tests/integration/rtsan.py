@@ -1,4 +1,4 @@
-"""The executor that is built with RealtimeSanitizer, and what it has to say."""
+"""The executor built with RealtimeSanitizer, and its reports."""
 
 from pathlib import Path
 
@@ -11,15 +11,15 @@ HOW_TO_BUILD = (
     f"there is no {EXECUTOR}: cmake -S . -B {EXECUTOR.parents[1].name} -G Ninja "
     "-DRTCF_SANITIZE=realtime -DCMAKE_CXX_COMPILER=clang++-22, and build rtcf-executor there"
 )
-# Of all reports, as a loop that was ended at the first would hide the others; with names by what
-# this machine has for that.
+# All reports: stopping at the first one would hide the others. Names are resolved by the tool
+# that this machine has.
 ENVIRONMENT = {"RTSAN_OPTIONS": sanitizer_options()}
 
 
 def sanitized_daemon(folder: Path, settings: str) -> Daemon:
-    """Return an rtcfd whose executors report what is not real-time safe, into its log."""
+    """Return an rtcfd whose executors log calls that are not real-time safe."""
     assert EXECUTOR.exists(), HOW_TO_BUILD
-    # A report is made inside the cycle, and takes long.
+    # A report is written within the cycle, and is slow.
     return Daemon(
         folder,
         "[runner]\nstall_timeout_ms = 60000\n" + settings,
@@ -29,5 +29,5 @@ def sanitized_daemon(folder: Path, settings: str) -> Daemon:
 
 
 def reports(daemon: Daemon) -> list[Violation]:
-    """Return all that was reported so far; of an ended daemon, all."""
+    """Return all reports so far; of an ended daemon, all."""
     return list(violations(daemon.log().splitlines()))

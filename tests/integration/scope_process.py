@@ -1,4 +1,4 @@
-"""`rtcfctl scope` as a process, and what somebody asks of it."""
+"""`rtcfctl scope` as a process, and requests to it."""
 
 import http.client
 import json
@@ -16,12 +16,12 @@ from rtcf.closing import Closing
 
 
 class ScopeProcess(Closing):
-    """A scope of a daemon; ends at the end of its `with`."""
+    """A scope of a daemon; ends with its `with` block."""
 
     def __init__(
         self, daemon: Daemon, *arguments: str, display: Mapping[str, str] | None = None
     ) -> None:
-        """`display` is the environment that has a display, and a browser for it."""
+        """`display` is an environment with a display and its browser."""
         log = self.log = Path(tempfile.mkdtemp(dir=daemon.folder)) / "said"
         environment = daemon.environment() | {"XDG_STATE_HOME": str(daemon.folder / "home")}
         for each in ("DISPLAY", "WAYLAND_DISPLAY"):
@@ -31,7 +31,7 @@ class ScopeProcess(Closing):
             self.process = subprocess.Popen(
                 [str(BUILD_TREE / "bin" / "rtcfctl"), "scope", *arguments],
                 env=environment, stdin=subprocess.DEVNULL, stdout=to, stderr=to,
-                # Where tests run in the background Ctrl-C is ignored.
+                # Ctrl-C is ignored where tests run in the background.
                 preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
             )  # fmt: skip
 
@@ -47,7 +47,7 @@ class ScopeProcess(Closing):
         self.token = self.address.partition("token=")[2]
 
     def news(self) -> str:
-        """Return what it has said since this was asked last."""
+        """Return its output since the last call."""
         said = self.log.read_text()
         news, self._told = said[self._told :], len(said)
         return news
@@ -60,9 +60,9 @@ class ScopeProcess(Closing):
         self, path: str, method: str = "GET", body: str | None = None, *, token: str | None = None,
         **headers: str,
     ) -> tuple[int, bytes]:  # fmt: skip
-        """Return status and body of an answer; of no other headers than these.
+        """Return status and body of an answer to a request with only these headers.
 
-        `_` in the name of a header is `-`; an empty token says none.
+        `_` in the name of a header stands for `-`; an empty token sends none.
         """
         connection = http.client.HTTPConnection("127.0.0.1", self.port, timeout=DEADLINE_S)
         try:
@@ -83,7 +83,7 @@ class ScopeProcess(Closing):
             connection.close()
 
     def raw(self, data: bytes, patience_s: float = DEADLINE_S) -> tuple[int, bytes]:
-        """Send any bytes; return status and body of the answer: 0 if none comes for so long."""
+        """Send any bytes; return status and body of the answer; status 0 if none arrives."""
         with socket.create_connection(("127.0.0.1", self.port), timeout=patience_s) as connection:
             answer = http.client.HTTPResponse(
                 connection, method=data.split(b" ")[0].decode("latin1")
@@ -100,7 +100,7 @@ class ScopeProcess(Closing):
         return str(self.told("/api/session", "POST")["session"])
 
     def told(self, path: str, method: str = "GET", body: str | None = None) -> Any:
-        """Return what an answer tells in JSON."""
+        """Return the JSON content of an answer."""
         status, text = self.ask(path, method, body)
         assert status == 200, text
         return json.loads(text)

@@ -1,4 +1,4 @@
-"""A page of the scope as its server sees one: what it says, and what it hears."""
+"""The WebSocket of a scope's page, as its server sees it."""
 
 import json
 import struct
@@ -10,21 +10,21 @@ from daemon_process import DEADLINE_S
 from numpy.typing import NDArray
 from scope_process import ScopeProcess
 
-HEAD = struct.Struct("<BBHIIIdd8x")  # as rtcf_scope.wire tells
+HEAD = struct.Struct("<BBHIIIdd8x")  # as in rtcf_scope.wire
 CYCLES, SHOT = 1, 2
 FIXED = 4  # columns before the traces
 
 
 class ScopePage:
-    """A page that is connected."""
+    """A connected page."""
 
     def __init__(self, socket: aiohttp.ClientWebSocketResponse) -> None:
         self._socket = socket
         self.texts: list[dict[str, Any]] = []
-        self._is_new = False  # the last of them, for `text`
+        self._is_new = False  # whether the last message is unread, for `text`
 
     async def say(self, **words: Any) -> None:
-        """Say what is watched, or armed."""
+        """Send the watched signals or the trigger."""
         await self._socket.send_json(words)
 
     async def send(self, text: str) -> None:
@@ -41,7 +41,7 @@ class ScopePage:
     async def binary(
         self, kind: int, traces: int | None = None
     ) -> tuple[tuple[Any, ...], NDArray[np.float64]]:
-        """Return head and columns of the next binary message of a kind, with so many traces."""
+        """Return head and columns of the next binary message of a kind with `count` traces."""
         while True:
             found = await self._hear(kind)
             if found is not None and traces in (None, len(found[1]) - FIXED):
@@ -61,7 +61,7 @@ class ScopePage:
 
 
 class Visit:
-    """A page's WebSocket, in an `async with`."""
+    """A page's WebSocket, for an `async with`."""
 
     def __init__(self, scope: ScopeProcess, runner: str = "") -> None:
         self._scope = scope

@@ -1,4 +1,4 @@
-"""What an executor shares with rtcfd, opened as rtcfd does: it outlives the process."""
+"""An executor's memory shared with rtcfd, opened as by rtcfd: it outlives the process."""
 
 import os
 from pathlib import Path
@@ -19,6 +19,6 @@ class SharedMemory:
         self.recorder = FlightRecorder(pid, number("rtcf-flight-recorder"))
 
     def close(self) -> None:
-        """Let go of both."""
+        """Close both."""
         os.close(self.frames)
         self.recorder.close()

@@ -1,4 +1,4 @@
-"""A terminal with a command in it: what a person would see, and keys."""
+"""A terminal with a command in it: its screen, and keys to type."""
 
 import codecs
 import os
@@ -18,12 +18,12 @@ _PIECE = re.compile(
 
 
 class _Cells:
-    """The characters of a terminal that does not wrap, as a VT100 shows them: whoever writes into
-    the last column stays there, and what is erased next is that character."""
+    """The characters of a terminal without wrapping, as on a VT100: the cursor stays in the
+    last column after a write there, and the next erase deletes that character."""
 
     def __init__(self, columns: int, lines: int) -> None:
         self.resize(columns, lines)
-        self.picture = ""  # the last one that was drawn whole
+        self.picture = ""  # the last complete screen
 
     def resize(self, columns: int, lines: int) -> None:
         self._columns = columns
@@ -31,7 +31,7 @@ class _Cells:
         self._row = self._column = 0
 
     def feed(self, text: str) -> str:
-        """Take what a program writes; return the begin of a sequence whose rest has not come."""
+        """Process a program's output; return the start of an incomplete sequence."""
         at = 0
         while (found := _PIECE.match(text, at)) is not None:
             at = found.end()
@@ -90,7 +90,7 @@ class Terminal:
             [BUILD_TREE / "bin" / "rtcfctl", *words],
             env=daemon.environment() | {"NO_COLOR": "1"},
             stdin=self.theirs, stdout=self.theirs, stderr=self.theirs,
-            # As the leader of a session whose terminal this is: a new size is told by a signal.
+            # As the leader of a session with this terminal: a signal reports a new size.
             start_new_session=True, preexec_fn=self._take_terminal,
         )  # fmt: skip
         self.shown = b""
@@ -103,7 +103,7 @@ class Terminal:
         os.close(self._ours)
 
     def see(self, pattern: str) -> str:
-        """Wait for something in a picture that is whole; return that picture, as it is shown."""
+        """Wait for a complete screen that matches; return it as shown."""
         deadline = time.monotonic() + DEADLINE_S
         while True:
             self._read()
@@ -127,14 +127,14 @@ class Terminal:
         return int(self.process.wait())
 
     def resize(self, columns: int, lines: int) -> None:
-        """Give the terminal another size."""
+        """Change the size of the terminal."""
         self._read()
         self._cells.resize(columns, lines)
         termios.tcsetwinsize(self._ours, (lines, columns))
 
     def _take_terminal(self) -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
-        # The first terminal that such a leader opens becomes its own.
+        # The first terminal that a session leader opens becomes its controlling terminal.
         os.close(os.open(os.ttyname(self.theirs), os.O_RDWR))
 
     def _read(self) -> None:

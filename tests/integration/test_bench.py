@@ -45,9 +45,7 @@ def mimo() -> Iterator[Bench]:
     values=arrays.arrays(float, 50, elements=st.floats(-1e6, 1e6)),
     sent=arrays.arrays(bool, 50, elements=st.booleans()),
 )
-def test_each_cycle_reads_its_row_and_nothing_where_it_is_masked(
-    mimo: Bench, values: Any, sent: Any
-) -> None:
+def test_each_cycle_reads_its_row_except_masked_values(mimo: Bench, values: Any, sent: Any) -> None:
     response = mimo.run({"in1": 2.0, "in2": MASKED.array(values, mask=~sent)})
     assert response["out1"].tolist() == [
         2.0 + value if there else 2.0 for value, there in zip(values, sent, strict=True)
@@ -56,7 +54,7 @@ def test_each_cycle_reads_its_row_and_nothing_where_it_is_masked(
     assert response.time[:2].tolist() == [0.0, 0.001]
 
 
-def test_the_same_run_twice_is_the_same_bit_by_bit() -> None:
+def test_two_equal_runs_give_identical_bits() -> None:
     with Bench("rtcf_examples/Wave", path=PATH, frequency_hz=2000, amplitude=2.5) as bench:
         assert bench.parameters == {
             "amplitude": 2.5, "rate": 1.0, "shape": "sine", "silent": False
@@ -80,7 +78,7 @@ def test_many_cycles_go_in_several_requests(mimo: Bench) -> None:
     assert len(response["out2"]) == len(rows)
 
 
-def test_a_graph_file_is_run_whole(tmp_path: Path, daemon: Daemon) -> None:
+def test_a_whole_graph_file_runs(tmp_path: Path, daemon: Daemon) -> None:
     with rtcf.Client(daemon.socket) as client:
         fig_1.load(client)
     file = tmp_path / "fig1.yaml"
@@ -103,7 +101,7 @@ def test_a_graph_file_is_run_whole(tmp_path: Path, daemon: Daemon) -> None:
             print(bench.state)
 
 
-def test_a_component_that_fails_is_a_refusal_with_its_words() -> None:
+def test_the_error_of_a_failing_component_is_raised() -> None:
     with Bench("rtcf_faults/Throws", path=PATH) as bench:
         for _ in range(2):
             with pytest.raises(refusals.LoopFailedError, match="/Throws"):
@@ -132,7 +130,7 @@ def test_a_component_that_crashes_is_named() -> None:
         ({}, 0, "set steps to at least 1, or pass an array"),
     ],
 )
-def test_inputs_that_do_not_fit_are_refused_and_the_bench_goes_on(
+def test_unsuitable_inputs_are_rejected_and_the_bench_continues(
     mimo: Bench, inputs: dict[str, Any], steps: int | None, said: str
 ) -> None:
     with pytest.raises(ValueError, match=".") as refusal:
@@ -141,7 +139,7 @@ def test_inputs_that_do_not_fit_are_refused_and_the_bench_goes_on(
     assert mimo.run(steps=1)["out1"].tolist() == [1.0]
 
 
-def test_what_nobody_wrote_is_named(mimo: Bench) -> None:
+def test_an_output_that_was_not_written_is_named(mimo: Bench) -> None:
     with pytest.raises(KeyError, match='no output out was written; did you mean "out'):
         mimo.run(steps=1)["out"]
 
@@ -158,7 +156,7 @@ def test_what_nobody_wrote_is_named(mimo: Bench) -> None:
         ("fig.yaml", {"kp": 1.0}, "fig.yaml: set parameters in the graph file"),
     ],
 )
-def test_what_cannot_be_tested_is_refused(what: str, arguments: dict[str, Any], said: str) -> None:
+def test_untestable_arguments_are_rejected(what: str, arguments: dict[str, Any], said: str) -> None:
     all_arguments: dict[str, Any] = {"path": PATH, **arguments}
     with pytest.raises((ValueError, rtcf.RtcfError)) as refusal:
         Bench(what, **all_arguments)
@@ -178,10 +176,10 @@ def test_benches_of_the_plugin_end_with_their_test(tmp_path: Path) -> None:
     )
     done = run_pytest(tmp_path)
     assert "1 failed, 1 passed" in done.stdout, done.stdout + done.stderr
-    assert "ready; runners: none" in done.stdout, "what rtcfd said is with the failure"
+    assert "ready; runners: none" in done.stdout, "rtcfd's output is part of the failure"
 
 
-def test_the_test_of_the_page_passes(tmp_path: Path) -> None:
+def test_the_example_test_of_the_docs_passes(tmp_path: Path) -> None:
     page = (TREE / "docs" / "components.md").read_text()
     code = re.search(r"### From Python.*?```python\n(.*?)```", page, re.DOTALL)
     assert code is not None

@@ -17,14 +17,14 @@ COUNT = 1000
 
 
 def _names(count: int = COUNT) -> list[str]:
-    """Return names whose alphabet has nothing to do with their place in the chain."""
+    """Return names whose alphabetical order is unrelated to their order in the chain."""
     names = [f"c{index}" for index in range(1, count)]
     random.Random(1).shuffle(names)
     return ["one", *names]
 
 
 def _specs(names: list[str]) -> list[graph_pb2.ComponentSpec]:
-    """Return Mimo in a chain, each of which adds the 1 that the first one sends to all."""
+    """Return a chain of Mimo in which each adds the 1 that the first one sends to all."""
     first = fig_1.mimo(names[0], {"out1": "/one"})
     rest = (
         fig_1.mimo(name, {"in1": f"/link{place - 1}", "in2": "/one", "out1": f"/link{place}"})
@@ -35,7 +35,7 @@ def _specs(names: list[str]) -> list[graph_pb2.ComponentSpec]:
 
 @dataclass(frozen=True)
 class Chain:
-    """A daemon with the chain loaded; shared, as that takes a while."""
+    """A daemon with the chain loaded; shared, because loading takes a while."""
 
     daemon: Daemon
     client: rtcf.Client
@@ -63,7 +63,7 @@ def test_a_thousand_components_run_in_the_order_of_their_chain(chain: Chain) -> 
     assert chain.daemon.ctl("order").stdout.split() == order
 
     client.step(1)
-    # Each value has gone through the whole chain in one cycle.
+    # Each value passes the whole chain within one cycle.
     assert port_value(client, names[-1], "out1") == COUNT
     client.step(9)
     assert port_value(client, names[COUNT // 2], "out1") == COUNT // 2 + 1
@@ -76,9 +76,9 @@ def test_a_thousand_components_run_in_the_order_of_their_chain(chain: Chain) -> 
     client.stop()
 
 
-def test_a_ring_of_a_thousand_is_refused_in_a_line_that_can_be_read(chain: Chain) -> None:
+def test_a_ring_of_a_thousand_is_rejected_in_a_readable_line(chain: Chain) -> None:
     client, names = chain.client, chain.names
-    # /link0 is what the first link reads, and nobody writes yet.
+    # The first link reads /link0, which has no writer yet.
     closing = [f"in1:=/link{COUNT - 2}", "in2:=/one", f"out1:=/link{COUNT - 1}", "out2:=/link0"]
     last = rtcf.component("rtcf_examples", "Mimo", name=names[-1], remaps=closing)
     with pytest.raises(rtcf.RefusedError) as refused:
@@ -87,7 +87,7 @@ def test_a_ring_of_a_thousand_is_refused_in_a_line_that_can_be_read(chain: Chain
     assert f"{COUNT - 1 - 20} more connections" in line
     assert len(line) < 3000
     assert client.get_order() == [f"/{name}" for name in names]
-    # The first way out that it names is one.
+    # The first suggested command works.
     (port, *_) = re.findall(r"`rtcfctl break (\S+)`", line)
     assert chain.daemon.ctl("break", port).returncode == 0
     client.replace(names[-1], last)
@@ -112,7 +112,7 @@ def test_as_many_components_run_as_the_settings_allow(tmp_path: Path, count: int
 
 
 @pytest.mark.long
-def test_one_parameter_costs_a_cycle_what_it_costs_among_a_few(tmp_path: Path) -> None:
+def test_setting_a_parameter_takes_equally_long_in_a_large_graph(tmp_path: Path) -> None:
     shortest = {}
     for count in (5, 4000):
         folder = tmp_path / f"{count}"
@@ -132,5 +132,6 @@ def test_one_parameter_costs_a_cycle_what_it_costs_among_a_few(tmp_path: Path) -
             shortest[count] = taken.min_ns
             print(f"{count} components: {taken.min_ns} ns at least, {taken.p50_ns} ns as a rule")
         daemon.end()
-    # Of 100 each, so that nothing is said of the machine; all components' would be 800 fold.
+    # 100 changes each, so that the machine's load does not matter; updating all components would
+    # take 800 times as long.
     assert shortest[4000] < 20 * shortest[5]

@@ -1,5 +1,5 @@
-"""Changes of the graph while its loop runs at 1 kHz: the loop goes on, what stays keeps its
-values."""
+"""Changes of the graph while its loop runs at 1 kHz: no cycle is missed, and unchanged
+components keep their values."""
 
 import json
 
@@ -22,7 +22,7 @@ def _ports(text: str) -> list[control_pb2.PortName]:
     return [rtcf.parse_port(text)]
 
 
-def test_the_loop_misses_no_cycle_and_what_stays_keeps_its_values(client: rtcf.Client) -> None:
+def test_no_cycle_is_missed_and_unchanged_components_keep_their_values(client: rtcf.Client) -> None:
     client.set_runner(runner_pb2.RunnerSettings(frequency_hz=1000.0))
     client.load(_counter("stays"))
     fig_1.load(client)
@@ -31,7 +31,7 @@ def test_the_loop_misses_no_cycle_and_what_stays_keeps_its_values(client: rtcf.C
     for _ in range(ROUNDS):
         client.load(_counter("guest"))
         client.load(fig_1.mimo("spy", {"in1": "/R3_G2H1"}))
-        # R2 reads the previous cycle's values of F1, then those of this one again.
+        # R2 reads F1's values of the previous cycle, then those of the present cycle again.
         client.set_breaks(_ports("R2.in1"), True)
         assert client.get_order().index("/R2") < client.get_order().index("/R3")
         client.set_breaks(_ports("R2.in1"), False)
@@ -42,11 +42,11 @@ def test_the_loop_misses_no_cycle_and_what_stays_keeps_its_values(client: rtcf.C
         seen = wait_until_after(client, seen)
     assert client.get_status("rt_runner").runners[0].state == runner_pb2.RUNNER_STATE_RUNNING
     client.stop()
-    # It was updated in each cycle, and never began anew.
+    # It was updated in each cycle and never restarted.
     assert port_value(client, "stays", "out") == iteration(client)
 
 
-def test_a_replacement_begins_anew(client: rtcf.Client) -> None:
+def test_a_replacement_starts_from_scratch(client: rtcf.Client) -> None:
     client.load(_counter("old"))
     client.start()
     wait_for(lambda: port_value(client, "old", "out") > 500, "500 cycles")
@@ -71,7 +71,7 @@ def test_an_input_keeps_its_value_when_its_writer_leaves(client: rtcf.Client) ->
 
 
 def test_a_broken_input_reads_the_previous_cycle(daemon: Daemon, client: rtcf.Client) -> None:
-    # A ramp: each cycle, /x is one more than before.
+    # A ramp: /x grows by one per cycle.
     client.load(fig_1.mimo("ramp", {"in1": "/x", "out1": "/x", "in2": "/one"}, first=True))
     client.load(fig_1.mimo("one", {"out1": "/one"}))
     client.load(fig_1.mimo("reader", {"in1": "/x", "out1": "/y"}))
@@ -104,7 +104,7 @@ def test_parameters_change_while_the_loop_runs(daemon: Daemon, client: rtcf.Clie
     assert port_value(client, "knobs", "length") == 4
     assert daemon.ctl("set", "knobs", "mode:=idle").returncode == 0
     wait_for(lambda: port_value(client, "knobs", "product") == 0.0, "nothing")
-    # An integer is taken for a double.
+    # An integer is accepted for a double.
     assert daemon.ctl("set", "knobs", "mode:=run", "rate:=3", "enabled:=true").returncode == 0
     wait_for(lambda: port_value(client, "knobs", "product") == 12.0, "4 * 3")
     info = json.loads(daemon.ctl("info", "knobs", "-o", "json").stdout)
@@ -118,7 +118,7 @@ def _values(client: rtcf.Client, component: str) -> dict[str, object]:
     return {each.name: getattr(each.value, each.value.WhichOneof("kind")) for each in found}
 
 
-def test_a_replacement_keeps_the_parameters_that_it_does_not_name(
+def test_a_replacement_keeps_parameters_that_it_does_not_set(
     daemon: Daemon, client: rtcf.Client
 ) -> None:
     client.load(rtcf.component("rtcf_test", "Knobs", name="knobs", parameters=["rate:=2.5"]))
@@ -129,25 +129,25 @@ def test_a_replacement_keeps_the_parameters_that_it_does_not_name(
     assert _values(client, "knobs") == {
         "enabled": True, "count": 4, "rate": 2.5, "label": "theirs", "mode": "run",
     }  # fmt: skip
-    # They are of the saved graph, too.
+    # They are in the saved graph, too.
     saved = daemon.ctl("save").stdout
     assert "count: 4" in saved and "rate: 2.5" in saved and "label: theirs" in saved
     assert daemon.ctl("runner", "restart", "rt_runner").returncode == 0
     assert _values(client, "knobs")["count"] == 4
 
 
-def test_a_replacement_says_which_parameters_do_not_fit(
+def test_a_replacement_reports_parameters_that_do_not_fit(
     daemon: Daemon, client: rtcf.Client
 ) -> None:
     client.load(rtcf.component("rtcf_test", "Knobs", name="knobs", parameters=["rate:=2.5"]))
     done = daemon.ctl("replace", "knobs", "rtcf_test", "Counter")
     assert done.stdout == "replaced knobs by /knobs\n"
-    # Of the others nobody has chosen the value.
+    # No note about the others, whose values are defaults.
     note = "parameter rate = 2.5 is not kept: rtcf_test/Counter has no such parameter"
     assert done.stderr == f"rtcfctl: note: {note}\n"
 
 
-def test_a_replacement_begins_with_defaults_if_asked_to(
+def test_a_replacement_starts_with_defaults_if_requested(
     daemon: Daemon, client: rtcf.Client
 ) -> None:
     client.load(rtcf.component("rtcf_test", "Knobs", name="knobs", parameters=["rate:=2.5"]))

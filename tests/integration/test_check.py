@@ -1,4 +1,4 @@
-"""`rtcfctl check` with the executor that is built with RealtimeSanitizer."""
+"""`rtcfctl check` with the executor built with RealtimeSanitizer."""
 
 import json
 import subprocess
@@ -24,7 +24,7 @@ def check(*arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_all_components_that_come_with_rtcf_are_clean(client: rtcf.Client) -> None:
+def test_all_components_of_rtcf_are_clean(client: rtcf.Client) -> None:
     types = [each for each in client.list_types().types if each.package in OURS]
     assert len(types) >= 3
     for each in types:
@@ -47,7 +47,7 @@ def test_a_violation_is_shown_with_its_stack_and_line(
     assert done.returncode == 1
     assert called in done.stdout
     (frame,) = [line for line in done.stdout.splitlines() if "/misbehaves.cpp:" in line]
-    # addr2line gives a function that is inlined by its last name.
+    # addr2line reports only the innermost name of an inlined function.
     llvm = "llvm-symbolizer" in sanitizer_options()
     shown = f"(anonymous namespace)::{function}" if llvm else "fault"
     assert frame.strip().partition("  ")[0] == shown
@@ -98,19 +98,19 @@ def test_a_violation_below_a_component_in_python_is_shown_with_its_line(tmp_path
     assert "> self.out.write(math.sin(self.dt))" in done.stdout
 
 
-def test_what_a_component_does_with_its_device_is_allowed() -> None:
+def test_system_calls_for_devices_are_allowed() -> None:
     done = check("rtcf_test", "Device", "--cycles", "50")
     assert done.stdout == "rtcf_test/Device: clean in 50 cycles\n"
 
 
-def test_a_component_that_faults_is_refused() -> None:
+def test_a_failing_component_is_rejected() -> None:
     done = check("rtcf_faults", "NotFiniteStops")
     assert done.returncode == 1
     assert "is not finite" in done.stderr
 
 
 def check_plainly(*arguments: str) -> subprocess.CompletedProcess[str]:
-    """Check in the ordinary executor, as what is shown here is no sanitizer's."""
+    """Check in the ordinary executor, since this needs no sanitizer."""
     return subprocess.run(
         [str(BUILD_TREE / "bin" / "rtcfctl"), "check", *arguments,
          "--executor", str(BUILD_TREE / "bin" / "rtcf-executor")],
@@ -131,13 +131,13 @@ def check_plainly(*arguments: str) -> subprocess.CompletedProcess[str]:
         ),
     ],
 )
-def test_what_ends_the_process_is_told_as_what_it_is(name: str, said: str) -> None:
+def test_the_cause_of_a_dead_process_is_reported(name: str, said: str) -> None:
     done = check_plainly("rtcf_faults", name)
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1].startswith(f"rtcfctl: rtcf_faults/{name}: {said}")
 
 
-def test_outputs_that_carry_nan_are_told() -> None:
+def test_outputs_with_nan_are_reported() -> None:
     done = check_plainly("rtcf_faults", "WritesNan", "--cycles", "50")
     assert "rtcf_faults/WritesNan: output value had NaN or infinity\n" in done.stdout
     found = json.loads(check_plainly("rtcf_faults", "WritesNan", "-o", "json").stdout)

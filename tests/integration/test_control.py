@@ -1,4 +1,4 @@
-"""The client library: graphs, refusals, deaths, restarts, several runners; without ROS."""
+"""The client library: graphs, errors, crashes, restarts, several runners; without ROS."""
 
 import os
 import signal
@@ -80,7 +80,7 @@ def test_a_dead_executor_comes_back_with_its_graph(daemon: Daemon, client: rtcf.
     client.start()
     wait_for(lambda: iteration(client) > 0, "a cycle")
     os.kill(client.get_status().runners[0].pid, signal.SIGKILL)
-    # That it is down may be too short to be seen.
+    # The executor may be down too shortly to be observed.
     wait_for(lambda: "executor restarted in" in daemon.log(), "its recovery")
     assert "was killed by SIGKILL" in daemon.log()
     client.start()
@@ -107,10 +107,10 @@ def test_runners_are_independent(client: rtcf.Client) -> None:
     client.start()
     client.start("arm")
     os.kill(client.get_status("arm").runners[0].pid, signal.SIGKILL)
-    # It is down, and soon is there again and does not run.
+    # It is down, and soon restarts without running.
     wait_for(
         lambda: client.get_status("arm").runners[0].state != runner_pb2.RUNNER_STATE_RUNNING,
-        "its death",
+        "its end",
     )
     before = client.get_status("rt_runner").runners[0]
     assert before.state == runner_pb2.RUNNER_STATE_RUNNING

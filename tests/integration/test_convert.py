@@ -1,4 +1,4 @@
-"""`rtcfctl convert`: recordings in files of other programs, with each value of each cycle."""
+"""`rtcfctl convert`: recordings in other programs' formats, with each value of each cycle."""
 
 import csv
 import os
@@ -22,7 +22,7 @@ from rtcf.v1 import ports_pb2
 
 @pytest.fixture
 def recorded(running: Daemon, tmp_path: Path) -> Path:
-    """Give a recording of half a second."""
+    """Return a recording of half a second."""
     file = tmp_path / "run.mcap"
     done = running.ctl("record", "-o", str(file), "--duration", "0.5s")
     assert done.returncode == 0, done.stderr
@@ -34,7 +34,7 @@ def _lines(file: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(text))
 
 
-def test_a_line_of_csv_is_a_cycle_with_the_same_numbers(running: Daemon, recorded: Path) -> None:
+def test_csv_has_one_line_per_cycle_with_the_same_numbers(running: Daemon, recorded: Path) -> None:
     file = recorded.with_suffix(".csv")
     done = running.ctl("convert", str(recorded), str(file))
     assert (done.returncode, done.stderr) == (0, "")
@@ -52,7 +52,7 @@ def test_a_line_of_csv_is_a_cycle_with_the_same_numbers(running: Daemon, recorde
 
 
 def _batch(first: int, begin_ns: int, **states: tuple[str, "np.ndarray[Any, Any]"]) -> PortBatch:
-    """Return cycles as a stream tells them, 1 ms apart; `states`: type and values by name."""
+    """Return cycles as sent by a stream, 1 ms apart; `states`: type and values by name."""
     count = len(next(iter(states.values()))[1])
     columns = [
         ports_pb2.PortColumn(
@@ -75,7 +75,7 @@ def _batch(first: int, begin_ns: int, **states: tuple[str, "np.ndarray[Any, Any]
     return PortBatch(schema, 1, first, 0, False, message)
 
 
-def test_cells_of_what_was_not_there_are_empty_and_numbers_of_arrays_have_their_own(
+def test_missing_values_are_empty_cells_and_array_elements_have_columns(
     running: Daemon, tmp_path: Path
 ) -> None:
     gains = np.array([[0.1, 1e30], [np.nan, -np.inf], [3.0, 0.25]], "<f4")
@@ -84,7 +84,7 @@ def test_cells_of_what_was_not_there_are_empty_and_numbers_of_arrays_have_their_
         writer = McapWriter(out)
         recorder = Recorder(writer, "rt_runner")
         recorder.add(_batch(6, 10**18, gains=("float[2]", gains)))
-        # The loop was started anew: cycles 7 and 8 come again.
+        # The loop was restarted: cycles 7 and 8 occur again.
         recorder.add(
             _batch(7, 10**18 + 10**10, gains=("float[2]", gains[:2]), late=("uint64", late))
         )
@@ -120,7 +120,7 @@ def test_a_bag_has_the_messages_with_their_stamps(running: Daemon, recorded: Pat
         assert cycles == recording.cycles.tolist()
 
 
-def test_a_state_that_has_the_name_of_an_output_is_a_topic_of_its_own(tmp_path: Path) -> None:
+def test_a_state_with_the_name_of_an_output_is_a_separate_topic(tmp_path: Path) -> None:
     file = tmp_path / "run.mcap"
     with file.open("xb") as out:
         writer = McapWriter(out)
@@ -145,7 +145,7 @@ def test_md5_sums_are_those_of_ros(name: str) -> None:
     assert md5_of(kind._type, kind._full_text) == kind._md5sum
 
 
-def test_refused_in_a_line_and_nothing_is_left(running: Daemon, recorded: Path) -> None:
+def test_errors_are_one_line_and_leave_no_file(running: Daemon, recorded: Path) -> None:
     there = recorded.with_name("there.csv")
     there.write_text("mine")
     itself = recorded.with_name("itself.csv")
@@ -179,9 +179,7 @@ def test_refused_in_a_line_and_nothing_is_left(running: Daemon, recorded: Path) 
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".bag"])
-def test_where_there_is_no_room_it_is_said_in_one_line(
-    running: Daemon, recorded: Path, suffix: str
-) -> None:
+def test_a_full_disk_is_reported_in_one_line(running: Daemon, recorded: Path, suffix: str) -> None:
     to = recorded.with_name(f"full{suffix}")
     to.symlink_to("/dev/full")
     done = running.ctl("convert", str(recorded), str(to), "--force")
@@ -191,7 +189,7 @@ def test_where_there_is_no_room_it_is_said_in_one_line(
     assert to.is_symlink()
 
 
-def test_a_recording_of_somebody_else_has_no_lines(running: Daemon, tmp_path: Path) -> None:
+def test_a_recording_of_another_program_has_no_cycles(running: Daemon, tmp_path: Path) -> None:
     file = tmp_path / "other.mcap"
     with file.open("xb") as out:
         writer = McapWriter(out)
@@ -202,7 +200,7 @@ def test_a_recording_of_somebody_else_has_no_lines(running: Daemon, tmp_path: Pa
     assert not (tmp_path / "x.csv").exists()
 
 
-def test_without_rosbag_it_is_said_what_to_install(
+def test_without_rosbag_the_package_to_install_is_named(
     recorded: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     modules: Any = sys.modules

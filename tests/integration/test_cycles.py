@@ -1,5 +1,5 @@
-"""Graphs with loops of connections, of every kind, through the executor: none is adopted, and
-what the refusal says is true."""
+"""Graphs with loops of connections of every kind, through the executor: it rejects each of
+them, and its error is correct."""
 
 import itertools
 import random
@@ -18,7 +18,7 @@ Edge = tuple[int, int]
 
 
 def has_loop(nodes: int, edges: set[Edge]) -> bool:
-    """Tell whether any way leads back to where it began."""
+    """Return whether a path leads back to its start."""
     reached = [{to for origin, to in edges if origin == node} for node in range(nodes)]
     for _ in range(nodes):
         for node in range(nodes):
@@ -31,7 +31,7 @@ def pairs(nodes: int) -> list[Edge]:
 
 
 def samples() -> list[tuple[int, set[Edge]]]:
-    """All graphs with a loop of up to 2 components, and some of those of up to 5."""
+    """All graphs with a loop of up to 2 components, and some graphs of up to 5."""
     every = [
         (nodes, set(edges))
         for nodes in (1, 2)
@@ -59,7 +59,7 @@ def gather(nodes: int, edges: set[Edge]) -> list[graph_pb2.ComponentSpec]:
 
 
 def check_loop(line: str, edges: set[Edge]) -> None:
-    """See that the loop in a refusal is one: connections that there are, end to end."""
+    """Check that the loop in an error exists: a closed path of existing connections."""
     (text,) = re.findall(r"form a loop: (.*?);", line)
     steps = re.findall(r"/n(\d)\.out → /n(\d)\.in(\d)", text)
     assert text.count("→") == 2 * len(steps) - 1
@@ -70,7 +70,7 @@ def check_loop(line: str, edges: set[Edge]) -> None:
 
 
 @pytest.mark.parametrize("running", [False, True])
-def test_no_loop_is_adopted_and_each_advice_makes_an_order(
+def test_every_loop_is_rejected_and_each_suggested_break_gives_an_order(
     client: rtcf.Client, running: bool
 ) -> None:
     if running:
@@ -97,7 +97,7 @@ def test_no_loop_is_adopted_and_each_advice_makes_an_order(
                 del spec.breaks[:]
 
 
-def test_a_loop_that_grows_one_by_one_is_refused_where_it_closes(client: rtcf.Client) -> None:
+def test_a_growing_loop_is_rejected_when_it_closes(client: rtcf.Client) -> None:
     client.start()
     ring = gather(MOST, {(node, (node + 1) % MOST) for node in range(MOST)})
     for spec in ring[:-1]:
@@ -106,7 +106,7 @@ def test_a_loop_that_grows_one_by_one_is_refused_where_it_closes(client: rtcf.Cl
     with pytest.raises(rtcf.RefusedError) as refused:
         client.load(ring[-1])
     assert client.get_order() == order == [f"/n{node}" for node in range(MOST - 1)]
-    # Of the component that is not there yet, the break is an option of its load.
+    # For a component that is not loaded yet, the break is an option of its load.
     (option,) = re.findall(r"loading n4 with `(--break [^`]+)`", str(refused.value))
     ring[-1].breaks.append(option.split()[1])
     client.load(ring[-1])

@@ -1,4 +1,4 @@
-"""Stopping loops at their executors: rtcfd is stopped, dead or full, or the disk is full."""
+"""Stops of loops at their executors: rtcfd is frozen, dead or busy, or the disk is full."""
 
 import contextlib
 import os
@@ -19,7 +19,7 @@ from rtcf.v1 import runner_pb2
 from values import iteration
 
 RESUME = "[runner]\non_boot = 'resume'\norphan_timeout_s = 60.0\n" + NO_ROS
-STRANGER = 54321  # a uid that no user has
+STRANGER = 54321  # an unused uid
 ASK = (
     "import socket, sys\n"
     "peer = socket.socket(socket.AF_UNIX)\n"
@@ -39,13 +39,13 @@ def settings() -> str:
 
 
 def runs(client: rtcf.Client) -> bool:
-    """Tell whether the loop runs."""
+    """Return whether the loop runs."""
     state: int = client.get_status("rt_runner").runners[0].state
     return state == runner_pb2.RUNNER_STATE_RUNNING
 
 
 def begin(client: rtcf.Client) -> None:
-    """Start a loop and see cycles."""
+    """Start a loop and wait for cycles."""
     if not client.get_order():
         client.load(rtcf.component("rtcf_test", "Counter", name="steady"))
     client.start()
@@ -53,18 +53,18 @@ def begin(client: rtcf.Client) -> None:
 
 
 def stop_by_command(daemon: Daemon, *options: str, out: str = "stopped") -> str:
-    """Stop by rtcfctl, which has to report success; return its standard error."""
+    """Stop with rtcfctl, which must report success; return its standard error."""
     done = daemon.ctl("stop", *options)
     assert (done.returncode, done.stdout) == (0, f"{out}\n"), done.stderr
     return done.stderr
 
 
 def mark(daemon: Daemon) -> Path:
-    """Return the file by which the loop would be resumed."""
+    """Return the file that marks the loop for resuming."""
     return daemon.folder / "state" / "rt_runner.running"
 
 
-def test_a_frozen_daemon_holds_up_no_stop_and_is_right_when_it_lives_again(
+def test_a_frozen_daemon_blocks_no_stop_and_learns_of_it_later(
     daemon: Daemon, client: rtcf.Client
 ) -> None:
     begin(client)
@@ -72,7 +72,7 @@ def test_a_frozen_daemon_holds_up_no_stop_and_is_right_when_it_lives_again(
     with stopped(daemon.pid):
         said = stop_by_command(daemon)
         assert "at its executor, because rtcfd does not answer within 0.5 s" in said
-        # Disk says so, whatever becomes of rtcfd now.
+        # The stop is on disk, whatever happens to rtcfd now.
         assert not mark(daemon).exists()
     assert not runs(client)
     wait_for(lambda: "loop stopped at its executor by " in daemon.log(), "the log")
@@ -83,7 +83,7 @@ def test_a_frozen_daemon_holds_up_no_stop_and_is_right_when_it_lives_again(
     begin(client)
 
 
-def test_a_start_that_was_asked_before_the_stop_starts_nothing(
+def test_a_start_requested_before_the_stop_starts_nothing(
     daemon: Daemon, client: rtcf.Client
 ) -> None:
     begin(client)
@@ -96,7 +96,7 @@ def test_a_start_that_was_asked_before_the_stop_starts_nothing(
             text=True,
         ) as early,
     ):
-        # It is connected, and waits for its answer.
+        # It is connected, and waits for the answer.
         wait_for(lambda: _connections(daemon) > 1, "the early start")
         assert daemon.ctl("stop").returncode == 0
         os.kill(daemon.pid, signal.SIGCONT)
@@ -110,14 +110,14 @@ def _connections(daemon: Daemon) -> int:
     return sum(line.endswith(str(daemon.socket)) for line in lines) - 1
 
 
-def test_a_dead_daemon_holds_up_no_stop_and_the_next_one_resumes_nothing(
+def test_a_dead_daemon_blocks_no_stop_and_its_successor_resumes_nothing(
     daemon: Daemon, client: rtcf.Client
 ) -> None:
     begin(client)
     executor = client.get_status("rt_runner").runners[0].pid
     daemon.end(signal.SIGKILL)
     stop_by_command(daemon, "--all", out="rt_runner stopped")
-    # Also without the executor, which knows of the stop.
+    # Also without the executor, which remembers the stop.
     os.kill(executor, signal.SIGKILL)
     daemon.start()
     with rtcf.Client(daemon.socket) as again:
@@ -126,7 +126,7 @@ def test_a_dead_daemon_holds_up_no_stop_and_the_next_one_resumes_nothing(
         assert again.get_order() == ["/steady"]
 
 
-def test_the_next_daemon_takes_over_that_the_loop_was_stopped(
+def test_the_next_daemon_learns_that_the_loop_was_stopped(
     daemon: Daemon, client: rtcf.Client
 ) -> None:
     begin(client)
@@ -141,7 +141,7 @@ def test_the_next_daemon_takes_over_that_the_loop_was_stopped(
     assert "by root" in daemon.log() or os.geteuid()
 
 
-def test_clients_that_fill_all_slots_hold_up_no_stop(tmp_path: Path) -> None:
+def test_clients_in_all_slots_block_no_stop(tmp_path: Path) -> None:
     daemon = Daemon(tmp_path, "[limits]\nclients = 4\n" + NO_ROS)
     daemon.start()
     others: list[socket.socket] = []
@@ -175,8 +175,8 @@ def _answers(client: rtcf.Client) -> bool:
     return True
 
 
-def test_a_full_disk_holds_up_no_stop_and_the_loop_stays_stopped(tmp_path: Path) -> None:
-    # No file can grow: what a full disk does to whoever writes.
+def test_a_full_disk_blocks_no_stop_and_the_loop_stays_stopped(tmp_path: Path) -> None:
+    # No file can grow, as on a full disk.
     folder = tmp_path / "d"
     folder.mkdir()
     daemon = Daemon(folder, RESUME)
@@ -197,7 +197,7 @@ def test_a_full_disk_holds_up_no_stop_and_the_loop_stays_stopped(tmp_path: Path)
 
 @pytest.fixture
 def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """Give a folder whose `state` is a disk of its own, which holds little."""
+    """Yield a folder whose `state` is a separate, small disk."""
     folder = tmp_path / "d"
     disk = folder / "state"
     disk.mkdir(parents=True)
@@ -212,7 +212,7 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
 
 
 def fill(disk: Path) -> None:
-    """Leave no free byte."""
+    """Fill the disk completely."""
     with (disk / "filler").open("wb", buffering=0) as filler:
         for size in (4096, 1):
             with contextlib.suppress(OSError):
@@ -222,7 +222,7 @@ def fill(disk: Path) -> None:
     assert (found.f_bfree, found.f_bavail) == (0, 0)
 
 
-def test_a_disk_without_a_free_byte_holds_up_no_stop(small_disk: Path) -> None:
+def test_a_disk_without_a_free_byte_blocks_no_stop(small_disk: Path) -> None:
     disk = small_disk / "state"
     daemon = Daemon(small_disk, RESUME)
     daemon.start()
@@ -234,13 +234,13 @@ def test_a_disk_without_a_free_byte_holds_up_no_stop(small_disk: Path) -> None:
             assert any("not saved" in note for note in result.notes), result
             assert not runs(client)
             assert not mark(daemon).exists()
-            # Nor where nobody but the executor can stop it.
+            # Nor where only the executor can stop the loop.
             begin(client)
             with stopped(daemon.pid):
                 stop_by_command(daemon)
                 assert not mark(daemon).exists()
-            wait_for(lambda: not runs(client), "rtcfd to know")
-        # What is on disk says that it runs, as there was no room to say otherwise.
+            wait_for(lambda: not runs(client), "rtcfd to notice it")
+        # The disk still says that it runs, as it was too full to record the stop.
         assert '"running": true' in (disk / "rt_runner.json").read_text()
         daemon.end(signal.SIGKILL)
         daemon.start()
@@ -255,14 +255,14 @@ NOT_YET = "not saved yet: the disk of the state folder does not answer"
 
 @pytest.fixture
 def hanging_disk(tmp_path: Path) -> Iterator[HangingDisk]:
-    """Give a disk that can hang; `state` of the folder `d` is on it."""
+    """Yield a disk that can hang; `state` of the folder `d` is on it."""
     with mounted(tmp_path / "d" / "state", tmp_path / "image") as disk:
         yield disk
 
 
 @pytest.fixture
 def daemon_on_it(hanging_disk: HangingDisk) -> Iterator[Daemon]:
-    """Give an rtcfd whose state is on that disk."""
+    """Yield an rtcfd whose state is on that disk."""
     daemon = Daemon(hanging_disk.folder.parent, RESUME)
     daemon.start()
     yield daemon
@@ -270,7 +270,7 @@ def daemon_on_it(hanging_disk: HangingDisk) -> Iterator[Daemon]:
         daemon.end()
 
 
-def test_a_disk_that_hangs_holds_up_no_stop_and_is_right_when_it_answers(
+def test_a_hanging_disk_blocks_no_stop_and_is_updated_later(
     daemon_on_it: Daemon, hanging_disk: HangingDisk
 ) -> None:
     daemon = daemon_on_it
@@ -279,7 +279,7 @@ def test_a_disk_that_hangs_holds_up_no_stop_and_is_right_when_it_answers(
         with hanging_disk.hanging():
             assert NOT_YET in client.stop().notes
             assert not runs(client)
-            # Nor does it hold up a start, or the stop after that.
+            # Nor does it block a start, or the stop after it.
             assert NOT_YET in client.start().notes
             assert runs(client)
             assert NOT_YET in stop_by_command(daemon)
@@ -293,7 +293,7 @@ def test_a_disk_that_hangs_holds_up_no_stop_and_is_right_when_it_answers(
         assert not runs(client)
 
 
-def test_an_executor_stops_again_and_again_whatever_its_disk_does(
+def test_an_executor_stops_repeatedly_with_a_hanging_disk(
     daemon_on_it: Daemon, hanging_disk: HangingDisk
 ) -> None:
     daemon = daemon_on_it
@@ -304,7 +304,7 @@ def test_an_executor_stops_again_and_again_whatever_its_disk_does(
                 with stopped(daemon.pid):
                     for _ in range(2):
                         assert NOT_YET in stop_by_command(daemon)
-                wait_for(lambda: not runs(client), "rtcfd to know")
+                wait_for(lambda: not runs(client), "rtcfd to notice it")
                 begin(client)
             assert f"rt_runner: {NOT_YET}" in stop_by_command(
                 daemon, "--all", out="rt_runner stopped"
@@ -313,7 +313,7 @@ def test_an_executor_stops_again_and_again_whatever_its_disk_does(
         wait_for(lambda: not mark(daemon).exists(), "the disk")
 
 
-def test_the_end_of_rtcfd_ends_loops_whatever_its_disk_does(
+def test_the_end_of_rtcfd_ends_loops_with_a_hanging_disk(
     daemon_on_it: Daemon, hanging_disk: HangingDisk
 ) -> None:
     daemon = daemon_on_it
@@ -329,7 +329,7 @@ def test_the_end_of_rtcfd_ends_loops_whatever_its_disk_does(
         assert not runs(client)
 
 
-def test_a_read_only_disk_is_told_of_by_the_executor_that_stops(
+def test_a_stopping_executor_reports_a_read_only_disk(
     daemon_on_it: Daemon, hanging_disk: HangingDisk
 ) -> None:
     daemon = daemon_on_it
@@ -339,19 +339,19 @@ def test_a_read_only_disk_is_told_of_by_the_executor_that_stops(
         subprocess.run(remount, check=True, capture_output=True)
         with stopped(daemon.pid):
             assert "not saved: Read-only file system" in stop_by_command(daemon)
-        wait_for(lambda: not runs(client), "rtcfd to know")
+        wait_for(lambda: not runs(client), "rtcfd to notice it")
 
 
 @pytest.fixture
 def open_folder() -> Iterator[Path]:
-    """Give a folder that others can enter, as pytest's cannot be."""
+    """Yield a folder that other users can enter, unlike pytest's."""
     with tempfile.TemporaryDirectory() as name:
         Path(name).chmod(0o755)
         yield Path(name)
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="takes on another user")
-def test_who_may_not_operate_stops_nothing_past_the_daemon(open_folder: Path) -> None:
+@pytest.mark.skipif(os.geteuid() != 0, reason="requires root to act as another user")
+def test_a_user_without_operate_cannot_stop_at_the_executor(open_folder: Path) -> None:
     daemon = Daemon(open_folder, f"[access]\ndefault = 'observe'\n{NO_ROS}")
     daemon.start()
     try:
@@ -370,7 +370,7 @@ def test_who_may_not_operate_stops_nothing_past_the_daemon(open_folder: Path) ->
                 f"refused: stop requires the right `operate`, but user {STRANGER} has none\n"
             ), done.stderr
             assert runs(client)
-            # What is no request, or no end of one, does nothing and holds up nobody.
+            # Invalid or incomplete requests do nothing and block nobody.
             for nonsense in (b"start\n", b"stop", b"\0" * 4096):
                 with socket.socket(socket.AF_UNIX) as peer:
                     peer.connect(str(path))
@@ -385,7 +385,7 @@ def test_who_may_not_operate_stops_nothing_past_the_daemon(open_folder: Path) ->
         daemon.end()
 
 
-def test_all_loops_stop_at_one_word(daemon: Daemon, client: rtcf.Client) -> None:
+def test_one_command_stops_all_loops(daemon: Daemon, client: rtcf.Client) -> None:
     client.add_runner("second")
     for runner in ("rt_runner", "second"):
         client.load(rtcf.component("rtcf_test", "Counter"), runner)

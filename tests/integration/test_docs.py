@@ -1,4 +1,4 @@
-"""What the pages in docs/ tell a reader to type, word for word, in a build tree."""
+"""The commands of the pages in docs/, run verbatim in a build tree."""
 
 import os
 import re
@@ -24,7 +24,7 @@ _BAG_S = 1_700_000_000
 
 
 def _nothing(_: Daemon, __: rtcf.Client) -> None:
-    """Have what the page needs: an empty graph."""
+    """Prepare nothing: the page needs an empty graph."""
 
 
 def _wave_that_was_tuned(_: Daemon, client: rtcf.Client) -> None:
@@ -49,7 +49,7 @@ def _loop_with_a_bag(daemon: Daemon, client: rtcf.Client) -> None:
         bag.write("/G2_R2", Float64(1.5), rospy.Time(_BAG_S + 1))
 
 
-# What a page takes for granted.
+# Setup that a page assumes.
 PREPARE: dict[str, Callable[[Daemon, rtcf.Client], None]] = {
     "boot.md": _nothing,
     "first-ten-minutes.md": _nothing,
@@ -75,7 +75,7 @@ BY_THEMSELVES = {
 }
 
 
-def test_each_page_is_typed() -> None:
+def test_the_commands_of_each_page_are_tested() -> None:
     assert {*PREPARE, *BY_THEMSELVES} == set(pages_typed())
 
 
@@ -87,7 +87,7 @@ def test_the_commands_of_a_page_succeed(page: str, daemon: Daemon, client: rtcf.
 
 
 def _type(line: str, folder: Path, environment: dict[str, str]) -> None:
-    """Type a line in a folder, which is /tmp too."""
+    """Run a command line in a folder, which also replaces /tmp."""
     done = subprocess.run(
         ["bash", "-c", line.replace("/tmp/", f"{folder}/")],
         cwd=folder, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True,
@@ -100,14 +100,14 @@ def _type(line: str, folder: Path, environment: dict[str, str]) -> None:
 def _left_running(
     line: str, folder: Path, environment: dict[str, str], until: str
 ) -> Iterator[None]:
-    """Type a line that goes on until Ctrl-C; it is under way once it has said `until`."""
+    """Run a command line until Ctrl-C; it has started once it prints `until`."""
     said = folder / f"said by {line.split()[0]}"
     with (
         said.open("wb") as to,
         subprocess.Popen(
             ["bash", "-c", "exec " + line.replace("/tmp/", f"{folder}/")],
             cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=to, stderr=to,
-            # Where tests run in the background Ctrl-C is ignored.
+            # Ctrl-C is ignored where tests run in the background.
             preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
         ) as process,
     ):  # fmt: skip
@@ -124,7 +124,7 @@ def _left_running(
 
 
 def _block(page: str, language: str, holding: str) -> str:
-    """Return the block of a page that has a text in it."""
+    """Return the block of a page that contains a text."""
     text = (TREE / page if page == "README.md" else TREE / "docs" / page).read_text()
     blocks = re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     (found,) = (str(block) for block in blocks if holding in block)
@@ -136,12 +136,12 @@ def _environment(folder: Path) -> dict[str, str]:
         "PATH": f"{BUILD_TREE / 'bin'}:{os.environ['PATH']}",
         "RTCF_SOCKET": str(folder / "rtcf.sock"),
         "XDG_CACHE_HOME": str(folder / "cache"),
-        # In place of librtcf-dev.
+        # Replaces librtcf-dev.
         "rtcf_DIR": str(BUILD_TREE / "cmake" / "rtcf"),
     }
 
 
-def test_the_component_of_the_page_is_built_and_loaded(tmp_path: Path) -> None:
+def test_the_component_of_the_docs_is_built_and_loaded(tmp_path: Path) -> None:
     (tmp_path / "src").mkdir()
     (tmp_path / "src" / "pi.cpp").write_text(_block("components.md", "cpp", "class Pi "))
     (tmp_path / "CMakeLists.txt").write_text(_block("components.md", "cmake", "project("))
@@ -155,7 +155,7 @@ def test_the_component_of_the_page_is_built_and_loaded(tmp_path: Path) -> None:
     assert kp.value.double_value == 4.0
 
 
-def test_the_component_with_a_service_of_the_page_is_built_and_described(tmp_path: Path) -> None:
+def test_the_component_with_a_service_of_the_docs_is_built_and_described(tmp_path: Path) -> None:
     (tmp_path / "brake.cpp").write_text(_block("components.md", "cpp", "class Brake "))
     (tmp_path / "CMakeLists.txt").write_text(
         "cmake_minimum_required(VERSION 3.25)\n"
@@ -174,7 +174,7 @@ def test_the_component_with_a_service_of_the_page_is_built_and_described(tmp_pat
     assert [port.name for port in found.ports] == ["speed", "torque"]
 
 
-def test_the_component_in_python_of_the_page_is_compiled_and_loaded(tmp_path: Path) -> None:
+def test_the_python_component_of_the_docs_is_compiled_and_loaded(tmp_path: Path) -> None:
     (tmp_path / "observer.py").write_text(_block("python-components.md", "python", "class Obs"))
     environment = _environment(tmp_path)
     compile_, daemon, watch, verify = typed("python-components.md")
@@ -188,18 +188,18 @@ def test_the_component_in_python_of_the_page_is_compiled_and_loaded(tmp_path: Pa
     _type(verify, tmp_path, environment)
 
 
-def test_the_workspace_of_the_page_is_built_and_a_daemon_loads_from_the_folder_it_names(
+def test_the_workspace_of_the_docs_is_built_and_loaded_from_its_folder(
     tmp_path: Path,
 ) -> None:
     page = (TREE / "docs" / "ros-setup.md").read_text()
     package = tmp_path / "ws" / "src" / "my_package"
     environment = build_tree_environment(_environment(tmp_path)) | {"HOME": str(tmp_path)}
     begin, build = (_block("ros-setup.md", "sh", each) for each in ("mkdir -p ~/ws", "catkin_make"))
-    _type("\n".join(begin.splitlines()[1:]), tmp_path, environment)  # without those of apt
+    _type("\n".join(begin.splitlines()[1:]), tmp_path, environment)  # without apt's commands
     (package / "package.xml").write_text(_block("ros-setup.md", "xml", "<name>my_package"))
     (package / "CMakeLists.txt").write_text(_block("ros-setup.md", "cmake", "project(my_package"))
     (package / "gain.cpp").write_text(_block("README.md", "cpp", "class Gain "))
-    # Nothing to debug or to be fast here; the last line is what a launch is begun in.
+    # Debug information and speed do not matter here; the last line starts the launch.
     environment["CXXFLAGS"] = "-O0"
     _type(f"set -e\n{build}env -0 > ~/given", tmp_path, environment)
     text = (tmp_path / "given").read_text()
@@ -208,7 +208,7 @@ def test_the_workspace_of_the_page_is_built_and_a_daemon_loads_from_the_folder_i
     (said,) = re.findall(r"components are in `(\S+)`", page)
     assert [each.name for each in (tmp_path / "ws" / said).iterdir()] == ["my_package.so"]
 
-    # Where the settings name the folder, and where the workspace is in the environment.
+    # With the folder in the settings, and with the workspace in the environment.
     (path,) = re.findall(r"`(path = \[.*\])`", page)
     named = tmp_path / "named"
     found = tmp_path / "found"

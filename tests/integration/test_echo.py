@@ -1,4 +1,4 @@
-"""`rtcfctl echo` on a loop that runs."""
+"""`rtcfctl echo` on a running loop."""
 
 import json
 import signal
@@ -9,7 +9,7 @@ import pytest
 from daemon_process import BUILD_TREE, Daemon, clean_environment
 
 
-def test_every_cycle_is_a_line_for_machines(running: Daemon) -> None:
+def test_json_has_a_line_per_cycle(running: Daemon) -> None:
     done = running.ctl("echo", "wave", "-n", "50", "-o", "json")
     assert done.returncode == 0, done.stderr
     lines = [json.loads(line) for line in done.stdout.splitlines()]
@@ -21,7 +21,7 @@ def test_every_cycle_is_a_line_for_machines(running: Daemon) -> None:
     assert isinstance(lines[0]["values"]["/wave.above"], bool)
 
 
-def test_people_get_some_cycles_a_second(running: Daemon) -> None:
+def test_text_has_a_few_cycles_per_second(running: Daemon) -> None:
     done = running.ctl("echo", "wave.wave", "--rate", "100Hz", "-n", "3")
     assert done.returncode == 0, done.stderr
     heads = [line for line in done.stdout.splitlines() if line.startswith("cycle ")]
@@ -39,7 +39,7 @@ def test_people_get_some_cycles_a_second(running: Daemon) -> None:
         (("wave", "--rate", "fast"), 2, "fast"),
     ],
 )
-def test_refused_in_a_line(running: Daemon, words: tuple[str, ...], code: int, said: str) -> None:
+def test_errors_are_one_line(running: Daemon, words: tuple[str, ...], code: int, said: str) -> None:
     done = running.ctl("echo", *words)
     assert done.returncode == code
     assert said in done.stderr.splitlines()[-1]
@@ -50,7 +50,7 @@ def test_ctrl_c_ends_it(running: Daemon) -> None:
         [BUILD_TREE / "bin" / "rtcfctl", "--socket", running.socket, "echo", "wave", "-o", "json"],
         stdout=subprocess.PIPE,
         env=clean_environment(),
-        # A shell's background job, or nohup, may have it ignored.
+        # Ctrl-C is ignored in a shell's background job and under nohup.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
     assert process.stdout is not None
@@ -62,7 +62,7 @@ def test_ctrl_c_ends_it(running: Daemon) -> None:
 
 
 @pytest.mark.parametrize("verb", ["echo", "record"])
-def test_a_loop_that_does_not_run_is_no_silence(running: Daemon, tmp_path: Path, verb: str) -> None:
+def test_a_note_says_that_the_loop_does_not_run(running: Daemon, tmp_path: Path, verb: str) -> None:
     assert running.ctl("stop").returncode == 0
     words = ["-o", str(tmp_path / "run.mcap")] if verb == "record" else []
     process = subprocess.Popen(

@@ -1,4 +1,4 @@
-"""How rtcfd and its executors end: in order, with nothing left, whoever asks."""
+"""How rtcfd and its executors end: in order, with nothing left, for any cause."""
 
 import os
 import signal
@@ -54,12 +54,12 @@ def test_a_signal_ends_loop_and_executor_in_order(
     assert not daemon.socket.with_name(daemon.socket.name + ".d").exists()
 
 
-def test_an_executor_that_was_killed_leaves_no_folder(tmp_path: Path) -> None:
+def test_a_killed_executor_leaves_no_folder(tmp_path: Path) -> None:
     daemon = Daemon(tmp_path)
     daemon.start()
     with rtcf.Client(daemon.socket) as client:
         executor = _executor(client)
-    # It cannot end in order, nor come back: rtcfd is ending.
+    # It can neither end in order nor be replaced: rtcfd is ending.
     os.kill(executor, signal.SIGSTOP)
     os.kill(daemon.pid, signal.SIGTERM)
     wait_for(lambda: "stopping all loops" in daemon.log(), "the end to begin")
@@ -80,26 +80,24 @@ def test_stop_ends_the_loop_in_order_and_keeps_the_executor(
     wait_for(lambda: "hook stop" in daemon.log(), "the stop hook")
     assert _hooks(daemon) == HOOKS[:-1]
     assert (iteration(client), _executor(client)) == (cycles, executor)
-    # Neither is refused where there is nothing to do.
+    # Neither command fails if there is nothing to do.
     assert daemon.ctl("stop").returncode == 0
     assert daemon.ctl("start").returncode == 0
     assert daemon.ctl("start").returncode == 0
 
 
-def test_the_executor_ends_by_a_signal_of_its_own_in_order(
-    daemon: Daemon, client: rtcf.Client
-) -> None:
+def test_a_signal_to_the_executor_ends_it_in_order(daemon: Daemon, client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_test", "Witness"))
     client.start()
     wait_for(lambda: iteration(client) > 100, "100 cycles")
     executor = _executor(client)
     os.kill(executor, signal.SIGTERM)
-    wait_for(lambda: "its loop is down" in daemon.log(), "rtcfd's word on it")
+    wait_for(lambda: "its loop is down" in daemon.log(), "rtcfd's message")
     assert _is_gone(executor)
     assert _hooks(daemon) == HOOKS
 
 
-def test_a_signal_while_start_hooks_run_lets_no_cycle_begin(
+def test_a_signal_during_start_hooks_prevents_the_first_cycle(
     daemon: Daemon, client: rtcf.Client
 ) -> None:
     gate = daemon.folder / "gate"
@@ -118,7 +116,7 @@ def test_a_signal_while_start_hooks_run_lets_no_cycle_begin(
         try:
             wait_for(lambda: "waits for a file" in daemon.log(), "the start hook")
             os.kill(executor, signal.SIGTERM)
-            # Nobody can ask it to stop any more once it does so.
+            # From this moment on no client can ask it to stop.
             wait_for(lambda: not stop_socket.exists(), "the executor to take the signal")
         finally:
             gate.touch()

@@ -1,4 +1,4 @@
-"""`rosrun rtcf evaluate_performance_rosbag`: numbers and a plot of a bag."""
+"""`rosrun rtcf evaluate_performance_rosbag`: statistics and a plot of a bag."""
 
 import json
 import subprocess
@@ -19,7 +19,7 @@ TOPIC = "/rt_runner/cycles"
 
 @pytest.fixture(scope="module", autouse=True)
 def fonts() -> None:
-    """Let matplotlib list the fonts beforehand: if that takes it 5 s, it says so."""
+    """Create matplotlib's font cache first: it prints a message if that takes 5 s."""
     subprocess.run(["/usr/bin/python3", "-c", "import matplotlib.font_manager"], check=True)
 
 
@@ -58,7 +58,7 @@ def _record(file: Path, cycles: Iterable[Any], topic: str = TOPIC) -> Path:
 
 @pytest.mark.parametrize("make", [_cycle, _info_2021])
 def test_numbers_of_a_bag_are_exact(tmp_path: Path, make: Callable[..., Any]) -> None:
-    # 1000 durations of 1 to 1000 µs; each second cycle begins 2 µs late.
+    # 1000 durations of 1 to 1000 µs; every second cycle starts 2 µs late.
     cycles = [make(i, (i + 1) * 1000, 2000 * (i % 2)) for i in range(1000)]
     done = _run(str(_record(tmp_path / "a.bag", cycles)), "2000", "--json")
     assert done.stderr == ""
@@ -71,21 +71,21 @@ def test_numbers_of_a_bag_are_exact(tmp_path: Path, make: Callable[..., Any]) ->
         },
         "jitter_us": {"min": 2.0, "mean": 2.0, "p50": 2.0, "p99": 2.0, "p999": 2.0, "max": 2.0},
     }  # fmt: skip
-    # The plot stands beside the bag.
+    # The plot is next to the bag.
     assert (tmp_path / "a.bag.evaluation.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_lost_messages_and_restarts_of_the_loop_are_told_apart(tmp_path: Path) -> None:
+def test_lost_messages_and_restarts_of_the_loop_are_distinguished(tmp_path: Path) -> None:
     iterations = [0, 1, 2, 5, 6, 0, 1, 2]
     cycles = [_cycle(iteration, 1000, 0) for iteration in iterations]
     done = _run(str(_record(tmp_path / "a.bag", cycles)), "2000", "--json")
     numbers = json.loads(done.stdout)
     assert (numbers["cycles"], numbers["lost"]) == (8, 2)
-    # Neither is jitter.
+    # Neither counts as jitter.
     assert numbers["jitter_us"]["max"] == 0.0
 
 
-def test_people_get_a_table(tmp_path: Path) -> None:
+def test_text_output_is_a_table(tmp_path: Path) -> None:
     bag = _record(tmp_path / "a.bag", [_cycle(i, 1000, 0) for i in range(10)])
     done = _run(str(bag), "2000", "--png", str(tmp_path / "b.png"))
     assert done.stdout.splitlines() == [
@@ -97,8 +97,8 @@ def test_people_get_a_table(tmp_path: Path) -> None:
     ]
 
 
-def test_one_of_each_is_said_in_the_singular(tmp_path: Path) -> None:
-    # The first takes longer than a period; the third of four was lost.
+def test_counts_of_one_use_the_singular(tmp_path: Path) -> None:
+    # The first cycle takes longer than a period; the third of four was lost.
     cycles = [_cycle(0, PERIOD_NS + 1, 0), _cycle(1, 1000, 0), _cycle(3, 1000, 0)]
     done = _run(str(_record(tmp_path / "a.bag", cycles)), "2000")
     assert done.stdout.splitlines()[0] == f"{TOPIC}: 3 cycles, 1 message lost, 1 overrun"
@@ -107,7 +107,7 @@ def test_one_of_each_is_said_in_the_singular(tmp_path: Path) -> None:
 def test_one_of_several_loops_is_chosen(tmp_path: Path) -> None:
     bag = _record(tmp_path / "a.bag", [_cycle(i, 1000, 0) for i in range(10)])
     _record(bag, [_cycle(i, 2000, 0) for i in range(10)], "/other/cycles")
-    # Of the same loop.
+    # From the same loop.
     _record(bag, [_info_2021(i, 2000, 0) for i in range(10)], "/other/iteration_info")
     refused = _run(str(bag), "2000")
     assert (refused.returncode, refused.stdout) == (1, "")
@@ -116,7 +116,7 @@ def test_one_of_several_loops_is_chosen(tmp_path: Path) -> None:
     assert json.loads(done.stdout)["duration_us"]["max"] == 2.0
 
 
-def test_bad_input_is_refused_in_one_line(tmp_path: Path) -> None:
+def test_bad_input_is_rejected_in_one_line(tmp_path: Path) -> None:
     other = tmp_path / "other.bag"
     with rosbag.Bag(str(other), "w") as bag:
         bag.write("/x", Float64(data=1.0), genpy.Time(1, 0))
@@ -139,7 +139,7 @@ def test_bad_input_is_refused_in_one_line(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("frequency", ["0", "-1", "nan", "fast"])
-def test_bad_frequency_is_wrong_usage(tmp_path: Path, frequency: str) -> None:
+def test_a_bad_frequency_is_a_usage_error(tmp_path: Path, frequency: str) -> None:
     done = _run(str(tmp_path / "a.bag"), frequency)
     assert done.returncode == 2
     assert "FREQUENCY" in done.stderr

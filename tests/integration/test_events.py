@@ -1,4 +1,4 @@
-"""What watchers of a real rtcfd hear: in order, from a number on, faults and deaths too."""
+"""Events of a real rtcfd: in order, from a given number on, including faults and crashes."""
 
 import json
 import os
@@ -19,7 +19,7 @@ Event = control_pb2.Event
 def until(
     stream: EventStream, condition: Callable[[control_pb2.Event], bool]
 ) -> list[control_pb2.Event]:
-    """Return what comes up to an event; the daemon's end would end the wait."""
+    """Return the events up to a condition; fails if the daemon ends."""
     found = []
     for event in stream:
         assert not isinstance(event, Lost)
@@ -29,7 +29,7 @@ def until(
     raise AssertionError(f"the stream ended: {found}")
 
 
-def test_changes_and_states_come_in_order_with_who_made_them(client: rtcf.Client) -> None:
+def test_changes_and_states_arrive_in_order_with_their_user(client: rtcf.Client) -> None:
     with client.watch_events(["rt_runner"]) as events:
         client.load(mimo("A", {}))
         client.start()
@@ -37,7 +37,7 @@ def test_changes_and_states_come_in_order_with_who_made_them(client: rtcf.Client
         client.stop()
         heard = until(events, lambda e: e.kind == Event.KIND_RUNNER_STATE
                       and e.state == runner_pb2.RUNNER_STATE_STOPPED)  # fmt: skip
-    asked = (Event.KIND_GRAPH, Event.KIND_RUNNER_STATE)  # a busy machine has others to tell
+    asked = (Event.KIND_GRAPH, Event.KIND_RUNNER_STATE)  # a busy machine emits others, too
     assert [(each.kind, each.state) for each in heard if each.kind in asked] == [
         (Event.KIND_GRAPH, runner_pb2.RUNNER_STATE_STOPPED),
         (Event.KIND_RUNNER_STATE, runner_pb2.RUNNER_STATE_RUNNING),
@@ -50,7 +50,7 @@ def test_changes_and_states_come_in_order_with_who_made_them(client: rtcf.Client
     assert heard[0].user == "root" or os.geteuid() != 0
 
 
-def test_who_comes_back_misses_nothing(client: rtcf.Client) -> None:
+def test_a_returning_watcher_misses_nothing(client: rtcf.Client) -> None:
     with client.watch_events() as events:
         place = events.place
     client.load(mimo("A", {}))
@@ -70,7 +70,7 @@ def test_a_dead_executor_is_an_event(daemon: Daemon, client: rtcf.Client) -> Non
     wait_for(lambda: client.get_status().runners[0].pid not in (0, pid), "a new executor")
 
 
-def test_rtcfctl_prints_them_for_people_and_machines(daemon: Daemon, client: rtcf.Client) -> None:
+def test_rtcfctl_prints_events_as_text_and_json(daemon: Daemon, client: rtcf.Client) -> None:
     client.load(mimo("A", {}))
     lines = daemon.ctl("events").stdout.splitlines()
     assert "rtcfd daemon: rtcfd" in lines[0]
@@ -85,7 +85,7 @@ def test_rtcfctl_prints_them_for_people_and_machines(daemon: Daemon, client: rtc
     assert {json.loads(line)["kind"] for line in other} == {"daemon"}
 
 
-def test_a_place_of_before_a_restart_of_rtcfd_begins_anew(
+def test_a_position_from_before_a_restart_of_rtcfd_starts_over(
     daemon: Daemon, client: rtcf.Client
 ) -> None:
     with client.watch_events(after=Place("another log", 7), until_now=True) as events:
@@ -95,7 +95,7 @@ def test_a_place_of_before_a_restart_of_rtcfd_begins_anew(
 
 
 @pytest.mark.parametrize("runner", ["rt_runner", "other"])
-def test_only_the_runners_that_are_asked_for_are_told_of(client: rtcf.Client, runner: str) -> None:
+def test_only_events_of_the_requested_runners_are_sent(client: rtcf.Client, runner: str) -> None:
     client.add_runner("other")
     with client.watch_events([runner]) as events:
         client.load(mimo("A", {}), "rt_runner")
@@ -105,7 +105,7 @@ def test_only_the_runners_that_are_asked_for_are_told_of(client: rtcf.Client, ru
     assert {each.runner for each in heard} == {runner}
 
 
-def test_a_load_is_told_before_its_parameters(client: rtcf.Client) -> None:
+def test_a_load_event_precedes_its_parameter_events(client: rtcf.Client) -> None:
     knobs = rtcf.component("rtcf_test", "Knobs", name="knobs", parameters=["rate:=2.5"])
     with client.watch_events(["rt_runner"]) as events:
         client.load(knobs)
@@ -119,10 +119,8 @@ def test_a_load_is_told_before_its_parameters(client: rtcf.Client) -> None:
         assert [each.kind for each in heard] == [Event.KIND_GRAPH, Event.KIND_PARAMETERS]
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="knows root's name only")
-def test_whoever_stops_a_loop_at_its_executor_has_a_name(
-    daemon: Daemon, client: rtcf.Client
-) -> None:
+@pytest.mark.skipif(os.geteuid() != 0, reason="requires root")
+def test_the_user_of_a_direct_stop_is_named(daemon: Daemon, client: rtcf.Client) -> None:
     client.load(mimo("A", {}))
     client.start()
     with client.watch_events(["rt_runner"]) as events:
@@ -133,7 +131,7 @@ def test_whoever_stops_a_loop_at_its_executor_has_a_name(
     assert heard[-1].message.startswith("stopped at its executor by root (pid ")
 
 
-def test_values_that_are_not_finite_are_told_of_again(client: rtcf.Client) -> None:
+def test_non_finite_values_are_reported_again(client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_faults", "NotFinite", name="bad", parameters=["after:=50"]))
     with client.watch_events(["rt_runner"]) as events:
         client.start()

@@ -1,4 +1,4 @@
-"""Nonsense on an executor's socket: it is hung up on, and the loop does not notice."""
+"""Invalid bytes on an executor's socket: it closes the connection, and the loop is unaffected."""
 
 import random
 import re
@@ -26,26 +26,26 @@ def hello() -> bytes:
 
 
 def nonsense(noise: random.Random) -> bytes:
-    """Return bytes that are no request, in one of the ways in which that can be."""
+    """Return bytes that are not a valid request, in one of several ways."""
     body = noise.randbytes(noise.randrange(1, 100))
     return noise.choice(
         [
-            body,  # no frame
-            frame(b"\x0f" + body),  # a frame, and no message
+            body,  # without framing
+            frame(b"\x0f" + body),  # framed, but not a message
             (16 * 1024 * 1024 + 1 + noise.randrange(2**31)).to_bytes(4, "little"),  # too long
-            frame(body)[:-1],  # ends before its end
+            frame(body)[:-1],  # truncated
             hello() + frame(b"\x0f" + body),
-            frame(wire.Request(id=noise.getrandbits(64)).SerializeToString()),  # nothing asked
+            frame(wire.Request(id=noise.getrandbits(64)).SerializeToString()),  # an empty request
             hello() + frame(wire.Request(id=2, load=wire.Load(library="/etc/passwd"))
                             .SerializeToString()),
-            # A change before hello.
+            # A change before the hello.
             frame(wire.Request(id=1, stop=wire.Stop()).SerializeToString()),
         ]
     )  # fmt: skip
 
 
 @pytest.mark.parametrize("times", TIMES)
-def test_nonsense_changes_nothing(daemon: Daemon, client: rtcf.Client, times: int) -> None:
+def test_invalid_bytes_change_nothing(daemon: Daemon, client: rtcf.Client, times: int) -> None:
     client.load(rtcf.component("rtcf_test", "Counter", name="steady"))
     client.start()
     before = client.get_status().runners[0]
@@ -59,7 +59,7 @@ def test_nonsense_changes_nothing(daemon: Daemon, client: rtcf.Client, times: in
                 peer.sendall(nonsense(noise))
                 peer.shutdown(socket.SHUT_WR)
                 while peer.recv(65536):
-                    pass  # until it hangs up
+                    pass  # until it closes the connection
             except ConnectionError:
                 pass
     after = client.get_status().runners[0]
@@ -70,7 +70,7 @@ def test_nonsense_changes_nothing(daemon: Daemon, client: rtcf.Client, times: in
 
 
 def _answer(peer: socket.socket) -> wire.Response:
-    """Read the next answer; what comes unasked is passed over."""
+    """Read the next answer; skip unsolicited messages."""
     while True:
         size = int.from_bytes(_read(peer, 4), "little")
         response: wire.Response = wire.Response.FromString(_read(peer, size))
@@ -82,7 +82,7 @@ def _read(peer: socket.socket, size: int) -> bytes:
     read = bytearray()
     while len(read) < size:
         got = peer.recv(size - len(read))
-        assert got, "it hung up"
+        assert got, "the connection was closed"
         read += got
     return bytes(read)
 
@@ -93,9 +93,7 @@ def _resident_bytes(pid: int) -> int:
     return int(found[1]) * 1024
 
 
-def test_a_peer_that_never_catches_up_costs_what_it_has_not_taken(
-    daemon: Daemon, client: rtcf.Client
-) -> None:
+def test_a_slow_peer_costs_only_its_unread_answers(daemon: Daemon, client: rtcf.Client) -> None:
     for number in range(50):
         client.load(rtcf.component("rtcf_test", "Counter", name=f"c{number}"))
     pid = client.get_status().runners[0].pid
@@ -107,7 +105,7 @@ def test_a_peer_that_never_catches_up_costs_what_it_has_not_taken(
         ask = frame(wire.Request(id=2, list_components=wire.ListComponents()).SerializeToString())
         peer.sendall(ask)
         size = _answer(peer).ByteSize()
-        # More than the socket takes, at any time.
+        # More than the socket's buffer holds.
         peer.sendall(ask * (4 * MIB // size))
         before = _resident_bytes(pid)
         for _ in range(128 * MIB // size):
@@ -117,11 +115,11 @@ def test_a_peer_that_never_catches_up_costs_what_it_has_not_taken(
 
 
 def _unknown() -> Any:
-    """Return a number that is no enumerator of any enumeration; its type is none of theirs."""
+    """Return a value of no enumeration; its type allows it in place of any of them."""
     return 99
 
 
-def test_enumerators_that_are_none_are_refused(daemon: Daemon, client: rtcf.Client) -> None:
+def test_unknown_enumerators_are_rejected(daemon: Daemon, client: rtcf.Client) -> None:
     requests = [
         wire.Request(id=2, configure=runner_pb2.RunnerSettings(realtime=_unknown())),
         wire.Request(

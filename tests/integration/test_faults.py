@@ -1,4 +1,4 @@
-"""Each fault, by a component that really does it: what is said, and what goes on."""
+"""Each fault, caused by a real component: its report, and what continues to run."""
 
 import contextlib
 import os
@@ -21,13 +21,13 @@ SETTINGS = "[runner]\nstall_timeout_ms = 300\n[runner.ros]\nenabled = false\n"
 
 @pytest.fixture
 def settings() -> str:
-    """Let there be an rtcfd whose loops are soon taken for stalled."""
+    """Return the settings of an rtcfd with a short stall timeout."""
     return SETTINGS
 
 
 @pytest.fixture(autouse=True)
 def bystander(client: rtcf.Client) -> Iterator[Bystander]:
-    """Run another loop all the time: it must notice nothing of any fault."""
+    """Run a second loop all the time; it must not notice any fault."""
     bystander = Bystander(client)
     yield bystander
     bystander.check()
@@ -40,7 +40,7 @@ def faulty(type_name: str, *, optional: bool = False, after: int = 20) -> graph_
 
 
 def load(client: rtcf.Client, bad: graph_pb2.ComponentSpec) -> None:
-    """Load a faulty component and, around it in the order, two that are not."""
+    """Load a faulty component and, around it in the order, two healthy ones."""
     client.load(rtcf.component("rtcf_test", "Counter", name="a", remaps=["out:=/a"]))
     client.load(bad)
     client.load(rtcf.component("rtcf_test", "Counter", name="z", remaps=["in:=/a", "out:=/z"]))
@@ -58,7 +58,7 @@ CRASHES = {
 
 
 @pytest.mark.parametrize("type_name", CRASHES)
-def test_what_crashes_the_process_is_named_and_taken_out(
+def test_a_component_that_crashes_is_named_and_taken_out(
     daemon: Daemon, client: rtcf.Client, type_name: str
 ) -> None:
     load(client, faulty(type_name))
@@ -70,14 +70,14 @@ def test_what_crashes_the_process_is_named_and_taken_out(
     assert status.state == runner_pb2.RUNNER_STATE_FAULTED
     assert client.get_order() == ["/a", "/z"]
     assert client.get_component("bad").state == graph_pb2.COMPONENT_STATE_LEFT_OUT
-    # And it runs without the culprit, by the word of somebody who knows.
+    # Without the culprit it runs if a user accepts that explicitly.
     with pytest.raises(refusals.ComponentLeftOutError, match=r"left out of its loop: /bad \("):
         client.start()
     client.start(without=["bad"])
     wait_for(lambda: state(client).iteration > 100, "100 cycles")
 
 
-# With what stands in the line that crashes.
+# With the content of the line that crashes.
 PLACES = {
     "NullDereference": ("NullDereference::fault", "*nowhere = 1;"),
     "DivisionByZero": ("DivisionByZero::fault", "zero = 7 / zero;"),
@@ -102,11 +102,11 @@ def test_a_crash_is_named_with_its_source_line(
         source = TREE / "tests" / "components" / "faults" / "crashes.cpp"
         assert code in source.read_text().splitlines()[int(found[3]) - 1]
     else:
-        assert line.count("deeper at crashes.cpp:") > 2, "and what called it"
+        assert line.count("deeper at crashes.cpp:") > 2, "its callers are listed"
     assert "rtcf-executor" not in line
     wait_for(lambda: "crashes.cpp:" in state(client).status, "the status")
     assert client.get_component("bad").fault.endswith(f"at crashes.cpp:{found[3]}")
-    # It outlives rtcfd with the rest of the reason.
+    # The source line outlives rtcfd with the rest of the reason.
     wait_for(lambda: "crashes.cpp:" in saved(daemon), "the state on disk")
 
 
@@ -115,7 +115,7 @@ def saved(daemon: Daemon) -> str:
 
 
 @pytest.mark.parametrize("type_name", ["NullDereference", "CallsAbort"])
-def test_what_crashes_a_step_is_named_and_taken_out(
+def test_a_component_that_crashes_a_step_is_named_and_taken_out(
     daemon: Daemon, client: rtcf.Client, type_name: str
 ) -> None:
     load(client, faulty(type_name))
@@ -138,17 +138,17 @@ def _stop_in_vain(daemon: Daemon, client: rtcf.Client, faulty: str) -> str:
     return daemon.log()
 
 
-def test_safe_that_does_not_return_is_named(daemon: Daemon, client: rtcf.Client) -> None:
+def test_a_safe_hook_that_hangs_is_named(daemon: Daemon, client: rtcf.Client) -> None:
     log = _stop_in_vain(daemon, client, "HangsInSafe")
     assert "because a cycle made no progress while /bad.safe was running" in log
 
 
-def test_safe_that_crashes_is_named(daemon: Daemon, client: rtcf.Client) -> None:
+def test_a_safe_hook_that_crashes_is_named(daemon: Daemon, client: rtcf.Client) -> None:
     log = _stop_in_vain(daemon, client, "CrashesInSafe")
     assert re.search(r"killed by SIGABRT \(.*\) while /bad\.safe was running", log)
 
 
-def test_take_over_that_does_not_return_is_named(daemon: Daemon, client: rtcf.Client) -> None:
+def test_a_take_over_that_hangs_is_named(daemon: Daemon, client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_test", "Counter", name="bad"))
     client.start()
     wait_for(lambda: state(client).iteration > 20, "20 cycles")
@@ -158,7 +158,7 @@ def test_take_over_that_does_not_return_is_named(daemon: Daemon, client: rtcf.Cl
     assert "because a cycle made no progress while /bad.takeOver was running" in daemon.log()
 
 
-def test_take_over_that_crashes_is_named(daemon: Daemon, client: rtcf.Client) -> None:
+def test_a_take_over_that_crashes_is_named(daemon: Daemon, client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_test", "Counter", name="bad"))
     client.start()
     wait_for(lambda: state(client).iteration > 20, "20 cycles")
@@ -169,7 +169,7 @@ def test_take_over_that_crashes_is_named(daemon: Daemon, client: rtcf.Client) ->
     assert re.search(crash, daemon.log())
 
 
-def test_a_device_whose_wait_does_not_return_is_named(daemon: Daemon, client: rtcf.Client) -> None:
+def test_a_device_whose_wait_hangs_is_named(daemon: Daemon, client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_faults", "HangsInWait", name="bad"))
     client.start()
     wait_for(lambda: "executor restarted in" in daemon.log(), "the recovery")
@@ -178,7 +178,7 @@ def test_a_device_whose_wait_does_not_return_is_named(daemon: Daemon, client: rt
 
 def test_a_device_whose_wait_crashes_is_named(daemon: Daemon, client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_faults", "CrashesInWait", name="bad"))
-    # It may crash before the start is answered.
+    # It may crash before the answer to the start.
     with contextlib.suppress(rtcf.RefusedError):
         client.start()
     wait_for(lambda: "executor restarted in" in daemon.log(), "the recovery")
@@ -188,13 +188,13 @@ def test_a_device_whose_wait_crashes_is_named(daemon: Daemon, client: rtcf.Clien
     assert client.get_order() == []
 
 
-def test_a_device_that_is_polled_may_be_silent_for_long(client: rtcf.Client) -> None:
+def test_a_polled_device_may_be_silent_for_long(client: rtcf.Client) -> None:
     client.set_runner(runner_pb2.RunnerSettings(cpu=-1))
     client.load(rtcf.component("rtcf_faults", "PollsSilence", name="bad"))
     client.start()
     pid = state(client).pid
-    # Longer than the stall timeout, and than the kernel's limit that follows it; and what the
-    # kernel sends then.
+    # Longer than the stall timeout and the kernel's limit after it, including the
+    # kernel's signals at that limit.
     for _ in range(3):
         time.sleep(1.0)
         os.kill(pid, signal.SIGXCPU)
@@ -203,7 +203,7 @@ def test_a_device_that_is_polled_may_be_silent_for_long(client: rtcf.Client) -> 
     assert state(client).pid == pid
 
 
-def test_a_process_that_is_held_is_not_taken_for_stalled(client: rtcf.Client) -> None:
+def test_a_stopped_process_is_not_reported_as_stalled(client: rtcf.Client) -> None:
     client.load(faulty("Lingers", after=0))
     client.set_runner(runner_pb2.RunnerSettings(frequency_hz=5.0))
     client.start()
@@ -218,7 +218,7 @@ def test_a_process_that_is_held_is_not_taken_for_stalled(client: rtcf.Client) ->
     assert state(client).pid == pid
 
 
-def test_heap_corruption_names_what_was_running_or_nothing(
+def test_heap_corruption_names_the_running_component_or_none(
     daemon: Daemon, client: rtcf.Client
 ) -> None:
     load(client, faulty("HeapCorruption"))
@@ -228,7 +228,7 @@ def test_heap_corruption_names_what_was_running_or_nothing(
     assert state(client).state == runner_pb2.RUNNER_STATE_FAULTED
 
 
-def test_a_hook_that_crashes_refuses_the_change(daemon: Daemon, client: rtcf.Client) -> None:
+def test_a_crashing_hook_fails_the_change(daemon: Daemon, client: rtcf.Client) -> None:
     load(client, faulty("Sleeps"))
     with pytest.raises(
         rtcf.RefusedError, match=r"SIGSEGV .* while /CrashingConfigure\.configure was running"
@@ -238,7 +238,9 @@ def test_a_hook_that_crashes_refuses_the_change(daemon: Daemon, client: rtcf.Cli
     assert client.get_order() == ["/a", "/bad", "/z"]
 
 
-def test_a_stop_hook_that_crashes_is_taken_out(daemon: Daemon, client: rtcf.Client) -> None:
+def test_a_component_with_a_crashing_stop_hook_is_taken_out(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
     load(client, rtcf.component("rtcf_faults", "CrashingStop", name="bad"))
     client.start()
     with pytest.raises(rtcf.RefusedError):
@@ -248,7 +250,7 @@ def test_a_stop_hook_that_crashes_is_taken_out(daemon: Daemon, client: rtcf.Clie
     assert client.get_order() == ["/a", "/z"]
 
 
-def test_a_loop_goes_on_without_an_optional_component_that_crashed(
+def test_a_loop_continues_without_a_crashed_optional_component(
     daemon: Daemon, client: rtcf.Client
 ) -> None:
     client.set_runner(runner_pb2.RunnerSettings(on_crash=runner_pb2.ON_CRASH_RESUME))
@@ -281,7 +283,7 @@ def test_an_exception_of_an_optional_component_takes_it_out(
     wait_for(lambda: state(client).iteration > before.iteration + 100, "100 cycles")
 
 
-def test_what_was_taken_out_is_released_with_its_parameters(client: rtcf.Client) -> None:
+def test_a_taken_out_component_is_released_with_its_parameters(client: rtcf.Client) -> None:
     load(client, faulty("Throws", optional=True))
     client.start()
     wait_for(lambda: client.get_component("bad").fault, "the fault")
@@ -293,13 +295,13 @@ def test_what_was_taken_out_is_released_with_its_parameters(client: rtcf.Client)
     (after,) = (each for each in found.parameters if each.name == "after")
     assert after.value.int_value == 1000000
     wait_for(lambda: state(client).iteration > before.iteration + 100, "100 cycles")
-    assert port_value(client, "bad", "out") > 0, "it is updated again"
+    assert port_value(client, "bad", "out") > 0, "the component is updated again"
     assert state(client).pid == before.pid
     with pytest.raises(refusals.ComponentNotLeftOutError, match="it is in the loop"):
         client.release(["bad"])
 
 
-def test_what_is_left_out_is_released_beside_what_was_taken_out(
+def test_left_out_and_taken_out_components_are_released_together(
     daemon: Daemon, client: rtcf.Client
 ) -> None:
     load(client, faulty("NullDereference"))
@@ -319,7 +321,9 @@ def test_what_is_left_out_is_released_beside_what_was_taken_out(
     assert set(client.get_order()) == {"/a", "/bad", "/loose", "/z"}
 
 
-def test_a_parameter_of_what_is_left_out_is_mended(daemon: Daemon, client: rtcf.Client) -> None:
+def test_a_parameter_of_a_left_out_component_can_be_corrected(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
     load(client, faulty("NullDereference"))
     client.start()
     wait_for(lambda: "executor restarted in" in daemon.log(), "the recovery")
@@ -341,7 +345,7 @@ def test_a_parameter_of_what_is_left_out_is_mended(daemon: Daemon, client: rtcf.
     assert client.get_component("bad").state == graph_pb2.COMPONENT_STATE_RUNNING
 
 
-def test_a_start_names_what_is_left_out(daemon: Daemon, client: rtcf.Client) -> None:
+def test_a_start_names_left_out_components(daemon: Daemon, client: rtcf.Client) -> None:
     load(client, faulty("NullDereference"))
     client.start()
     wait_for(lambda: "executor restarted in" in daemon.log(), "the recovery")
@@ -355,20 +359,20 @@ def test_a_start_names_what_is_left_out(daemon: Daemon, client: rtcf.Client) -> 
     done = daemon.ctl("start", "--without", "bad")
     assert (done.returncode, done.stdout) == (0, "started\n"), done.stderr
     assert "rtcfctl: note: without /bad: was killed by SIGSEGV" in done.stderr
-    # One that runs is left alone, whatever it lacks.
+    # A running loop is left alone, even if components are missing.
     assert daemon.ctl("start").returncode == 0
     client.stop()
     assert daemon.ctl("start", "--partial").returncode == 0
 
 
-def test_what_is_optional_holds_up_no_start(daemon: Daemon, client: rtcf.Client) -> None:
+def test_a_left_out_optional_component_blocks_no_start(daemon: Daemon, client: rtcf.Client) -> None:
     load(client, faulty("NullDereference", optional=True))
     client.start()
     wait_for(lambda: "executor restarted in" in daemon.log(), "the recovery")
     assert client.start().notes[-1].startswith("without /bad: was killed by SIGSEGV")
 
 
-def test_a_value_that_is_not_finite_is_held_back(daemon: Daemon, client: rtcf.Client) -> None:
+def test_a_non_finite_value_is_held_back(daemon: Daemon, client: rtcf.Client) -> None:
     load(client, faulty("NotFinite"))
     client.start()
     fault = wait_for(lambda: client.get_component("bad").fault, "the fault")
@@ -376,11 +380,11 @@ def test_a_value_that_is_not_finite_is_held_back(daemon: Daemon, client: rtcf.Cl
     assert state(client).state == runner_pb2.RUNNER_STATE_RUNNING
 
 
-def test_faults_beyond_those_that_are_told_are_counted(daemon: Daemon, client: rtcf.Client) -> None:
+def test_faults_beyond_the_reported_ones_are_counted(daemon: Daemon, client: rtcf.Client) -> None:
     load(client, faulty("NotFinite"))
     client.start()
     wait_for(lambda: client.get_component("bad").faults > 20, "the faults")
-    # Told once, and counted wherever one looks.
+    # Reported once, and counted in every view.
     told = "is not finite: readers keep its last value"
     wait_for(lambda: told in daemon.log(), "the log")
     assert daemon.log().count(told) == 1
@@ -390,13 +394,13 @@ def test_faults_beyond_those_that_are_told_are_counted(daemon: Daemon, client: r
     assert re.search(r"^/bad: \d+ faults$", daemon.ctl("stats").stdout, re.MULTILINE)
     assert state(client).faults >= 20
     client.stop()
-    # Of another loop others count.
+    # Each run of the loop counts from zero.
     client.set_runner(runner_pb2.RunnerSettings(frequency_hz=1.0))
     client.start()
     assert client.get_component("bad").faults < 20
 
 
-def test_a_value_that_is_not_finite_stops_the_loop_where_it_is_to(
+def test_a_non_finite_value_stops_the_loop_if_requested(
     daemon: Daemon, client: rtcf.Client
 ) -> None:
     load(client, faulty("NotFiniteStops"))
@@ -406,7 +410,7 @@ def test_a_value_that_is_not_finite_stops_the_loop_where_it_is_to(
 
 
 @pytest.mark.parametrize("type_name", ["Allocates", "Sleeps"])
-def test_what_is_slow_shows_in_the_figures(
+def test_a_slow_component_shows_in_the_statistics(
     daemon: Daemon, client: rtcf.Client, type_name: str
 ) -> None:
     load(client, faulty(type_name, after=0))
@@ -416,7 +420,7 @@ def test_what_is_slow_shows_in_the_figures(
         figures = {each.component: each.duration for each in client.get_statistics().components}
         return figures["/bad"].p50_ns, figures["/a"].p50_ns
 
-    wait_for(lambda: longest()[0] > 5e4 > longest()[1] > 0, "the figures")
+    wait_for(lambda: longest()[0] > 5e4 > longest()[1] > 0, "the statistics")
 
 
 def safe_calls(daemon: Daemon) -> int:
@@ -424,7 +428,7 @@ def safe_calls(daemon: Daemon) -> int:
 
 
 @pytest.mark.parametrize("end", ["Throws", "NotFiniteStops", "overruns", "stop"])
-def test_each_orderly_end_makes_all_safe_once(
+def test_each_orderly_end_calls_safe_once_per_component(
     daemon: Daemon, client: rtcf.Client, end: str
 ) -> None:
     client.load(rtcf.component("rtcf_test", "Witness", name="first"))
@@ -435,7 +439,7 @@ def test_each_orderly_end_makes_all_safe_once(
         client.load(faulty("Sleeps"))
     client.load(rtcf.component("rtcf_test", "Witness", name="second"))
     client.start()
-    # Where anything is missing for real time a loop is not to blame for being late.
+    # Without real-time rights a loop is not blamed for being late.
     spared = end == "overruns" and bool(state(client).degraded)
     if end == "stop" or spared:
         wait_for(lambda: state(client).iteration > 100, "more cycles than overruns are allowed")
@@ -443,7 +447,7 @@ def test_each_orderly_end_makes_all_safe_once(
     else:
         wait_for(lambda: state(client).state == runner_pb2.RUNNER_STATE_FAULTED, "its end")
     wait_for(lambda: daemon.log().count("hook stop") == 2, "the stop hooks")
-    # Those that failed, too.
+    # Failed components, too.
     assert safe_calls(daemon) == (3 if end in ("Throws", "NotFiniteStops") else 2)
     if spared:
         wait_for(lambda: "; max_overruns does not stop a degraded loop" in daemon.log(), "the log")
@@ -454,7 +458,7 @@ def test_each_orderly_end_makes_all_safe_once(
         wait_for(lambda: "ended late" in daemon.log(), "the log")
 
 
-def test_a_crash_makes_nothing_safe(daemon: Daemon, client: rtcf.Client) -> None:
+def test_a_crash_calls_no_safe_hook(daemon: Daemon, client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_test", "Witness"))
     client.load(faulty("NullDereference"))
     client.start()
@@ -471,7 +475,7 @@ def test_a_crash_is_recovered_within_a_second(daemon: Daemon, client: rtcf.Clien
 
 
 def give_up(daemon: Daemon, client: rtcf.Client) -> None:
-    """Kill executors until there is none any more."""
+    """Kill executors until rtcfd starts none any more."""
     seen = set()
     while (status := state(client)).state != runner_pb2.RUNNER_STATE_DOWN:
         if status.pid and status.pid not in seen:
@@ -486,15 +490,13 @@ def give_up(daemon: Daemon, client: rtcf.Client) -> None:
             )
 
 
-def test_an_executor_that_dies_all_the_time_is_given_up(
-    daemon: Daemon, client: rtcf.Client
-) -> None:
+def test_an_executor_that_keeps_dying_is_not_restarted(daemon: Daemon, client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_test", "Counter", name="a"))
     give_up(daemon, client)
     assert client.start().order == ["/a"]
 
 
-def test_settings_of_a_runner_that_is_down_are_judged_too(
+def test_settings_of_a_runner_without_executor_are_checked(
     daemon: Daemon, client: rtcf.Client
 ) -> None:
     client.load(rtcf.component("rtcf_test", "Counter", name="a"))

@@ -1,4 +1,4 @@
-"""Fig. 1 of the paper: its order, and every value it sends to ROS."""
+"""Fig. 1 of the paper: its order, and every value that it sends to ROS."""
 
 import itertools
 import json
@@ -25,7 +25,7 @@ def ros_daemon(tmp_path: Path, master: Master) -> Iterator[Daemon]:
     daemon.end()
 
 
-# Each component is the first to be loaded once, and the last.
+# Each component is loaded first once, and last once.
 @pytest.mark.parametrize(
     "names",
     ["H1 F1 R1 R2 R3", "R3 R2 R1 F1 H1", "F1 R2 H1 R3 R1", "R1 H1 R3 F1 R2", "R2 R3 F1 H1 R1"],
@@ -42,7 +42,7 @@ def test_the_order_does_not_depend_on_the_order_of_loading(daemon: Daemon, names
     assert daemon.ctl("order").stdout.split() == fig_1.ORDER
 
 
-def test_ros_gets_each_value_of_an_independent_simulation(
+def test_ros_receives_each_value_of_an_independent_simulation(
     ros_daemon: Daemon, master: Master
 ) -> None:
     with rtcf.Client(ros_daemon.socket) as client:
@@ -50,7 +50,7 @@ def test_ros_gets_each_value_of_an_independent_simulation(
         fig_1.load(client, ("R3", "F1", "R2", "H1", "R1"))
         g1 = master.node("record", "/R1_H1R2")
         g2 = master.node("record", "/R3_G2H1")
-        # A value that takes all of a double's digits.
+        # A value that needs all digits of a double.
         latched = master.node("latch", "/G2_R2", "0.1")
         for node in (g1, g2, latched):
             node.wait_until_connected()
@@ -62,8 +62,8 @@ def test_ros_gets_each_value_of_an_independent_simulation(
         wait_for(lambda: iteration(client) >= MESSAGES, f"{MESSAGES} cycles")
         client.stop()
         cycles = iteration(client)
-        # Half a second of values waits for a thread that a busy machine may hold up for longer.
-        # What is lost then is counted; all else arrives.
+        # Half a second of values waits for a thread that a busy machine may delay longer. Lost
+        # values are counted; all others arrive.
         lost = client.get_status("rt_runner").runners[0].tap_dropped
         assert lost < cycles
         wait_until_it_is(
@@ -72,7 +72,7 @@ def test_ros_gets_each_value_of_an_independent_simulation(
         wanted = list(itertools.islice(fig_1.simulate(g2=0.1), cycles))
         assert is_among(g2.values(), [values["R3"] for values in wanted])
         assert is_among(g1.values(), [values["R1"] for values in wanted])
-        # The sums grow and begin anew, again and again: no value stands for many.
+        # The sums grow and restart repeatedly, so the values differ.
         assert len({values["R3"] for values in wanted}) > 50
         for node in (g1, g2, latched):
             node.end()

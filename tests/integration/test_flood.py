@@ -1,4 +1,4 @@
-"""A user who may only look floods rtcfd in every way at once; an administrator stops the loop."""
+"""An observer floods rtcfd in every way at once; an administrator stops the loop."""
 
 import os
 import statistics
@@ -15,14 +15,14 @@ import rtcf
 from daemon_process import BUILD_TREE, DEADLINE_S, NO_ROS, Daemon, wait_for
 from rtcf.v1 import runner_pb2
 
-STRANGER = 54321  # a uid that no user has
+STRANGER = 54321  # an unused uid
 TIMES = [3, pytest.param(100, marks=pytest.mark.long)]
 FLOOD = Path(__file__).with_name("flood.py")
 
 
 @contextmanager
 def flooded(daemon: Daemon) -> Iterator[None]:
-    """Flood it."""
+    """Run the flood during the block."""
     with tempfile.TemporaryFile("w+") as said:
         process = subprocess.Popen(
             ["setpriv", f"--reuid={STRANGER}", "--clear-groups", "--",
@@ -30,7 +30,7 @@ def flooded(daemon: Daemon) -> Iterator[None]:
              f"{daemon.socket}.d/stop/rt_runner"],
             stdout=said, stderr=subprocess.DEVNULL,
             env={"PYTHONPATH": str(BUILD_TREE / "python"), "PATH": os.environ["PATH"]},
-            start_new_session=True,  # as another user's: the scheduler gives it that user's share
+            start_new_session=True,  # like another user's session, with its own CPU share
         )  # fmt: skip
 
         def there() -> bool:
@@ -47,7 +47,7 @@ def flooded(daemon: Daemon) -> Iterator[None]:
 
 
 def patiently(ask: Callable[[rtcf.Client], Any], daemon: Daemon) -> Any:
-    """Ask what is not the stop, as often as it takes: others may be before us at the door."""
+    """Repeat a request other than the stop until it succeeds, since others compete for slots."""
     deadline = time.monotonic() + DEADLINE_S
     while True:
         try:
@@ -58,9 +58,9 @@ def patiently(ask: Callable[[rtcf.Client], Any], daemon: Daemon) -> Any:
                 raise
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="takes on another user")
+@pytest.mark.skipif(os.geteuid() != 0, reason="requires root to act as another user")
 @pytest.mark.parametrize("times", TIMES)
-def test_a_flood_holds_up_no_stop(times: int) -> None:
+def test_a_flood_blocks_no_stop(times: int) -> None:
     with tempfile.TemporaryDirectory() as name, ExitStack() as floods:
         folder = Path(name)
         folder.chmod(0o755)
@@ -78,7 +78,7 @@ def test_a_flood_holds_up_no_stop(times: int) -> None:
         for _ in range(times):
             patiently(lambda client: client.start(), daemon)
             begin = time.monotonic()
-            with rtcf.Client(daemon.socket) as client:  # a new connection: that of who comes now
+            with rtcf.Client(daemon.socket) as client:  # a new connection, as of a new client
                 client.stop()
             took_s.append(time.monotonic() - begin)
             (status,) = patiently(lambda client: client.get_status("rt_runner").runners, daemon)
@@ -88,9 +88,9 @@ def test_a_flood_holds_up_no_stop(times: int) -> None:
             f"median {statistics.median(took_s):.3f} s, longest {max(took_s):.3f} s, "
             f"{sum(each > 1 for each in took_s)} above one second"
         )
-        # On a quiet machine all are far below one second; what is shown here is that no stop
-        # waits for the flood to end, which it does not.
+        # On an idle machine each stop takes far less than one second. The assertion shows only that
+        # no stop waits for the end of the flood.
         assert max(took_s) < 30
         memory = Path(f"/proc/{daemon.pid}/status").read_text().partition("VmHWM:")[2].split()[0]
-        assert int(memory) < 600_000, "kB of rtcfd"
+        assert int(memory) < 600_000, "memory of rtcfd in kB"
         assert len(list(Path(f"/proc/{daemon.pid}/fd").iterdir())) < 1500

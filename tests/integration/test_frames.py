@@ -1,4 +1,4 @@
-"""The values of the last second outlive the executor, whatever it dies of."""
+"""The values of the last second outlive the executor, whatever the cause of its death."""
 
 import os
 import random
@@ -24,19 +24,19 @@ AT_MOST_BEFORE = 2  # cycles
 
 @pytest.fixture
 def settings() -> str:
-    """Let there be a loop of 1 kHz."""
+    """Return the settings of a loop of 1 kHz."""
     return SETTINGS
 
 
 @pytest.fixture
 def counting(daemon: Daemon, client: rtcf.Client) -> Iterator[rtcf.Client]:
-    """Give a client of a loop that counts its cycles."""
+    """Yield a client of a loop that counts its cycles."""
     client.load(rtcf.component("rtcf_test", "Counter", name="steady"))
     yield client
 
 
 def die(client: rtcf.Client) -> SharedMemory:
-    """Run the loop for a random while, and kill its executor."""
+    """Run the loop for a random time, and kill its executor."""
     client.start()
     wait_for(lambda: state(client).iteration > 20, "20 cycles")
     pid = state(client).pid
@@ -57,7 +57,7 @@ def check_frames(memory: SharedMemory) -> None:
     (message,) = ring.batches()
     batch = PortBatch(schema_of(ring.schema()), 1, message.first_cycle, 0, False, message)
     values = batch["/steady.out"]
-    assert (np.diff(values) == 1).all(), "each is of its own cycle"
+    assert (np.diff(values) == 1).all(), "each value is of its own cycle"
 
 
 def kill_at_random(client: rtcf.Client, times: int) -> None:
@@ -67,7 +67,7 @@ def kill_at_random(client: rtcf.Client, times: int) -> None:
             check_frames(memory)
         finally:
             memory.close()
-        # After some deaths within a minute rtcfd starts no other by itself.
+        # After several crashes within a minute rtcfd starts no executor by itself.
         client.restart_runner("rt_runner")
         assert state(client).state != runner_pb2.RUNNER_STATE_DOWN
 
@@ -94,10 +94,10 @@ def test_the_cycles_before_a_change_are_kept_too(daemon: Daemon, counting: rtcf.
         memory.close()
     assert {value.component for value in before.layout.values} == {"/steady"}
     assert {value.component for value in after.layout.values} == {"/steady", "/other"}
-    assert before.cycles[-1] + 1 == after.cycles[0], "from one cycle to the next"
+    assert before.cycles[-1] + 1 == after.cycles[0], "no cycle is missing between the rings"
 
 
-def test_what_there_is_no_room_for_is_told(daemon: Daemon, client: rtcf.Client) -> None:
+def test_values_that_do_not_fit_a_frame_are_reported(daemon: Daemon, client: rtcf.Client) -> None:
     client.set_runner(runner_pb2.RunnerSettings(frame_kb=0))
     client.load(rtcf.component("rtcf_test", "Counter", name="steady"))
     memory = SharedMemory(state(client).pid)
@@ -111,7 +111,7 @@ def test_what_there_is_no_room_for_is_told(daemon: Daemon, client: rtcf.Client) 
         memory.close()
 
 
-def test_a_frame_size_out_of_range_is_refused(daemon: Daemon) -> None:
+def test_a_frame_size_out_of_range_is_rejected(daemon: Daemon) -> None:
     refused = daemon.ctl("runner", "set", "rt_runner", "--frame-kb", "1025")
     assert refused.returncode != 0
     assert "1025" in refused.stderr and "1024" in refused.stderr

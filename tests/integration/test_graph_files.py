@@ -1,4 +1,4 @@
-"""`rtcfctl apply` and `save` against a loop that runs."""
+"""`rtcfctl apply` and `save` with a running loop."""
 
 import json
 import shutil
@@ -32,7 +32,7 @@ def file(tmp_path: Path) -> Path:
 
 
 def changes(daemon: Daemon, *arguments: str) -> set[tuple[str, str]]:
-    """Apply, and return what was changed and where."""
+    """Apply; return the kinds and names of the changes."""
     done = daemon.ctl("-r", "rt_runner", "apply", *arguments, "-o", "yaml")
     assert done.returncode == 0, done.stderr
     differences = yaml.safe_load(done.stdout)["rt_runner"]["differences"]
@@ -44,7 +44,7 @@ def count(client: rtcf.Client, name: str) -> int:
     return int((ports["out"].value or "0").removeprefix("data: "))
 
 
-def test_a_file_becomes_the_graph_and_again_changes_nothing(
+def test_a_second_apply_of_a_file_changes_nothing(
     daemon: Daemon, client: rtcf.Client, file: Path
 ) -> None:
     client.load(rtcf.component("rtcf_test", "Counter", name="gone"))
@@ -61,7 +61,9 @@ def test_a_file_becomes_the_graph_and_again_changes_nothing(
     assert changes(daemon, str(file)) == set()
 
 
-def test_what_stays_is_not_touched(daemon: Daemon, client: rtcf.Client, file: Path) -> None:
+def test_unchanged_components_are_not_touched(
+    daemon: Daemon, client: rtcf.Client, file: Path
+) -> None:
     changes(daemon, str(file))
     client.start()
     wait_for(lambda: count(client, "steady") > 50, "50 cycles")
@@ -81,7 +83,7 @@ def test_what_stays_is_not_touched(daemon: Daemon, client: rtcf.Client, file: Pa
     assert rate == 1.0
 
 
-def test_a_refused_file_changes_nothing(daemon: Daemon, client: rtcf.Client, file: Path) -> None:
+def test_a_rejected_file_changes_nothing(daemon: Daemon, client: rtcf.Client, file: Path) -> None:
     changes(daemon, str(file))
     order = client.get_order()
     file.write_text(
@@ -111,7 +113,7 @@ def test_save_and_apply_are_inverse(daemon: Daemon, client: rtcf.Client, file: P
     assert values["mode"].string_value == "idle"
 
 
-def test_the_graph_of_a_file_comes_back_after_a_crash(
+def test_the_graph_of_a_file_is_restored_after_a_crash(
     daemon: Daemon, client: rtcf.Client, file: Path
 ) -> None:
     changes(daemon, str(file))
@@ -124,7 +126,7 @@ def test_the_graph_of_a_file_comes_back_after_a_crash(
     assert changes(daemon, str(file)) == set()
 
 
-def test_apply_takes_a_rebuilt_library_when_it_is_asked_to(tmp_path: Path) -> None:
+def test_apply_loads_a_rebuilt_library_if_requested(tmp_path: Path) -> None:
     built = BUILD_TREE / "lib" / "rtcf" / "rtcf_examples" / "rtcf_examples.so"
     library = tmp_path / "packages" / "rtcf_mine" / "mine.so"
     library.parent.mkdir(parents=True)

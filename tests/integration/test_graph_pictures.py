@@ -1,4 +1,4 @@
-"""`rtcfctl graph`: what a loop consists of, as text and as pictures by Graphviz."""
+"""`rtcfctl graph`: a graph as text and as drawings by Graphviz."""
 
 import json
 import re
@@ -18,12 +18,12 @@ _MANY = 200
 
 @pytest.fixture
 def loaded(daemon: Daemon, client: rtcf.Client) -> Iterator[Daemon]:
-    """Give a daemon with Fig. 1 of the paper."""
+    """Yield a daemon with Fig. 1 of the paper."""
     fig_1.load(client)
     yield daemon
 
 
-def test_the_text_tells_the_order_and_who_feeds_whom(loaded: Daemon) -> None:
+def test_the_text_lists_order_and_connections(loaded: Daemon) -> None:
     done = loaded.ctl("graph")
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
@@ -37,7 +37,7 @@ def test_the_text_tells_the_order_and_who_feeds_whom(loaded: Daemon) -> None:
     assert [each["full_name"] for each in told["components"]] == order
 
 
-def test_pictures_show_every_component(loaded: Daemon, tmp_path: Path) -> None:
+def test_drawings_show_every_component(loaded: Daemon, tmp_path: Path) -> None:
     picture = tmp_path / "fig_1.svg"
     done = loaded.ctl("graph", "-o", str(picture))
     assert (done.returncode, done.stdout) == (0, f"{picture}: 5 components\n"), done.stderr
@@ -50,7 +50,7 @@ def test_pictures_show_every_component(loaded: Daemon, tmp_path: Path) -> None:
     assert "style=dashed" in (tmp_path / "fig_1.dot").read_text()
 
 
-def test_topics_and_namespaces_are_in_it(client: rtcf.Client, daemon: Daemon) -> None:
+def test_drawings_show_topics_and_namespaces(client: rtcf.Client, daemon: Daemon) -> None:
     client.load(rtcf.component("rtcf_examples", "Wave", name="w", ns="/arm/left"))
     file = daemon.folder / "x.dot"
     assert daemon.ctl("graph", "-o", str(file)).returncode == 0
@@ -100,7 +100,7 @@ def test_long_and_wide_graphs_fit_a_screen(
     assert len({(round(x), round(y)) for x, y in boxes.values()}) >= _MANY
     for a, b in boxes.values():
         assert -1 <= a <= wide and -high - 1 <= b <= 1
-    # The .dot file has the same places, whoever draws it.
+    # The .dot file has the same positions, for any program that draws it.
     source = tmp_path / "large.dot"
     assert daemon.ctl("graph", "-o", str(source)).returncode == 0
     again = subprocess.run(["dot", "-Tsvg", source], capture_output=True, check=True).stdout
@@ -108,7 +108,7 @@ def test_long_and_wide_graphs_fit_a_screen(
 
 
 def boxes_in(root: ElementTree.Element) -> Iterator[tuple[str, tuple[float, float]]]:
-    """Yield the middle of each node of a picture."""
+    """Yield the centre of each node of a drawing."""
     for group in root.iter():
         if group.get("class") == "node":
             title, text = (
@@ -139,13 +139,15 @@ def test_a_short_chain_is_drawn_from_left_to_right(
         ("no/x.dot", 1, "No such file or directory"),
     ],
 )
-def test_refused_in_a_line(daemon: Daemon, tmp_path: Path, file: str, code: int, said: str) -> None:
+def test_errors_are_one_line(
+    daemon: Daemon, tmp_path: Path, file: str, code: int, said: str
+) -> None:
     done = daemon.ctl("graph", "-o", str(tmp_path / file))
     assert done.returncode == code
     assert said in done.stderr.splitlines()[-1]
 
 
-def test_without_graphviz_it_is_said_how_to_get_it(loaded: Daemon, tmp_path: Path) -> None:
+def test_without_graphviz_the_package_is_named(loaded: Daemon, tmp_path: Path) -> None:
     programs = tmp_path / "bin"
     programs.mkdir()
     (programs / "python3").symlink_to("/usr/bin/python3")

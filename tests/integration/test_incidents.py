@@ -1,4 +1,4 @@
-"""What ran before a fault, a crash or a stall is kept in a file, whatever else goes on."""
+"""The cycles before a fault, a crash or a stall are kept in a file, despite other activity."""
 
 import json
 import os
@@ -19,12 +19,12 @@ from values import state
 
 SETTINGS = f"[runner]\nstall_timeout_ms = 500\n{NO_ROS}"
 FAULTS = ("Throws", "NotFiniteStops", "NullDereference", "NeverReturns")
-PACE_S = 11.0  # after which another incident of a runner is kept
+PACE_S = 11.0  # minimum time between two incidents of a runner
 
 
 @pytest.fixture
 def settings() -> str:
-    """Let there be an rtcfd whose loops are soon taken for stalled."""
+    """Return the settings of an rtcfd with a short stall timeout."""
     return SETTINGS
 
 
@@ -36,7 +36,7 @@ def faulty(type_name: str, after: int) -> graph_pb2.ComponentSpec:
 
 @contextmanager
 def hot_swaps(daemon: Daemon) -> Iterator[None]:
-    """Load and unload a component again and again."""
+    """Load and unload a component repeatedly."""
     done = threading.Event()
 
     def swap() -> None:
@@ -58,23 +58,23 @@ def hot_swaps(daemon: Daemon) -> Iterator[None]:
 
 
 def newest(client: rtcf.Client, known: int) -> incidents_pb2.Incident:
-    """Wait for an incident besides those known."""
+    """Wait for an incident besides the known ones."""
     wait_for(lambda: len(client.list_incidents()) > known, "an incident")
     return client.list_incidents()[-1]
 
 
 def check_file(incident: incidents_pb2.Incident) -> None:
-    """See that values of /a.out are there, each of its own cycle, up to the end."""
+    """Check that the file has the values of /a.out, each of its own cycle, up to the end."""
     with rtcf.read_recording(incident.file) as recording:
         assert recording.whole
         about = recording.metadata["incident"]
         cycles = recording.cycles
         assert len(cycles) > 10
         assert (np.diff(cycles) == 1).all(), "no cycle is missing"
-        assert int(about["cycle"]) - cycles[-1] <= 2, "up to the end"
+        assert int(about["cycle"]) - cycles[-1] <= 2, "the frames reach the end"
         column = recording.read("/a.out")
-        # In the last one, where components make safe, nobody counts.
-        assert (column.values == column.cycles + 1)[:-1].all(), "each is of its own cycle"
+        # The last cycle, in which components make safe, does not count.
+        assert (column.values == column.cycles + 1)[:-1].all(), "each value is of its own cycle"
         graph = json.loads(recording.metadata["graph"]["json"])
         assert "a" in {each["name"].strip("/") for each in graph}
         assert about["rtcf"] == about["executor"] != ""
@@ -99,7 +99,7 @@ def test_each_fault_has_its_file(daemon: Daemon, client: rtcf.Client) -> None:
         check_file(incident)
 
 
-def test_sigkill_amid_hot_swaps_has_its_file(daemon: Daemon, client: rtcf.Client) -> None:
+def test_sigkill_during_hot_swaps_has_its_file(daemon: Daemon, client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_test", "Counter", name="a"))
     client.start()
     with hot_swaps(daemon):
@@ -111,7 +111,7 @@ def test_sigkill_amid_hot_swaps_has_its_file(daemon: Daemon, client: rtcf.Client
 
 
 @pytest.mark.long
-def test_50_random_incidents_amid_hot_swaps_have_their_files(
+def test_50_random_incidents_during_hot_swaps_have_their_files(
     daemon: Daemon, client: rtcf.Client
 ) -> None:
     with hot_swaps(daemon):
@@ -133,7 +133,9 @@ def test_50_random_incidents_amid_hot_swaps_have_their_files(
             client.remove_runner(runner)
 
 
-def test_one_is_taken_of_a_loop_that_runs_on(daemon: Daemon, client: rtcf.Client) -> None:
+def test_an_incident_of_a_running_loop_is_kept_on_request(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
     client.load(rtcf.component("rtcf_test", "Counter", name="a"))
     client.load(rtcf.component("rtcf_test", "Knobs", name="knobs", parameters=["rate:=2.5"]))
     client.start()
@@ -174,14 +176,16 @@ def test_a_file_is_exported_and_removed(
     assert refused.returncode == 1 and "there are no incidents" in refused.stderr
 
 
-def test_a_runner_without_executor_has_none_to_take(daemon: Daemon, client: rtcf.Client) -> None:
+def test_a_runner_without_executor_has_no_cycles_to_keep(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
     refused = daemon.ctl("-r", "nobody", "incident", "take")
     assert refused.returncode == 1 and "nobody" in refused.stderr
     with pytest.raises(rtcf.RefusedError, match="there is no incident /etc/passwd"):
         client.remove_incidents(["/etc/passwd"])
 
 
-def test_the_oldest_go_when_there_are_too_many(tmp_path: Path) -> None:
+def test_the_oldest_incidents_are_removed(tmp_path: Path) -> None:
     daemon = Daemon(tmp_path, f"[limits]\nincidents_mb = 1\n{NO_ROS}")
     daemon.start()
     try:
@@ -189,7 +193,7 @@ def test_the_oldest_go_when_there_are_too_many(tmp_path: Path) -> None:
             client.load(rtcf.component("rtcf_test", "Counter", name="a"))
             client.start()
             first = client.take_incident()
-            # As one of a large graph would be.
+            # The size of a large graph's incident.
             Path(first.file).write_bytes(bytes(1_000_000))
             os.utime(first.file, (1.0, 1.0))
             second = client.take_incident()
@@ -199,7 +203,7 @@ def test_the_oldest_go_when_there_are_too_many(tmp_path: Path) -> None:
         daemon.end()
 
 
-def test_the_faulting_cycle_is_shown_of_a_loop_that_goes_on(
+def test_the_faulting_cycle_of_a_continuing_loop_is_shown(
     daemon: Daemon, client: rtcf.Client
 ) -> None:
     client.load(rtcf.component("rtcf_test", "Counter", name="a"))
@@ -217,11 +221,11 @@ def test_the_faulting_cycle_is_shown_of_a_loop_that_goes_on(
     assert [each["cycle"] for each in told["last_cycles"]] == list(
         range(told["cycle"] - 9, told["cycle"] + 1)
     )
-    # It counts its updates, and failed in the 201st, which nobody reads.
+    # It counts its updates and failed in the 201st, whose value nobody reads.
     assert told["values"]["/bad.out"] == {"cycle": told["cycle"], "value": 200}
 
 
-def test_parameters_changed_lately_are_shown_with_values(
+def test_recent_parameter_changes_are_shown_with_values(
     daemon: Daemon, client: rtcf.Client
 ) -> None:
     client.load(rtcf.component("rtcf_test", "Knobs", name="knobs"))
@@ -233,12 +237,14 @@ def test_parameters_changed_lately_are_shown_with_values(
     assert "/knobs.label abc -> xyz by " in shown, shown
 
 
-def test_the_set_that_an_executor_died_of_is_known(daemon: Daemon, client: rtcf.Client) -> None:
+def test_the_parameter_change_that_killed_an_executor_is_shown(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
     client.load(rtcf.component("rtcf_test", "Counter", name="a"))
     client.load(faulty("NullDereference", 1_000_000_000))
     client.start()
     wait_for(lambda: state(client).iteration > 100, "100 cycles")
-    # Whether it answers before it dies is a matter of microseconds.
+    # It may or may not answer before it dies.
     with suppress(rtcf.RtcfError):
         client.set_parameters("bad", [rtcf.parse_parameter("after:=0")])
     newest(client, 0)

@@ -1,4 +1,4 @@
-"""What a default `make` has built can be installed by CMake alone."""
+"""The result of a default `make` can be installed with CMake alone."""
 
 import subprocess
 from pathlib import Path

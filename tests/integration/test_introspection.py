@@ -1,4 +1,4 @@
-"""What ROS peers see of a loop besides its topics, and what they may ask of it."""
+"""Introspection of a loop for ROS peers, besides its topics, and the services they may call."""
 
 import itertools
 import re
@@ -30,17 +30,17 @@ SERVICES = {
 
 @pytest.fixture
 def settings(master: Master) -> str:
-    """Let the loops of `daemon` have a ROS node."""
+    """Return settings with a ROS node for the loops of `daemon`."""
     return _with_ros(master.uri, fig_1.WHITELIST)
 
 
 def _with_ros(master_uri: str, whitelist: str) -> str:
-    """Return settings for a node whose services are where RTCF 2021 has them."""
+    """Return settings for a node that offers its services where RTCF 2021 does."""
     return with_ros(master_uri, whitelist) + "ns = '/rt_runner'\n"
 
 
 def _node(client: rtcf.Client) -> str:
-    """Return the name of the registered node, under which the loop's health is reported."""
+    """Return the name of the registered node, which reports the loop's health."""
     wait_for(lambda: client.get_status("rt_runner").runners[0].ros.connected, "the ROS node")
     return str(client.get_status("rt_runner").runners[0].ros.node).removeprefix("/")
 
@@ -50,7 +50,7 @@ def _wait_for_services(master: Master) -> None:
 
 
 def _call(master: Master, service: str, request: str = "") -> dict[str, object]:
-    """Call a service as a person does; return its answer."""
+    """Call a service by rosservice; return its answer."""
     done = subprocess.run(
         ["/usr/bin/rosservice", "call", f"/rt_runner/{service}", *([request] if request else [])],
         env=_environment(master),
@@ -99,11 +99,11 @@ def test_every_cycle_is_published_with_stamp_and_duration(
     client.start()
     cycles, infos = ([list(map(int, line.split())) for line in _lines(peer)] for peer in peers)
     client.stop()
-    assert [each[0] for each in cycles] == list(range(6000))  # none lost, from the first on
+    assert [each[0] for each in cycles] == list(range(6000))  # complete, from the first one on
     stamps = [each[1] for each in cycles]
     assert all(later > earlier for earlier, later in itertools.pairwise(stamps))
     assert all(duration > 0 for _, _, _, duration in cycles)
-    # RTCF 2021's has the time at which the cycle began.
+    # RTCF 2021's stamp is the time at which the cycle began.
     assert infos == [[stamp + latency, duration] for _, stamp, latency, duration in cycles]
 
 
@@ -127,7 +127,7 @@ def test_a_stamped_number_has_the_time_of_the_cycle_that_wrote_it(
     client.start()
     cycles, values = ([list(map(int, line.split())) for line in _lines(peer)] for peer in peers)
     assert values == [[stamp, iteration + 1] for iteration, stamp, _, _ in cycles]
-    # As a person looks: the value where it is in a message of std_msgs, and its time.
+    # As a user reads it: the value is in the same field as in a message of std_msgs, with a time.
     for field in ("data", "header/stamp", "header/seq"):
         shown = subprocess.run(
             ["/usr/bin/rostopic", "echo", "-n1", f"/c/out/{field}"],
@@ -154,7 +154,7 @@ def test_rostopic_knows_the_types_of_the_cycles(daemon: Daemon, master: Master) 
         assert f"Type: rtcf_msgs/{kind}" in done.stdout
 
 
-def test_a_peer_of_rtcf_2021_loads_looks_and_unloads(
+def test_a_peer_of_rtcf_2021_loads_queries_and_unloads(
     daemon: Daemon, client: rtcf.Client, master: Master
 ) -> None:
     _wait_for_services(master)
@@ -175,7 +175,7 @@ def test_a_peer_of_rtcf_2021_loads_looks_and_unloads(
         "msg_type": "std_msgs/Float64", "connected_to_ROS": False,
     } in component["output_ports"]  # fmt: skip
     assert len(component["input_ports"]) == 4
-    assert told["connections"] == []  # nothing reads what it writes
+    assert told["connections"] == []  # no input reads its outputs
     assert _call(master, "load_orocos_component", load.replace("Sum", "Next").replace(
         "from_topic: {data: out1}", "from_topic: {data: in1}"
     )) == {"success": {"data": True}}  # fmt: skip
@@ -187,7 +187,7 @@ def test_a_peer_of_rtcf_2021_loads_looks_and_unloads(
     }]  # fmt: skip
     unload = "{component_name: {data: Sum}, ns: {data: /arm}}"
     assert _call(master, "unload_orocos_component", unload) == {"success": {"data": True}}
-    # Its answer has no room for the reason.
+    # RTCF 2021's response has no field for the reason.
     assert _call(master, "unload_orocos_component", unload) == {"success": {"data": False}}
     wait_for(lambda: "service call failed: " in daemon.log(), "the reason")
 
@@ -212,7 +212,7 @@ def test_the_rt_launcher_of_rtcf_2021_names_a_component_by_its_full_name(
     assert client.get_component("/leg/z").full_name == "/leg/z"
 
 
-def test_diagnostics_tell_the_health_of_loop_and_components(
+def test_diagnostics_report_the_health_of_loop_and_components(
     client: rtcf.Client, master: Master
 ) -> None:
     client.load(rtcf.component("rtcf_faults", "Throws", name="Bomb", parameters=["after:=2000"]))
@@ -236,10 +236,10 @@ def test_diagnostics_tell_the_health_of_loop_and_components(
     assert "state=faulted" in loop[-1]
 
 
-def test_diagnostics_call_a_loop_that_cannot_keep_its_rate_an_error(
+def test_diagnostics_report_an_error_for_a_loop_that_is_too_slow(
     client: rtcf.Client, master: Master
 ) -> None:
-    # It sleeps for 100 µs or more in each cycle of 50 µs.
+    # It sleeps for at least 100 µs in each cycle of 50 µs.
     client.set_runner(runner_pb2.RunnerSettings(frequency_hz=20000.0))
     client.load(rtcf.component("rtcf_faults", "Sleeps", name="slow", parameters=["after:=0"]))
     client.start()
@@ -249,14 +249,12 @@ def test_diagnostics_call_a_loop_that_cannot_keep_its_rate_an_error(
     assert "Hz instead of 20000 Hz" in loop[-1][2]
 
 
-def test_what_is_missing_for_real_time_is_a_warning_once(
-    client: rtcf.Client, master: Master
-) -> None:
+def test_missing_real_time_rights_are_warned_of_once(client: rtcf.Client, master: Master) -> None:
     client.set_runner(runner_pb2.RunnerSettings(frequency_hz=10.0, lock_memory=False))
-    _wait_for_services(master)  # by then the node has its name
+    _wait_for_services(master)  # the node has its name then
     name = f"{_node(client)}: loop"
     peer = _peer(master, "diagnostics", name, "0")
-    assert _lines(peer)  # it listens, and the loop is stopped
+    assert _lines(peer)  # it is connected, and the loop is stopped
     client.start()
     wait_for(lambda: iteration(client) > 30, "three seconds")
     statuses = [line.split("|") for line in _lines(_peer(master, "diagnostics", name, "0"))]
@@ -308,7 +306,7 @@ def test_services_load_run_and_unload_as_rtcfctl_does(
     assert daemon.ctl("order").stdout.split() == []
 
 
-def test_what_services_change_is_the_desired_state(
+def test_services_change_the_desired_state(
     daemon: Daemon, client: rtcf.Client, master: Master
 ) -> None:
     _wait_for_services(master)
@@ -329,7 +327,7 @@ def test_what_services_change_is_the_desired_state(
         ("unload_component", "{name: Nobody}", "/Nobody"),
     ],
 )
-def test_refusals_say_what_is_wrong(
+def test_errors_give_the_reason(
     daemon: Daemon, master: Master, service: str, request_text: str, why: str
 ) -> None:
     _wait_for_services(master)
@@ -342,7 +340,7 @@ def test_refusals_say_what_is_wrong(
 @pytest.mark.parametrize(
     ("access", "loads", "starts"), [("observe", False, False), ("operate", False, True)]
 )
-def test_ros_may_do_what_the_settings_allow(
+def test_ros_peers_have_the_rights_of_the_settings(
     tmp_path: Path, master: Master, access: str, loads: bool, starts: bool
 ) -> None:
     settings = _with_ros(master.uri, "") + f'peers = "{access}"\n'
@@ -361,7 +359,7 @@ def test_ros_may_do_what_the_settings_allow(
         daemon.end()
 
 
-def test_services_and_topics_are_there_again_after_a_restart_of_the_master(
+def test_services_and_topics_return_after_a_restart_of_the_master(
     tmp_path: Path,
 ) -> None:
     master = Master(tmp_path)
@@ -381,7 +379,7 @@ def test_services_and_topics_are_there_again_after_a_restart_of_the_master(
         master.end()
 
 
-def test_services_leave_with_the_daemon(daemon: Daemon, master: Master) -> None:
+def test_services_end_with_the_daemon(daemon: Daemon, master: Master) -> None:
     _wait_for_services(master)
     daemon.end()
-    wait_for(lambda: not master.services() & SERVICES, "the master to have heard of it")
+    wait_for(lambda: not master.services() & SERVICES, "the master to be told")

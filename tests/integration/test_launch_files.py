@@ -1,4 +1,4 @@
-"""Launch files with roslaunch: those that come with the examples, and larger ones."""
+"""Launch files with roslaunch: those of the examples, and larger ones."""
 
 import itertools
 import os
@@ -21,7 +21,7 @@ RUNNER_SERVICES = (
     "activate_rt_loop", "deactivate_rt_loop", "get_introspection_information", "get_loop",
     "load_orocos_component", "unload_orocos_component", "load_component", "unload_component",
 )  # fmt: skip
-# What roscore itself has.
+# roscore's own topics.
 ROSCORE_TOPICS = {"/rosout", "/rosout_agg"}
 
 
@@ -42,16 +42,16 @@ def wait_until_running(client: rtcf.Client, runner: str) -> None:
 
 
 def press_ctrl_c(launch: Process) -> None:
-    """End roslaunch; nothing had to be killed, and nothing is left."""
+    """End roslaunch in order: it kills no process, and none remains."""
     begin = time.monotonic()
     launch.end(signal.SIGINT)
-    # A figure to look at, not a limit: the machine may be busy.
+    # For information only, not a limit: the machine may be busy.
     print(f"Ctrl-C took {time.monotonic() - begin:.2f} s")
     output = launch.output()
     assert "escalating" not in output
     socket = output.partition("private daemon at ")[2].partition(",")[0]
     wait_for(lambda: not left_over(socket), "the private daemon to end")
-    wait_for(lambda: not Path(socket).parent.exists(), "its folder to go")
+    wait_for(lambda: not Path(socket).parent.exists(), "the removal of its folder")
 
 
 def topics(master: Master) -> dict[str, str]:
@@ -88,7 +88,7 @@ def nodes(master: Master) -> set[str]:
 
 
 def node_of_the_loop(master: Master) -> str:
-    """Return its name, once it has topics."""
+    """Return the node's name, once it has topics."""
     wait_for(lambda: "/rt_runner/cycles" in master.topics()[0], "the node of the loop")
     state = rosgraph.Master("/test", master.uri).getSystemState()
     (node,) = next(users for topic, users in state[0] if topic == "/rt_runner/cycles")
@@ -122,7 +122,7 @@ def test_the_papers_evaluation_runs_and_the_tools_find_it(
         "connection_info: no connection /R1_H1R3; did you mean /R1_H1R2?\n",
     )
     with launching.client() as (client, runner):
-        # G2 answers: its value has come into the loop.
+        # G2 works: its value has arrived in the loop.
         wait_for(
             lambda: next(p for p in client.get_component("R2", runner).ports if p.name == "in4")
             .count > 0,
@@ -142,7 +142,7 @@ def test_listing_2_of_the_paper_runs(launching: Launching, master: Master) -> No
     press_ctrl_c(launch)
 
 
-def test_records_are_on_the_screen_a_killed_launcher_comes_back_and_the_master_may_go(
+def test_logs_are_on_screen_and_a_killed_launcher_and_master_are_survived(
     tmp_path: Path,
 ) -> None:
     master = Master(tmp_path)
@@ -154,9 +154,9 @@ def test_records_are_on_the_screen_a_killed_launcher_comes_back_and_the_master_m
         launch.wait_for_output("/wave: up through zero in cycle")
         launch.wait_for_output("the loop runs with 1 components")
         os.kill(launch.children()["wave"], signal.SIGKILL)
-        # Its death stops the loop; once roslaunch has started it again, the loop is complete.
+        # Its death stops the loop; once roslaunch has restarted it, the loop is complete.
         started = "the loop runs with 1 components"
-        wait_for(lambda: launch.output().count(started) == 2, "the launcher to come back")
+        wait_for(lambda: launch.output().count(started) == 2, "the restart of the launcher")
         master.end()
         press_ctrl_c(launch)
         assert "/wave: stopped" in launch.output()
@@ -164,9 +164,7 @@ def test_records_are_on_the_screen_a_killed_launcher_comes_back_and_the_master_m
         launching.end()
 
 
-def test_private_parameters_are_values_of_declared_ones(
-    launching: Launching, master: Master
-) -> None:
+def test_private_parameters_set_declared_parameters(launching: Launching, master: Master) -> None:
     launch = launching.roslaunch("rtcf_examples", "parameters.launch")
     with launching.client() as (client, runner):
         wait_until_running(client, runner)
@@ -186,7 +184,7 @@ def test_private_parameters_are_values_of_declared_ones(
 
 
 # Ten components in four namespaces: a position loop around a velocity loop around a current
-# loop, twice, and a sum of both. The arrows are names; `~` is a component's own.
+# loop, twice, and a sum of both. The arrows are names; `~` is a private name.
 TEN: dict[str, dict[str, str]] = {
     "/drive": {"in1": "/l/effort", "in2": "/r/effort", "out1": "/state"},
     "/l/position": {"in1": "/target", "in2": "/state", "out1": "wanted"},
@@ -250,7 +248,7 @@ def ten_components() -> str:
 
 
 def simulate_ten(target: float) -> Iterator[float]:
-    """Yield what /watch/total writes; all inputs are new in each cycle but the target."""
+    """Yield the values of /watch/total; all inputs are new in each cycle except the target."""
     add = fig_1.mimo_sum
     effort: dict[str, float | None] = {"l": None, "r": None}
     felt: dict[str, float | None] = {"l": None, "r": None}
@@ -266,7 +264,7 @@ def simulate_ten(target: float) -> Iterator[float]:
         yield add(effort["l"], effort["r"], state)
 
 
-def test_ten_components_in_nested_loops_and_namespaces_give_the_numbers_wanted(
+def test_ten_components_in_nested_loops_and_namespaces_compute_correctly(
     launching: Launching, master: Master
 ) -> None:
     launch = launching.launch_text(ten_components())
@@ -286,7 +284,7 @@ def test_ten_components_in_nested_loops_and_namespaces_give_the_numbers_wanted(
         wanted = dict.fromkeys(("/target", "/l/effort", "/watch/sum"), "std_msgs/Float64")
         wait_until_it_is(wanted, lambda: topics(master), "the topics")
         loop = node_of_the_loop(master)
-        # The runner, ten launchers, and the two of this test.
+        # The runner, ten launchers, and two nodes of this test.
         wait_until_it_is(13, lambda: len(nodes(master) - {loop}), "the number of nodes")
         own = {
             *(f"/rt_runner/{name}" for name in RUNNER_SERVICES),
@@ -301,7 +299,7 @@ def test_ten_components_in_nested_loops_and_namespaces_give_the_numbers_wanted(
         assert master.call("/rt_runner/deactivate_rt_loop")["success"] is True
         assert not running(client, runner)
         cycles = iteration(client, runner)
-        # Half a second of values waits for a thread that a busy machine may hold up for longer.
+        # Half a second of values waits for a thread that a busy machine may delay longer.
         lost = client.get_status(runner).runners[0].tap_dropped
         record.wait_for_values(cycles - lost)
         assert is_among(record.values(), itertools.islice(simulate_ten(0.1), cycles))
@@ -338,7 +336,7 @@ TWO_RUNNERS = """
 """
 
 
-def test_one_launch_file_has_several_runners(launching: Launching, master: Master) -> None:
+def test_a_launch_file_can_have_several_runners(launching: Launching, master: Master) -> None:
     launch = launching.launch_text(TWO_RUNNERS)
     for node, frequency, component in (
         ("/left/rt_runner", 100.0, "/left/same"),
@@ -349,7 +347,7 @@ def test_one_launch_file_has_several_runners(launching: Launching, master: Maste
             (status,) = client.get_status(runner).runners
             assert status.settings.frequency_hz == frequency
             assert client.get_order(runner) == [component]
-            # What it shows of itself is under its node's name, as of any node.
+            # Its introspection is under its node's name, as for any node.
             wait_until_shown(master, node)
     order = launching.tool("component_order", "-r", "/left/rt_runner").stdout
     assert "1. /left/same\n" in order

@@ -1,4 +1,4 @@
-"""The node of a launch's loop as ROS shows it, and a launch whose roscore is started anew."""
+"""The node of a launch's loop in ROS tools, and launches whose roscore restarts."""
 
 import subprocess
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ DONE = 0
 
 @pytest.fixture
 def own_master(tmp_path: Path) -> Iterator[Master]:
-    """Give a master of the test's own, which it may end."""
+    """Yield a private master, which the test may end."""
     master = Master(tmp_path)
     master.start()
     yield master
@@ -29,7 +29,7 @@ def launching(tmp_path: Path, own_master: Master) -> Iterator[Launching]:
 
 
 def running(launching: Launching, master: Master, *words: str) -> tuple[Process, Process]:
-    """Start a runner and a component with a topic; return when ROS shows both."""
+    """Start a runner and a component with a topic; return once ROS shows both."""
     runner = launching.node("rt_runner", "_ros_mapping_whitelist:=.*", *words)
     launcher = launching.node(
         "rt_launcher", "rtcf_compat", "PaperExample", "__name:=it", "out_port:=/out"
@@ -49,7 +49,7 @@ def test_the_runners_node_has_the_loops_topics_services_and_loggers(
         assert f" * {name}" in told, told
     nodes = set(own_master.run("/usr/bin/rosnode", "list").split())
     assert nodes == {"/rosout", "/rt_runner", "/rt_runner/launch", "/it"}
-    # As rqt_logger_level does it.
+    # The call of rqt_logger_level.
     loggers = {
         each["name"]: each["level"] for each in own_master.call("/rt_runner/get_loggers")["loggers"]
     }
@@ -71,10 +71,10 @@ def test_rosnode_kill_of_the_runner_ends_the_launch(
     own_master.run("/usr/bin/rosnode", "kill", "/rt_runner")
     assert runner.wait() == DONE
     assert "asked to end: " in runner.output()
-    assert launcher.wait() != DONE  # its runner has gone
+    assert launcher.wait() != DONE  # its runner ended
 
 
-def test_the_level_of_a_launchers_logger_holds_for_its_lines(
+def test_a_launchers_logger_level_applies_to_its_records(
     launching: Launching, own_master: Master
 ) -> None:
     runner, launcher = running(launching, own_master)
@@ -87,7 +87,7 @@ def test_the_level_of_a_launchers_logger_holds_for_its_lines(
     assert "the loop is stopped" not in runner.output()
 
 
-def test_a_launch_is_there_again_after_a_restart_of_roscore(
+def test_a_launch_returns_after_a_restart_of_roscore(
     launching: Launching, own_master: Master
 ) -> None:
     runner, launcher = running(launching, own_master)
@@ -109,7 +109,7 @@ def test_a_launch_is_there_again_after_a_restart_of_roscore(
 
 def test_tools_of_another_machine_ask_the_service(launching: Launching, own_master: Master) -> None:
     runner, launcher = running(launching, own_master)
-    # What is of the other machine is out of reach here: its file system, its host name.
+    # The other machine's file system and host name are unavailable here.
     parameters = own_master.parameter("/rt_runner/rtcf_runner")
     own_master.run("/usr/bin/rosparam", "set", "/rt_runner/rtcf_runner/host", "elsewhere")
     own_master.run("/usr/bin/rosparam", "set", "/rt_runner/rtcf_runner/socket", "/nonexistent")
@@ -125,7 +125,7 @@ def test_tools_of_another_machine_ask_the_service(launching: Launching, own_mast
     assert (launcher.end(), runner.end()) == (DONE, DONE)
 
 
-def test_tools_say_what_is_not_there(launching: Launching, own_master: Master) -> None:
+def test_tools_name_missing_nodes_and_components(launching: Launching, own_master: Master) -> None:
     told = launching.tool("component_list")
     assert (told.returncode, told.stdout) == (3, "")
     assert told.stderr.startswith(

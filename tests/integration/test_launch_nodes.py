@@ -1,5 +1,5 @@
-"""rt_runner and rt_launcher as processes: which daemon they take, what they do when something
-ends, and the statuses they exit with."""
+"""rt_runner and rt_launcher as processes: their choice of a daemon, their reaction to the end of
+each other, and their exit statuses."""
 
 import os
 import re
@@ -37,8 +37,8 @@ Path(sys.argv[0]).with_name("ended").touch()
 
 @pytest.fixture
 def system(tmp_path: Path, master: Master) -> Iterator[Daemon]:
-    """Give a daemon that stands for the system's."""
-    # Its executors wait for its restart as those of the system's do.
+    """Yield a daemon that plays the system's daemon."""
+    # Its executors wait for its restart, like the system's.
     orphans = "[runner]\norphan_timeout_s = 60.0\n"
     daemon = Daemon(tmp_path, orphans + with_ros(master.uri, ""))
     daemon.start()
@@ -48,7 +48,7 @@ def system(tmp_path: Path, master: Master) -> Iterator[Daemon]:
 
 @pytest.fixture
 def launching(tmp_path: Path, master: Master, system: Daemon) -> Iterator[Launching]:
-    """Start nodes that find `system` as the system's daemon."""
+    """Yield a starter of nodes that find `system` as the system's daemon."""
     launching = Launching(master, tmp_path, system.socket)
     launching.forget()
     yield launching
@@ -57,7 +57,7 @@ def launching(tmp_path: Path, master: Master, system: Daemon) -> Iterator[Launch
 
 @pytest.fixture
 def alone(tmp_path: Path, master: Master) -> Iterator[Launching]:
-    """Start nodes where there is no system daemon."""
+    """Yield a starter of nodes without a system daemon."""
     launching = Launching(master, tmp_path)
     launching.forget()
     yield launching
@@ -82,7 +82,7 @@ def is_running(client: rtcf.Client) -> bool:
     return bool(status.state == runner_pb2.RUNNER_STATE_RUNNING)
 
 
-def test_the_system_daemon_is_taken_where_it_may_be_and_given_back(
+def test_the_system_daemon_is_used_if_permitted_and_released(
     launching: Launching, system: Daemon, master: Master
 ) -> None:
     runner = launching.node("rt_runner", "_frequency:=321", ROS_HOSTNAME="127.0.0.1")
@@ -94,7 +94,7 @@ def test_the_system_daemon_is_taken_where_it_may_be_and_given_back(
         assert "rt_runner /rt_runner" in status.holder
         for reason in status.degraded:
             runner.wait_for_output(f"!! rt_runner IS NOT REAL TIME: {reason}")
-        # The name by which peers reach the loop's node is that of the launch.
+        # The node of the loop has the name of the launch's runner.
         graph = rosgraph.Master("/test", master.uri)
         wait_for(lambda: client.get_status("rt_runner").runners[0].ros.connected, "the ROS node")
         assert "127.0.0.1" in graph.lookupNode(status.ros.node)
@@ -103,7 +103,7 @@ def test_the_system_daemon_is_taken_where_it_may_be_and_given_back(
         assert (status.settings.frequency_hz, status.holder) == (1000.0, "")
 
 
-def test_a_runner_prints_what_it_took(alone: Launching) -> None:
+def test_a_runner_prints_its_settings(alone: Launching) -> None:
     cpu = max(os.sched_getaffinity(0))
     chosen = alone.node(
         "rt_runner", "__name:=chosen", "_frequency:=250", f"_cpu:={cpu}", "_priority:=42",
@@ -116,14 +116,14 @@ def test_a_runner_prints_what_it_took(alone: Launching) -> None:
     plain.wait_for_output(
         "runner plain at 1000 Hz, a CPU with the fewest loops, priority 80, overrun skip: starting"
     )
-    # Which may be a thousand times what somebody's components were written for.
+    # 1 kHz may be a thousand times the rate for which the components were written.
     plain.wait_for_output("no ~frequency is set; RTCF 2021 took 1 Hz then")
     assert chosen.end() == DONE
     assert plain.end() == DONE
     assert "no ~frequency" not in chosen.output()
 
 
-def test_a_private_daemon_is_taken_where_the_systems_has_another_master(
+def test_a_private_daemon_is_used_if_the_systems_has_another_master(
     tmp_path: Path, master: Master
 ) -> None:
     daemon = Daemon(tmp_path, with_ros("http://localhost:1", ""))
@@ -145,16 +145,16 @@ def test_launchers_come_and_go_and_a_killed_one_stops_the_loop(
     first, second = loaded(launching, "first"), loaded(launching, "second")
     with rtcf.Client(system.socket) as client:
         wait_for(lambda: is_running(client), "the loop")
-        # Ends by itself: its component leaves, the loop goes on.
+        # A launcher ends in order: its component leaves, the loop continues.
         assert first.end(signal.SIGTERM) == DONE
         assert client.get_order() == ["/second"]
         wait_until_after(client, iteration(client) + 10)
         first = loaded(launching, "first")
-        # Dies: the loop is stopped; it starts again when all components are there again.
+        # A launcher dies: the loop stops, and starts again once all components have returned.
         first.end(signal.SIGKILL)
         runner.wait_for_output(f"/first: rt_launcher /first (pid {first.pid}) has died")
         runner.wait_for_output("the loop is stopped")
-        wait_for(lambda: client.get_order() == ["/second"], "the component to leave")
+        wait_for(lambda: client.get_order() == ["/second"], "the unload of the component")
         assert not is_running(client)
         first = loaded(launching, "first", "_on_lease_lost:=keep")
         wait_for(lambda: is_running(client), "the loop")
@@ -163,7 +163,7 @@ def test_launchers_come_and_go_and_a_killed_one_stops_the_loop(
         assert is_running(client)
         assert second.end() == DONE
         assert runner.end() == DONE
-        # What was kept is like any other component of that runner.
+        # The kept component is like any other component of that runner.
         assert client.get_order() == ["/first"]
 
 
@@ -183,7 +183,7 @@ def test_a_launch_outlives_the_restart_of_its_daemon(launching: Launching, syste
     assert runner.end() == DONE
 
 
-def test_a_runner_that_died_may_come_back_to_the_system_daemon(
+def test_a_restarted_runner_returns_to_the_system_daemon(
     launching: Launching, system: Daemon
 ) -> None:
     runner = launching.node("rt_runner", "_frequency:=321")
@@ -198,7 +198,7 @@ def test_a_runner_that_died_may_come_back_to_the_system_daemon(
         assert status.settings.frequency_hz == 1000.0
 
 
-def test_launchers_end_when_their_runner_has_died(alone: Launching) -> None:
+def test_launchers_end_when_their_runner_dies(alone: Launching) -> None:
     runner = alone.node("rt_runner", "_num_components_expected:=1")
     first = loaded(alone, "first")
     runner.wait_for_output("the loop runs with 1 components")
@@ -206,10 +206,10 @@ def test_launchers_end_when_their_runner_has_died(alone: Launching) -> None:
     assert match is not None
     socket = Path(match[1], "control.sock")
     runner.end(signal.SIGKILL)
-    # rtcfd ends with it, in order, and so says why to the launcher.
+    # rtcfd ends with it, in order, and reports that to the launcher.
     assert first.wait() == LOST
     wait_for(lambda: not socket.parent.exists(), "the private daemon to end")
-    # What the dead one has left on the parameter server misleads nobody.
+    # The dead runner's parameters on the parameter server mislead no launcher.
     waiting = launcher(alone, "waiting")
     again = alone.node("rt_runner", "_num_components_expected:=1")
     waiting.wait_for_output("loaded into runner")
@@ -227,7 +227,7 @@ def test_a_fault_ends_the_runner_and_the_launcher_of_the_culprit(alone: Launchin
     assert "the encoder jumped" in bad.output()
 
 
-def test_a_component_that_is_refused_ends_its_launcher(alone: Launching) -> None:
+def test_a_rejected_component_ends_its_launcher(alone: Launching) -> None:
     runner = alone.node("rt_runner", "_num_components_expected:=3")
     runner.wait_for_output("waiting for 3 components")
     cases = {
@@ -248,7 +248,7 @@ def test_a_component_that_is_refused_ends_its_launcher(alone: Launching) -> None
     assert runner.end() == DONE
 
 
-def test_a_runner_that_is_refused_says_why_in_one_line(alone: Launching) -> None:
+def test_a_rejected_runner_prints_the_reason_in_one_line(alone: Launching) -> None:
     cases = {
         ("_ros_latch:=*.ros.*", "__name:=a"): (REFUSED, "*.ros.*"),
         ("_frequency:=fast", "__name:=b"): (USAGE, '~frequency must be a number, not "fast"'),
@@ -265,7 +265,7 @@ def test_a_runner_that_is_refused_says_why_in_one_line(alone: Launching) -> None
         assert "Traceback" not in process.output(), line
 
 
-def test_an_expression_that_is_none_falls_back_as_in_rtcf_2021(alone: Launching) -> None:
+def test_an_invalid_expression_falls_back_as_in_rtcf_2021(alone: Launching) -> None:
     runner = alone.node(
         "rt_runner", "_ros_mapping_whitelist:=*.ros.*", "_ros_mapping_blacklist:=(",
     )  # fmt: skip
@@ -279,7 +279,7 @@ def test_an_expression_that_is_none_falls_back_as_in_rtcf_2021(alone: Launching)
     assert runner.end() == DONE
 
 
-def test_a_launcher_waits_for_its_runner_and_ends_at_once_if_it_is_asked_to(
+def test_a_launcher_waits_for_its_runner_and_can_be_interrupted(
     alone: Launching,
 ) -> None:
     waiting = launcher(alone, "waiting")
@@ -287,7 +287,7 @@ def test_a_launcher_waits_for_its_runner_and_ends_at_once_if_it_is_asked_to(
     assert waiting.end() == DONE
 
 
-def test_a_runner_that_is_to_end_does_not_wait_for_its_private_daemon(
+def test_an_interrupted_runner_does_not_wait_for_its_private_daemon(
     alone: Launching, tmp_path: Path
 ) -> None:
     runtime = tmp_path / "runtime"
@@ -305,4 +305,4 @@ def test_a_runner_that_is_to_end_does_not_wait_for_its_private_daemon(
     assert runner.end(signal.SIGTERM) == DONE
     assert not left_over(f"{runtime}/rtcf-")
     assert not list(runtime.iterdir())
-    assert never_serves.with_name("ended").exists()  # in order, not by force
+    assert never_serves.with_name("ended").exists()  # in order, not killed

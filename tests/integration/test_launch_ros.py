@@ -24,7 +24,9 @@ def nodes(master: Master) -> set[str]:
     return set(master.run("/usr/bin/rosnode", "list").split())
 
 
-def test_nodes_are_seen_pinged_and_killed_as_others(launching: Launching, master: Master) -> None:
+def test_nodes_can_be_listed_pinged_and_killed_as_usual(
+    launching: Launching, master: Master
+) -> None:
     runner = running(launching)
     launcher = identity(launching, "mine", "__ns:=/arm")
     launcher.wait_for_output("loaded into runner")
@@ -45,7 +47,7 @@ def test_nodes_are_seen_pinged_and_killed_as_others(launching: Launching, master
     assert "/rt_runner" not in nodes(master)
 
 
-def test_a_second_node_of_a_name_displaces_the_first(launching: Launching) -> None:
+def test_a_second_node_with_the_same_name_replaces_the_first(launching: Launching) -> None:
     runner = running(launching)
     first = identity(launching, "it")
     first.wait_for_output("loaded into runner")
@@ -60,7 +62,7 @@ def test_a_second_node_of_a_name_displaces_the_first(launching: Launching) -> No
     assert successor.end() == DONE
 
 
-def test_a_left_over_runner_holds_up_nobody_and_waiting_says_for_what(
+def test_a_dead_runners_parameters_block_no_launcher_and_waits_are_explained(
     launching: Launching, master: Master
 ) -> None:
     rosgraph.Master("/test", master.uri).setParam("/left/rt_runner/frequency", 100)
@@ -76,7 +78,7 @@ def test_a_left_over_runner_holds_up_nobody_and_waiting_says_for_what(
     assert (near.end(), named.end(), runner.end()) == (DONE, DONE, DONE)
 
 
-def test_the_only_runner_is_taken_whatever_its_name_and_of_several_none(
+def test_a_single_runner_is_used_by_default_but_not_one_of_several(
     launching: Launching,
 ) -> None:
     runner = running(launching, "__name:=control", "__ns:=/arm")
@@ -89,7 +91,7 @@ def test_the_only_runner_is_taken_whatever_its_name_and_of_several_none(
     assert (launcher.end(), runner.end(), other.end()) == (DONE, DONE, DONE)
 
 
-def test_parameters_of_a_components_own_names_reach_it_and_slips_are_said(
+def test_component_parameters_are_passed_and_misspelled_ones_reported(
     launching: Launching,
 ) -> None:
     runner = running(launching, "_freqency:=5")
@@ -106,8 +108,8 @@ def test_parameters_of_a_components_own_names_reach_it_and_slips_are_said(
 
 
 def tuned(launching: Launching, master: Master) -> tuple[Process, Process]:
-    """Return runner and launcher of a /wave whose amplitude dynparam has set to 4, and whose rate
-    rosparam has set to 3."""
+    """Return runner and launcher of a /wave; dynparam has set its amplitude to 4, rosparam its
+    rate to 3."""
     runner = running(launching)
     launcher = launching.node("rt_launcher", "rtcf_examples", "Wave", "__name:=wave")
     launcher.wait_for_output("loaded into runner")
@@ -121,25 +123,25 @@ def tuned(launching: Launching, master: Master) -> tuple[Process, Process]:
             parameters = client.get_component("/wave", name).parameters
             return [each.value.double_value for each in parameters[:2]]
 
-        wait_for(lambda: values() == [4.0, 3.0], "the loop to follow")
+        wait_for(lambda: values() == [4.0, 3.0], "the loop to follow the change")
     return runner, launcher
 
 
-def test_what_is_tuned_goes_with_the_launch_and_what_somebody_wrote_stays(
+def test_the_end_of_a_launch_removes_tuned_values_but_not_written_ones(
     launching: Launching, master: Master
 ) -> None:
     runner, launcher = tuned(launching, master)
     assert launcher.end() == DONE
-    wait_for(lambda: master.parameter("/wave") == {"rate": 3.0}, "what was tuned to go")
+    wait_for(lambda: master.parameter("/wave") == {"rate": 3.0}, "the removal of the tuned value")
     assert runner.end() == DONE
     assert master.parameter("/wave") == {"rate": 3.0}
 
 
-def test_what_was_there_before_is_put_back_when_the_runner_ends_in_order(
+def test_an_orderly_end_of_the_runner_restores_earlier_parameters(
     launching: Launching, master: Master
 ) -> None:
     rosgraph.Master("/test", master.uri).setParam("/wave/amplitude", 2.0)
     runner, launcher = tuned(launching, master)
     assert runner.end() == DONE
     assert launcher.wait() == LOST
-    wait_for(lambda: master.parameter("/wave") == {"amplitude": 2.0, "rate": 3.0}, "what was there")
+    wait_for(lambda: master.parameter("/wave") == {"amplitude": 2.0, "rate": 3.0}, "the old value")

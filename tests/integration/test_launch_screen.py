@@ -1,4 +1,4 @@
-"""What the nodes of a launch print, and where."""
+"""Output of the nodes of a launch, and its destination."""
 
 import re
 
@@ -18,19 +18,19 @@ LAUNCH = """
 """
 
 
-def test_components_log_on_the_runners_screen_where_their_launcher_has_none(
+def test_components_log_on_the_runners_screen_if_their_launcher_has_none(
     launching: Launching,
 ) -> None:
     launch = launching.launch_text(LAUNCH)
     for name in ("quiet", "loud"):
         launch.wait_for_output(f": /{name}: Fetched param with value")
     assert launch.end() == DONE
-    # Each once: not by both of them.
+    # Each line occurs once, not from both nodes.
     for name in ("quiet", "loud"):
         assert launch.output().count(f": /{name}: Fetched param with value") == 1
 
 
-def test_the_end_of_a_loop_has_its_statistics(launching: Launching) -> None:
+def test_statistics_are_printed_at_the_end_of_a_loop(launching: Launching) -> None:
     runner = launching.node("rt_runner", "_warmup_cycles:=3", "_frequency:=500")
     runner.wait_for_output("the loop runs")
     with launching.client() as (client, name):
@@ -52,7 +52,7 @@ def test_the_end_of_a_loop_has_its_statistics(launching: Launching) -> None:
     assert runner.output().count("Performed ") == 2
 
 
-def test_what_is_missing_for_real_time_is_a_warning_once_a_launch(launching: Launching) -> None:
+def test_missing_real_time_rights_are_warned_of_once_per_launch(launching: Launching) -> None:
     runner = launching.node("rt_runner")
     runner.wait_for_output("the loop runs")
     with launching.client() as (client, name):
@@ -66,7 +66,7 @@ def test_what_is_missing_for_real_time_is_a_warning_once_a_launch(launching: Lau
         assert line.startswith("[ WARN] ") and "!! rt_runner IS NOT REAL TIME: " in line
 
 
-def test_the_format_of_rosconsole_is_followed(launching: Launching) -> None:
+def test_the_format_of_rosconsole_is_used(launching: Launching) -> None:
     runner = launching.node(
         "rt_runner", "_mode:=wait_for_trigger",
         ROSCONSOLE_FORMAT="<${severity}|${node}|${logger}|${time:%Y}|${what}> ${message}",

@@ -1,7 +1,7 @@
-"""The rosrun tools print what RTCF 2021's print.
+"""The rosrun tools print the same as RTCF 2021's.
 
-rtcf_2021_tools.txt is what its five scripts, unchanged, printed of the same launch: each command
-after a `$`, and its output.
+rtcf_2021_tools.txt is the output of its five unmodified scripts for the same launch: each
+command after a `$`, followed by its output.
 """
 
 import shlex
@@ -36,9 +36,7 @@ LAUNCH = """
 """
 
 
-def test_the_tools_print_what_those_of_rtcf_2021_print(
-    launching: Launching, master: Master
-) -> None:
+def test_the_tools_print_the_same_as_in_rtcf_2021(launching: Launching, master: Master) -> None:
     launch = launching.launch_text(LAUNCH)
     launch.wait_for_output("the loop runs with 3 components")
     wait_for(lambda: "/rt_runner/get_introspection_information" in master.services(), "it")

@@ -1,4 +1,4 @@
-"""Components and runners that stay only as long as somebody holds them."""
+"""Leased components and runners stay only as long as their lease."""
 
 import json
 import signal
@@ -35,7 +35,9 @@ def running(client: rtcf.Client) -> bool:
     return bool(state(client).state == runner_pb2.RUNNER_STATE_RUNNING)
 
 
-def test_a_component_leaves_at_its_holders_word_and_the_loop_goes_on(client: rtcf.Client) -> None:
+def test_a_component_leaves_at_the_end_of_its_lease_and_the_loop_continues(
+    client: rtcf.Client,
+) -> None:
     client.load(counter("stays"))
     holder = leased(client, counter("leaves"))
     client.start()
@@ -53,23 +55,23 @@ def test_the_death_of_a_holder_stops_the_loop_and_unloads_its_component(
     holder = leased(client, counter("leaves"))
     client.start()
     holder.tenancy.drop()
-    wait_for(lambda: names(client) == ["/stays"], "the component to leave")
+    wait_for(lambda: names(client) == ["/stays"], "the unload of the component")
     assert state(client).state == runner_pb2.RUNNER_STATE_STOPPED
     assert "/leaves: holder of leaves has died: stopping the loop" in daemon.log()
 
 
-def test_the_death_of_a_holder_only_unloads_its_component_if_it_said_so(
+def test_the_death_of_a_holder_only_unloads_its_component_if_requested(
     client: rtcf.Client,
 ) -> None:
     client.load(counter("stays"))
     holder = leased(client, counter("leaves"), UNLOAD)
     client.start()
     holder.tenancy.drop()
-    wait_for(lambda: names(client) == ["/stays"], "the component to leave")
+    wait_for(lambda: names(client) == ["/stays"], "the unload of the component")
     wait_until_after(client, iteration(client) + 10)
 
 
-def test_a_component_whose_dead_holder_said_keep_is_saved_like_any_other(
+def test_a_component_leased_with_keep_is_saved_after_its_holders_death(
     client: rtcf.Client, daemon: Daemon
 ) -> None:
     holder = leased(client, counter("kept"), KEEP)
@@ -81,7 +83,7 @@ def test_a_component_whose_dead_holder_said_keep_is_saved_like_any_other(
     assert client.get_component("kept").holder == ""
 
 
-def test_leases_of_one_run_that_end_together_leave_in_one_transaction(client: rtcf.Client) -> None:
+def test_leases_that_end_together_unload_in_one_transaction(client: rtcf.Client) -> None:
     client.load(counter("stays"))
     other = leased(client, counter("other"), run="other run")
     client.start()
@@ -96,12 +98,12 @@ def test_leases_of_one_run_that_end_together_leave_in_one_transaction(client: rt
         assert sorted(names(client)) == ["/other", "/stays"]
         return state(client).generation - before
 
-    # Together is within 0.2 s, for which we may be too slow once on a busy machine.
+    # They must end within 0.2 s of each other, which may fail once on a busy machine.
     assert any(transactions() == 1 for _ in range(10))
     other.end()
 
 
-def test_a_holder_hears_that_another_client_has_taken_its_component_out(
+def test_a_holder_is_told_if_another_client_unloads_its_component(
     client: rtcf.Client,
 ) -> None:
     holder = leased(client, counter("taken"))
@@ -111,7 +113,7 @@ def test_a_holder_hears_that_another_client_has_taken_its_component_out(
 
 
 @pytest.mark.parametrize(("type_name", "reason"), [("Throws", "threw"), ("CallsAbort", "SIGABRT")])
-def test_the_holder_of_a_component_that_fails_hears_why_and_others_stay(
+def test_the_holder_of_a_failing_component_gets_the_reason_and_others_stay(
     client: rtcf.Client, type_name: str, reason: str
 ) -> None:
     other = leased(client, counter("other"))
@@ -120,13 +122,13 @@ def test_the_holder_of_a_component_that_fails_hears_why_and_others_stay(
     client.start()
     assert holder.why() == ENDED.WHY_FAILED
     assert reason in holder.wait("ended").message
-    wait_for(lambda: names(client) == ["/other"], "the component to leave")
-    client.start()  # what is left runs again
+    wait_for(lambda: names(client) == ["/other"], "the unload of the component")
+    client.start()  # the remaining components run again
     assert other.of("ended") == []
     other.end()
 
 
-def test_a_holder_gets_the_log_records_of_its_component_and_of_no_other(
+def test_a_holder_gets_the_log_records_of_its_component_only(
     client: rtcf.Client,
 ) -> None:
     def witness(name: str) -> graph_pb2.ComponentSpec:
@@ -147,7 +149,7 @@ def test_a_holder_gets_the_log_records_of_its_component_and_of_no_other(
         holder.end()
 
 
-def test_a_load_that_is_refused_leaves_nothing_behind(client: rtcf.Client, daemon: Daemon) -> None:
+def test_a_rejected_load_leaves_nothing_behind(client: rtcf.Client, daemon: Daemon) -> None:
     client.load(counter("there"))
     refusal = lease(client, counter("there")).refusal()
     assert "/there exists already" in str(refusal)
@@ -161,7 +163,7 @@ def test_a_load_that_is_refused_leaves_nothing_behind(client: rtcf.Client, daemo
     assert saved(daemon)["leased"] == {}
 
 
-def test_a_loop_outlives_rtcfd_and_those_who_come_back_keep_what_they_held(
+def test_a_loop_outlives_rtcfd_and_returning_holders_keep_their_leases(
     client: rtcf.Client, daemon: Daemon
 ) -> None:
     patient = runner_pb2.RunnerSettings(orphan_timeout_s=60.0)
@@ -181,8 +183,8 @@ def test_a_loop_outlives_rtcfd_and_those_who_come_back_keep_what_they_held(
         refusal = lease(again, counter("comes_back"), runner="back", attach=True).refusal()
         assert "keeps no /comes_back" in str(refusal)
         assert sorted(again.get_order("back")) == ["/comes_back", "/stays_away"]
-        # After 10 s of waiting for the others.
-        wait_for(lambda: again.get_order("back") == ["/comes_back"], "the component to leave")
+        # After 10 s of waiting for the other lease holders.
+        wait_for(lambda: again.get_order("back") == ["/comes_back"], "the unload of the component")
         wait_for(
             lambda: "away" not in [each.runner for each in again.get_status().runners],
             "the runner whose holder stays away to be removed",
@@ -194,9 +196,7 @@ def test_a_loop_outlives_rtcfd_and_those_who_come_back_keep_what_they_held(
         assert [each.runner for each in again.get_status().runners] == ["rt_runner"]
 
 
-def test_a_runner_that_is_held_gets_its_own_settings_back(
-    client: rtcf.Client, daemon: Daemon
-) -> None:
+def test_a_leased_runner_gets_its_own_settings_back(client: rtcf.Client, daemon: Daemon) -> None:
     client.set_runner(runner_pb2.RunnerSettings(frequency_hz=100.0, priority=11))
     holder = held(client, settings=runner_pb2.RunnerSettings(frequency_hz=500.0))
     status = state(client)
@@ -215,7 +215,7 @@ def test_a_runner_that_is_held_gets_its_own_settings_back(
     assert status.state == runner_pb2.RUNNER_STATE_STOPPED
 
 
-def test_a_runner_that_is_in_use_is_not_given_away(client: rtcf.Client) -> None:
+def test_a_runner_in_use_cannot_be_leased(client: rtcf.Client) -> None:
     client.load(counter("own"))
     assert "has components of its own (/own)" in str(hold(client).refusal())
     client.unload(["own"])
@@ -231,7 +231,7 @@ def test_a_runner_that_is_in_use_is_not_given_away(client: rtcf.Client) -> None:
     holder.end()
 
 
-def test_a_runner_that_was_added_goes_with_its_dead_holder(client: rtcf.Client) -> None:
+def test_an_added_runner_is_removed_with_its_dead_holder(client: rtcf.Client) -> None:
     holder = held(client, "arm")
     member = leased(client, counter("member"), runner="arm", hold="token")
     client.start("arm")
@@ -243,7 +243,7 @@ def test_a_runner_that_was_added_goes_with_its_dead_holder(client: rtcf.Client) 
     )
 
 
-def test_a_launch_that_was_cut_off_with_its_executor_leaves_nothing(
+def test_a_launch_lost_with_its_executor_leaves_nothing(
     client: rtcf.Client, daemon: Daemon
 ) -> None:
     held(client, settings=runner_pb2.RunnerSettings(frequency_hz=500.0, orphan_timeout_s=0.0))

@@ -1,4 +1,4 @@
-"""What components log, by way of rtcfd: in order, with cycle numbers, none lost without a count."""
+"""Log records of components through rtcfd: in order, with cycle numbers, losses counted."""
 
 import json
 import re
@@ -20,7 +20,7 @@ KEPT = 4096
 def until(
     stream: LogStream, condition: Callable[[control_pb2.LogRecord], bool]
 ) -> control_pb2.LogRecord:
-    """Return the first record that is so; the daemon's end would end the wait."""
+    """Return the first record that fulfils a condition; fails if the daemon ends."""
     for record in stream:
         assert not isinstance(record, Lost)
         if condition(record):
@@ -29,7 +29,7 @@ def until(
 
 
 def kept(client: rtcf.Client, *components: str, level: str = "debug") -> list[str]:
-    """Return the messages of all that is kept."""
+    """Return all stored messages."""
     with client.watch_logs("", components, level, Place(), until_now=True) as stream:
         return [each.message for each in stream if isinstance(each, Record)]
 
@@ -47,7 +47,7 @@ def test_records_have_the_cycle_in_which_they_were_logged(
     assert later.time_ns > record.time_ns
 
 
-def test_what_was_logged_before_is_kept_and_who_comes_back_misses_nothing(
+def test_earlier_records_are_kept_and_a_returning_client_misses_none(
     client: rtcf.Client,
 ) -> None:
     with client.watch_logs() as stream:
@@ -70,7 +70,7 @@ def test_what_was_logged_before_is_kept_and_who_comes_back_misses_nothing(
     assert kept(client, "/b") == [configured]
 
 
-def test_only_the_level_that_is_asked_for_is_told(client: rtcf.Client) -> None:
+def test_only_records_of_the_requested_level_are_sent(client: rtcf.Client) -> None:
     loud = rtcf.component("rtcf_examples", "Wave", name="loud", parameters=["amplitude:=9.5"])
     client.load(loud)
     with client.watch_logs(level="warn") as stream:
@@ -84,7 +84,7 @@ def test_only_the_level_that_is_asked_for_is_told(client: rtcf.Client) -> None:
         client.watch_logs(level="loud")
 
 
-def test_what_is_not_kept_any_more_is_counted(client: rtcf.Client) -> None:
+def test_records_no_longer_stored_are_counted(client: rtcf.Client) -> None:
     client.set_runner(runner_pb2.RunnerSettings(frequency_hz=1.0))
     client.load(rtcf.component("rtcf_examples", "Wave", name="wave", parameters=["rate:=0.4"]))
 
@@ -102,7 +102,7 @@ def test_what_is_not_kept_any_more_is_counted(client: rtcf.Client) -> None:
     assert numbers == list(range(first.count + 1, first.count + KEPT + 1))
 
 
-def test_people_and_machines_read_them(daemon: Daemon, client: rtcf.Client) -> None:
+def test_logs_are_printed_as_text_and_json(daemon: Daemon, client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_examples", "Wave", name="wave"))
     client.start()
     client.stop()
@@ -119,13 +119,13 @@ def test_people_and_machines_read_them(daemon: Daemon, client: rtcf.Client) -> N
     assert {(each["component"], each["level"]) for each in documents} == {("/wave", "info")}
 
 
-def test_following_goes_on_until_ctrl_c(daemon: Daemon, client: rtcf.Client) -> None:
+def test_following_continues_until_ctrl_c(daemon: Daemon, client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_examples", "Wave", name="wave"))
     process = subprocess.Popen(
         [BUILD_TREE / "bin" / "rtcfctl", "--socket", daemon.socket, "logs", "wave", "-f",
          "-o", "json"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=clean_environment(),
-        # A shell's background job, or nohup, may have it ignored.
+        # Ctrl-C is ignored in a shell's background job and under nohup.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )  # fmt: skip
     assert process.stdout is not None
@@ -147,13 +147,13 @@ def test_following_goes_on_until_ctrl_c(daemon: Daemon, client: rtcf.Client) -> 
         (("-r", "nobody", "logs"), 1, 'no runner "nobody" (runners: rt_runner)'),
     ],
 )  # fmt: skip
-def test_refused_in_a_line(running: Daemon, words: tuple[str, ...], code: int, said: str) -> None:
+def test_errors_are_one_line(running: Daemon, words: tuple[str, ...], code: int, said: str) -> None:
     done = running.ctl(*words)
     assert done.returncode == code
     assert said in done.stderr.splitlines()[-1]
 
 
-def test_who_watches_a_runner_is_told_when_it_is_removed(client: rtcf.Client) -> None:
+def test_a_watcher_is_told_when_its_runner_is_removed(client: rtcf.Client) -> None:
     client.add_runner("arm")
     with client.watch_logs("arm") as stream:
         client.remove_runner("arm")

@@ -1,6 +1,6 @@
-"""What docs/performance.md states, held to what is measured; and the benches' own measuring.
+"""The measurements stated in docs/performance.md against new ones, and the benchmarks' methods.
 
-Instructions are counted one by one: they are the same on any machine, whatever else it does.
+Instructions are counted exactly: the counts are the same on any machine under any load.
 """
 
 import itertools
@@ -17,8 +17,8 @@ from pages import TREE
 
 PAGE = TREE / "docs" / "performance.md"
 BENCH = TREE / "tests" / "bench"
-TOLERANCE = 0.03  # of a figure
-# Threads that come and go, each of which takes some CPU time; says how much when they have ended.
+TOLERANCE = 0.03  # relative, of a measurement
+# Short-lived threads, each of which uses some CPU time; prints the total at the end.
 THREADS = """
 import sys, threading, time
 taken = 0.0
@@ -37,7 +37,7 @@ for _ in sys.stdin:
         thread.join()
     print(taken, flush=True)
 """
-# As benches measure: what the threads took, in ms, and the cost that was found.
+# Measures like a benchmark: the threads' CPU time in ms, and the measured cost.
 COST_OF_THREADS = f"""
 import subprocess, sys
 from cost import cost_of
@@ -80,7 +80,7 @@ with subprocess.Popen([sys.executable, "-c", {SHORT_THREADS!r}],
 
 
 def bench(code: str) -> str:
-    """Run code with the modules of the benches; return what it prints."""
+    """Run code with the modules of the benchmarks; return its output."""
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=BENCH / "suite", timeout=60, check=True,
         env=clean_environment() | {"PYTHONPATH": str(BENCH / "suite")}, stdout=subprocess.PIPE,
@@ -90,8 +90,8 @@ def bench(code: str) -> str:
 
 
 def measured(folder: Path) -> list[dict[str, Any]]:
-    """Run the bench of instructions; return the figures that it holds against budgets."""
-    # Its results are not those of the build tree.
+    """Run the instruction benchmark; return the results that have a budget."""
+    # The build tree's own results stay untouched.
     (folder / "bench").mkdir()
     for part in ("bench/bin", "lib", "python"):
         (folder / part).symlink_to(BUILD_TREE / part)
@@ -106,7 +106,7 @@ def measured(folder: Path) -> list[dict[str, Any]]:
 
 
 def stated() -> dict[str, tuple[float, str]]:
-    """Return the figures of the page for this release's compiler, and its word on each budget."""
+    """Return the docs' results for this release's compiler, and whether each budget is met."""
     release = subprocess.check_output([TREE / "tools" / "release", "codename"], text=True).strip()
     lines = PAGE.read_text().splitlines()
     head = next(i for i, line in enumerate(lines) if line.startswith("| instructions of a cycle"))
@@ -125,7 +125,7 @@ def cells(line: str) -> list[str]:
 
 
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="the counter is for x86-64")
-def test_instructions_of_a_cycle_are_those_that_the_page_states(tmp_path: Path) -> None:
+def test_instructions_of_a_cycle_match_the_docs(tmp_path: Path) -> None:
     figures = stated()
     found = measured(tmp_path)
     assert figures.keys() == {each["text"] for each in found}
@@ -136,7 +136,7 @@ def test_instructions_of_a_cycle_are_those_that_the_page_states(tmp_path: Path) 
         assert verdict == f"{each['limit']:.0f}: {word}", each["text"]
 
 
-def test_the_cost_of_a_process_has_what_ended_threads_took() -> None:
+def test_the_cost_of_a_process_includes_ended_threads() -> None:
     taken, cost = map(float, bench(COST_OF_THREADS).split())
     assert cost >= taken
 

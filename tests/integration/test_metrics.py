@@ -1,4 +1,4 @@
-"""`rtcfctl metrics` and `rtcfctl stats --plot`: figures for Prometheus, and as a picture."""
+"""`rtcfctl metrics` and `rtcfctl stats --plot`: statistics for Prometheus, and as a plot."""
 
 import importlib
 import json
@@ -18,14 +18,14 @@ import rtcf
 from daemon_process import Daemon, wait_for
 from values import iteration
 
-# Untyped, in some releases.
+# Without type hints in some releases.
 _PARSER: Any = importlib.import_module("prometheus_client.parser")
 
 Samples = dict[tuple[str, frozenset[tuple[str, str]]], float]
 
 
 def samples(text: str) -> Samples:
-    """Read what an independent reader of the format reads."""
+    """Parse with an independent reader of the format."""
     return {
         (sample.name, frozenset(sample.labels.items())): sample.value
         for family in _PARSER.text_string_to_metric_families(text)
@@ -39,7 +39,7 @@ def labels(**words: str) -> frozenset[tuple[str, str]]:
 
 @pytest.fixture
 def counted(daemon: Daemon, client: rtcf.Client) -> Daemon:
-    """Give a loop that has run for some cycles."""
+    """Return a daemon whose loop has run for some cycles."""
     client.load(rtcf.component("rtcf_test", "Counter"))
     client.start()
     wait_for(lambda: iteration(client) > 200, "200 cycles")
@@ -47,7 +47,7 @@ def counted(daemon: Daemon, client: rtcf.Client) -> Daemon:
     return daemon
 
 
-def test_all_figures_are_those_of_the_loop(counted: Daemon, client: rtcf.Client) -> None:
+def test_all_metrics_match_the_loop(counted: Daemon, client: rtcf.Client) -> None:
     done = counted.ctl("metrics")
     assert done.returncode == 0, done.stderr
     found = samples(done.stdout)
@@ -76,7 +76,7 @@ def test_all_figures_are_those_of_the_loop(counted: Daemon, client: rtcf.Client)
     assert found["rtcf_component_faults_total", labels(**component)] == 0
 
 
-def test_buckets_are_those_values_that_there_were(counted: Daemon, client: rtcf.Client) -> None:
+def test_buckets_match_the_values(counted: Daemon, client: rtcf.Client) -> None:
     figures = client.get_statistics(buckets=True)
     for buckets, all_of_it in (
         (figures.duration_buckets, figures.duration),
@@ -87,7 +87,7 @@ def test_buckets_are_those_values_that_there_were(counted: Daemon, client: rtcf.
         assert sum(each.count for each in buckets) == all_of_it.count
         assert all(each.count for each in buckets)
         assert all_of_it.max_ns <= ends[-1] * 1.001
-    assert not client.get_statistics().duration_buckets, "where nobody asks"
+    assert not client.get_statistics().duration_buckets, "buckets are sent only on request"
 
 
 @contextmanager
@@ -109,7 +109,7 @@ def free_port() -> int:
         return port
 
 
-def test_they_are_served_and_say_when_rtcfd_is_gone(counted: Daemon) -> None:
+def test_metrics_are_served_and_report_a_missing_rtcfd(counted: Daemon) -> None:
     port = free_port()
     with served(counted, port) as address:
         assert address == f"http://127.0.0.1:{port}/metrics"
@@ -131,7 +131,7 @@ def test_they_are_served_and_say_when_rtcfd_is_gone(counted: Daemon) -> None:
 
 
 @pytest.mark.parametrize("place", ["", "x", "0", "65536", "localhost", "1.2.3.4:", "²"])
-def test_what_is_no_port_is_refused(daemon: Daemon, place: str) -> None:
+def test_an_invalid_port_is_rejected(daemon: Daemon, place: str) -> None:
     done = daemon.ctl("metrics", "--listen", place)
     assert done.returncode == 2
     assert done.stderr == f"rtcfctl: --listen {place}: use PORT or ADDRESS:PORT\n"
@@ -141,7 +141,7 @@ def test_what_is_no_port_is_refused(daemon: Daemon, place: str) -> None:
     ("name", "begin"),
     [("loop.png", b"\x89PNG"), ("loop.svg", b"<?xml"), ("loop.pdf", b"%PDF")],
 )
-def test_a_picture_is_drawn(counted: Daemon, tmp_path: Path, name: str, begin: bytes) -> None:
+def test_a_plot_is_drawn(counted: Daemon, tmp_path: Path, name: str, begin: bytes) -> None:
     pictures = tmp_path / "pictures"
     pictures.mkdir()
     (pictures / name).write_text("old")
@@ -153,7 +153,7 @@ def test_a_picture_is_drawn(counted: Daemon, tmp_path: Path, name: str, begin: b
 
 @pytest.fixture
 def outlier(daemon: Daemon, client: rtcf.Client) -> Daemon:
-    """Give a loop one of whose cycles took far longer than the others."""
+    """Return a daemon whose loop had one cycle that took far longer than the others."""
     client.load(
         rtcf.component("rtcf_faults", "Stumbles", name="slow", parameters=["spin_us:=60000"])
     )
@@ -165,7 +165,7 @@ def outlier(daemon: Daemon, client: rtcf.Client) -> Daemon:
     return daemon
 
 
-def test_a_picture_shows_an_outlier_and_the_others(
+def test_a_plot_shows_an_outlier_and_the_others(
     outlier: Daemon, client: rtcf.Client, tmp_path: Path
 ) -> None:
     figures = client.get_statistics(buckets=True)
@@ -189,16 +189,16 @@ def test_a_picture_shows_an_outlier_and_the_others(
     (longest,) = ids(root, "calculation mark max")
     assert min(across(longest)) - min(across(median)) > 100
     assert any(re.fullmatch(r"max: 6\d{4} µs", each) for each in texts), texts
-    assert {"1", "10", "100"} <= texts  # cycles, as numbers that can be read
+    assert {"1", "10", "100"} <= texts  # cycles, as readable numbers
 
 
 def ids(root: Element, begin: str) -> list[Element]:
-    """Return the parts of a picture whose name begins so."""
+    """Return the parts of a plot whose name starts with a text."""
     return [each for each in root.iter() if each.get("id", "").startswith(begin)]
 
 
 def across(part: Element) -> list[float]:
-    """Return where a part of a picture is, from left to right."""
+    """Return the horizontal positions of a part of a plot."""
     numbers = [
         float(number)
         for each in part.iter()
@@ -235,16 +235,16 @@ def test_bars_in_the_terminal_show_an_outlier_and_the_others(
         ):  # fmt: skip
             ((low, high, _, _, _),) = [each for each in bars if name in each[4].split(", ")]
             assert float(low) * 0.95 < value_ns / 1e3 < float(high) * 1.05
-    # What stands between them and the outlier is one line.
+    # A single line stands between them and the outlier.
     assert "…" in done.stdout
 
 
-def test_programs_get_the_buckets(counted: Daemon) -> None:
+def test_json_has_the_buckets(counted: Daemon) -> None:
     told = json.loads(counted.ctl("stats", "--plot", "-o", "json").stdout)
     assert sum(each["count"] for each in told["duration_buckets"]) == told["duration"]["count"]
 
 
-def test_pictures_that_cannot_be_are_refused(daemon: Daemon, tmp_path: Path) -> None:
+def test_impossible_plots_are_rejected(daemon: Daemon, tmp_path: Path) -> None:
     for words, code, said in (
         (("loop.gif",), 2, "loop.gif: use one of .svg, .png, .pdf"),
         (("loop.png", "--watch"), 2, "--plot cannot be used with --watch"),

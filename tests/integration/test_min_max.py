@@ -1,4 +1,4 @@
-"""Streams of minima and maxima: no value of a cycle is hidden, whatever the rate."""
+"""Streams of minima and maxima: they contain the extremes of every cycle, at any rate."""
 
 import json
 import re
@@ -19,7 +19,7 @@ _CYCLES = _WINDOWS * _EVERY
 
 
 def noise(cycles: NDArray[np.int64]) -> dict[str, NDArray[Any]]:
-    """Return what the component Noise writes in cycles."""
+    """Return the values that the component Noise writes in cycles."""
     with np.errstate(over="ignore"):
         mixed = cycles.astype(np.uint64) + np.uint64(0x9E3779B97F4A7C15)
         mixed = (mixed ^ (mixed >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -42,7 +42,7 @@ def extremes(values: NDArray[Any]) -> tuple[float, int, float, int]:
 
 @pytest.fixture(scope="module")
 def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[rtcf.Client]:
-    """Give a client of a daemon with a component of noise."""
+    """Yield a client of a daemon with a component of noise."""
     daemon = Daemon(tmp_path_factory.mktemp("daemon"), NO_ROS)
     daemon.start()
     with rtcf.Client(daemon.socket) as client:
@@ -59,7 +59,7 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[rtcf.Client]:
     before=st.integers(0, 1500),
     steps=st.lists(st.integers(1, 900), min_size=1, max_size=3),
 )
-def test_extremes_lie_in_the_cycles_that_a_window_tells(
+def test_extremes_are_in_the_cycles_named_by_their_window(
     shared: rtcf.Client, every: int, before: int, steps: list[int]
 ) -> None:
     shared.stop()
@@ -68,7 +68,7 @@ def test_extremes_lie_in_the_cycles_that_a_window_tells(
     with shared.watch_ports(["noise"], every=every, min_max=True) as stream:
         for count in steps:
             shared.step(count)
-        shared.stop()  # ends the last window, by a cycle that makes safe and writes nothing
+        shared.stop()  # ends the last window with a safe cycle, which writes nothing
         windows: list[PortBatch] = []
         for batch in stream:
             windows.append(batch)
@@ -96,7 +96,7 @@ def test_extremes_lie_in_the_cycles_that_a_window_tells(
     assert next_cycle == end + 1
 
 
-def test_a_glitch_of_one_cycle_is_told_with_its_cycle(client: rtcf.Client) -> None:
+def test_a_glitch_of_one_cycle_is_reported_with_its_cycle(client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_test", "Glitch", name="glitch"))
     client.load(rtcf.component("rtcf_test", "Gather", name="other", remaps=["out:=/o"]))
     with (
@@ -131,14 +131,14 @@ def test_a_glitch_of_one_cycle_is_told_with_its_cycle(client: rtcf.Client) -> No
         ):
             found = np.concatenate([getattr(batch, method)(name) for batch in windows])
             assert (found == expected).all(), (name, method)
-    # A glitch in each window, at a cycle of its own.
+    # A glitch in each window, in a different cycle.
     glitches = np.concatenate([batch.maxima("/glitch.out") for batch in windows])
     places = np.concatenate([batch.maxima_at("/glitch.out") for batch in windows])
     assert (glitches == 1000.0).all()
     assert len(set((places % _EVERY).tolist())) > _WINDOWS // 2
 
 
-def test_people_see_the_extremes(daemon: Daemon, client: rtcf.Client) -> None:
+def test_text_output_shows_the_extremes(daemon: Daemon, client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_test", "Glitch", name="glitch"))
     client.start()
     done = daemon.ctl("echo", "glitch.out", "--min-max", "--rate", "1Hz", "-n", "1")
@@ -148,12 +148,10 @@ def test_people_see_the_extremes(daemon: Daemon, client: rtcf.Client) -> None:
     assert lines[1].startswith("  /glitch.out: 0 to 1000 (cycle ")
 
 
-def test_lines_tell_the_cycles_in_which_their_extremes_are(
-    daemon: Daemon, client: rtcf.Client
-) -> None:
+def test_json_lines_name_the_cycles_of_the_extremes(daemon: Daemon, client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_test", "Noise", name="noise"))
     client.start()
-    # Where it begins is by chance: in the midst of a window.
+    # The stream starts at a random position within a window.
     for _ in range(3):
         done = daemon.ctl("echo", "noise.out", "--min-max", "--rate", "3Hz", "-n", "2")
         assert done.returncode == 0, done.stderr

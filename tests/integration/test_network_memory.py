@@ -1,4 +1,4 @@
-"""What peers send, and do not take, stays out of the memory that is locked for the loop."""
+"""Unread data from and to ROS peers stays out of the loop's locked memory."""
 
 import os
 import signal
@@ -22,13 +22,13 @@ from values import port_value, state, wait_until_after
 MOST_LOCKED_KB = 64 * 1024
 
 
-# Each peer takes a descriptor; the unit has room for more still.
+# Each peer needs a descriptor; the unit permits even more.
 _MANY_DESCRIPTORS = ("prlimit", "--nofile=4096:", "--")
 
 
 @pytest.fixture
 def text(tmp_path: Path, master: Master) -> Iterator[rtcf.Client]:
-    """Give a loop with a string of 200 kB out and one in, both on ROS."""
+    """Yield a client of a loop with a string of 200 kB out and one in, both on ROS."""
     daemon = Daemon(tmp_path, with_ros(master.uri, "/t/said|/t/heard"), wrapper=_MANY_DESCRIPTORS)
     daemon.start()
     with rtcf.Client(daemon.socket) as client:
@@ -50,7 +50,7 @@ def _locked_kb(client: rtcf.Client) -> int:
 
 
 class _Subscriber:
-    """A peer that asks for a topic and then takes nothing."""
+    """A peer that subscribes a topic and then reads nothing."""
 
     def __init__(self, host: str, port: int, topic: str) -> None:
         self._socket = socket.create_connection((host, port), 30.0)
@@ -78,7 +78,7 @@ def _counted(client: rtcf.Client, count: int) -> bool:
     return bool(state(client).ros.too_large == count)
 
 
-def test_a_message_that_is_too_large_is_counted_and_costs_nothing(
+def test_a_message_that_is_too_large_is_counted_and_uses_no_memory(
     text: rtcf.Client, master: Master
 ) -> None:
     before = _locked_kb(text)
@@ -87,13 +87,13 @@ def test_a_message_that_is_too_large_is_counted_and_costs_nothing(
         wait_for(partial(_counted, text, count), "the count")
         sender.end()
     assert _locked_kb(text) <= min(before + 4096, MOST_LOCKED_KB)
-    # What fits comes through all the same.
+    # Smaller messages still arrive.
     sender = master.node("text", "/t/heard", "5000")
     wait_for(lambda: port_value(text, "/t/text", "length") == 5000, "the message")
     sender.end()
 
 
-def test_subscribers_that_take_nothing_cost_no_locked_memory(
+def test_subscribers_that_read_nothing_use_no_locked_memory(
     text: rtcf.Client, master: Master
 ) -> None:
     before = _locked_kb(text)
@@ -101,7 +101,7 @@ def test_subscribers_that_take_nothing_cost_no_locked_memory(
     peers = [_Subscriber(host, port, "/t/said") for _ in range(20)]
     for peer in peers:
         peer.wait_until_accepted()
-    # More than all queues may hold: 20 kB a cycle for each of them.
+    # More than the capacity of all queues: 20 kB per cycle for each of them.
     wait_until_after(text, state(text).iteration + 500)
     assert _locked_kb(text) <= min(before + 8192, MOST_LOCKED_KB)
     listener = master.node("sizes", "/t/said")
@@ -111,9 +111,7 @@ def test_subscribers_that_take_nothing_cost_no_locked_memory(
         peer.close()
 
 
-def test_all_of_it_at_once_with_a_thousand_peers_costs_little_locked_memory(
-    text: rtcf.Client, master: Master
-) -> None:
+def test_a_thousand_peers_use_little_locked_memory(text: rtcf.Client, master: Master) -> None:
     host, port = _address(text, master, "/t/said")
     stopped = master.node("sizes", "/t/said")
     stopped.wait_for_values(5)
@@ -133,7 +131,7 @@ def test_all_of_it_at_once_with_a_thousand_peers_costs_little_locked_memory(
             most = max(most, _locked_kb(text))
         print(f"\nVmLck at most {most / 1024:.1f} of {MOST_LOCKED_KB // 1024} MB")
         assert most <= MOST_LOCKED_KB
-        # The loop and who does take its messages are served all the same.
+        # The loop and reading subscribers are served as before.
         listener = master.node("sizes", "/t/said")
         listener.wait_for_values(10)
         listener.end()
@@ -144,9 +142,7 @@ def test_all_of_it_at_once_with_a_thousand_peers_costs_little_locked_memory(
     assert _locked_kb(text) <= MOST_LOCKED_KB
 
 
-def test_subscribers_that_take_nothing_turn_no_other_away(
-    text: rtcf.Client, master: Master
-) -> None:
+def test_subscribers_that_read_nothing_displace_no_other(text: rtcf.Client, master: Master) -> None:
     text.stop()
     large = runner_pb2.RosSettings(largest_message_kb=1024)
     text.set_runner(runner_pb2.RunnerSettings(ros=large))
@@ -156,7 +152,7 @@ def test_subscribers_that_take_nothing_turn_no_other_away(
     listener = master.node("sizes", "/t/said")
     listener.wait_for_values(5)
     with ExitStack() as peers:
-        # Each holds a message that no other does: in turn, until there is no room for more.
+        # Each of them holds a different message, until there is no room for more.
         for _ in range(250):
             peer = _Subscriber(host, port, "/t/said")
             peers.callback(peer.close)
@@ -171,7 +167,7 @@ def test_subscribers_that_take_nothing_turn_no_other_away(
     assert "slow subscribers" not in state(text).ros.problem
 
 
-def test_a_peer_that_announces_a_huge_header_or_call_is_sent_away(
+def test_a_peer_that_announces_a_huge_header_or_call_is_disconnected(
     text: rtcf.Client, master: Master
 ) -> None:
     host, port = _address(text, master, "/t/said")
@@ -190,7 +186,9 @@ def test_a_peer_that_announces_a_huge_header_or_call_is_sent_away(
     assert state(text).state == runner_pb2.RUNNER_STATE_RUNNING
 
 
-def test_a_stopped_listener_loses_the_oldest_and_goes_on(text: rtcf.Client, master: Master) -> None:
+def test_a_stopped_listener_loses_the_oldest_messages_and_continues(
+    text: rtcf.Client, master: Master
+) -> None:
     listener = master.node("sizes", "/t/said")
     listener.wait_for_values(5)
     os.kill(listener.pid, signal.SIGSTOP)

@@ -1,4 +1,4 @@
-"""`rtcfctl new`: what it makes builds, passes its test and runs, by the lines that it prints."""
+"""`rtcfctl new`: the new package builds, passes its test and runs with the printed commands."""
 
 import json
 import os
@@ -13,7 +13,7 @@ import rtcf
 from daemon_process import BUILD_TREE, clean_environment, wait_for
 from launch_processes import build_tree_environment
 
-_DEADLINE_S = 600.0  # of compilers on a busy machine
+_DEADLINE_S = 600.0  # for compilers on a busy machine
 Done = subprocess.CompletedProcess[str]
 
 
@@ -22,7 +22,7 @@ def environment(tmp_path: Path) -> dict[str, str]:
     return clean_environment() | {
         "PATH": f"{BUILD_TREE / 'bin'}:{os.environ['PATH']}",
         "XDG_CACHE_HOME": str(tmp_path / "cache"),
-        # In place of librtcf-dev.
+        # Replaces librtcf-dev.
         "rtcf_DIR": str(BUILD_TREE / "cmake" / "rtcf"),
         "CXXFLAGS": "-O0",
     }
@@ -37,7 +37,7 @@ def type_(line: str, folder: Path, environment: dict[str, str]) -> Done:
 
 @contextmanager
 def running(line: str, folder: Path, environment: dict[str, str]) -> Iterator[None]:
-    """Type a line that goes on until Ctrl-C."""
+    """Run a command line until Ctrl-C."""
     said = folder / "said"
     with (
         said.open("wb") as to,
@@ -57,7 +57,7 @@ def running(line: str, folder: Path, environment: dict[str, str]) -> Iterator[No
 
 
 @pytest.mark.parametrize("language", [(), ("--python",)], ids=["C++", "Python"])
-def test_its_lines_build_test_and_run_it(
+def test_the_printed_commands_build_test_and_run_it(
     tmp_path: Path, environment: dict[str, str], language: tuple[str, ...]
 ) -> None:
     made = type_(" ".join(["rtcfctl new my_arm PDControl", *language]), tmp_path, environment)
@@ -87,7 +87,7 @@ def test_its_lines_build_test_and_run_it(
     assert gain.value.double_value == 2.0
 
 
-def test_its_test_fails_when_the_component_is_wrong(
+def test_its_test_fails_if_the_component_is_wrong(
     tmp_path: Path, environment: dict[str, str]
 ) -> None:
     assert type_("rtcfctl new my_arm Gain --python", tmp_path, environment).returncode == 0
@@ -127,7 +127,7 @@ def test_catkin_builds_it(tmp_path: Path, environment: dict[str, str]) -> None:
         ("there Pi", "there exists: choose another name, or move it"),
     ],
 )
-def test_refused_in_a_line_and_nothing_is_left(
+def test_errors_are_one_line_and_leave_no_file(
     tmp_path: Path, environment: dict[str, str], words: str, said: str
 ) -> None:
     (tmp_path / "there").mkdir()
@@ -138,7 +138,7 @@ def test_refused_in_a_line_and_nothing_is_left(
     assert os.listdir(tmp_path) == ["there"]
 
 
-def test_programs_are_told_what_was_made(tmp_path: Path, environment: dict[str, str]) -> None:
+def test_json_lists_the_created_files(tmp_path: Path, environment: dict[str, str]) -> None:
     done = type_("rtcfctl -o json new my_arm Pi", tmp_path, environment)
     told = json.loads(done.stdout)
     assert told["folder"] == str(tmp_path / "my_arm")

@@ -1,5 +1,5 @@
-"""A catkin workspace as people have it of RTCF 2021: messages, their typekit package, components
-with OROCOS' CMake; built by catkin_make, run from devel/ and from install/."""
+"""A catkin workspace of an RTCF 2021 user: messages, their typekit package, components with
+OROCOS' CMake; built by catkin_make, run from devel/ and from install/."""
 
 import shutil
 import subprocess
@@ -19,7 +19,7 @@ DONE = 0
 
 @pytest.fixture(scope="module")
 def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Build it as its author would, in front of this build tree."""
+    """Build it as its author would, on top of this build tree."""
     folder = tmp_path_factory.mktemp("workspace")
     shutil.copytree(SOURCES, folder / "src")
     done = subprocess.run(
@@ -31,7 +31,7 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
                 "install",
                 "-DPYTHON_EXECUTABLE=/usr/bin/python3",
             ),
-            # Nothing to debug or to be fast here.
+            # Debug information and speed do not matter here.
             *("-DCMAKE_CXX_FLAGS=-O0", "-DCATKIN_ENABLE_TESTING=OFF"),
         ],
         cwd=folder,
@@ -47,7 +47,7 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def environment(workspace: Path, space: str, base: dict[str, str]) -> dict[str, str]:
-    """Return that of a user who has sourced a space's setup.sh on top of the build tree's."""
+    """Return the environment after sourcing a space's setup.sh on top of the build tree's."""
     done = subprocess.run(
         ["/bin/sh", "-c", ". ./setup.sh && env -0"],
         cwd=workspace / space,
@@ -63,7 +63,7 @@ def environment(workspace: Path, space: str, base: dict[str, str]) -> dict[str, 
 def launching(
     request: pytest.FixtureRequest, workspace: Path, tmp_path: Path, master: Master
 ) -> Iterator[Launching]:
-    """Start nodes in one of its spaces."""
+    """Yield a starter of nodes in one of its spaces."""
     launching = Launching(master, tmp_path)
     launching.environment = environment(workspace, request.param, master.environment()) | {
         "RTCF_SOCKET": "/nonexistent",
@@ -103,7 +103,7 @@ def test_its_launch_file_and_rosrun_work_from_both_spaces(
     told = launching.tool("component_list")
     assert "/scaler" in told.stdout, told.stderr
     assert launch.end() == DONE
-    # Of each hook, also of those that Ctrl-C brings about.
+    # Each hook ran, including those that Ctrl-C triggers.
     for text in ("constructed", "scaling by 3", "stopped", "cleaned up"):
         assert f"/scaler: {text}\n" in launch.output()
 
@@ -120,7 +120,7 @@ def test_its_rostest_passes(workspace: Path, tmp_path: Path) -> None:
         "ROS_HOSTNAME": "localhost",
         "RTCF_SOCKET": "/nonexistent",
     }
-    # publishtest takes the first python3 there is, which must be Debian's.
+    # publishtest uses the first python3 on PATH, which must be Debian's.
     given["PATH"] = f"/usr/bin:{given['PATH']}"
     test = Process(["/usr/bin/rostest", "old_components", "old.test"], given, tmp_path)
     try:
@@ -130,7 +130,7 @@ def test_its_rostest_passes(workspace: Path, tmp_path: Path) -> None:
         test.make_sure()
 
 
-def test_the_workspace_has_nothing_in_the_way_of_rtcfs_own_programs(workspace: Path) -> None:
+def test_the_workspace_hides_none_of_rtcfs_programs(workspace: Path) -> None:
     for space in ("devel", "install"):
         assert not (workspace / space / "lib" / "rtcf").exists()
     assert (BUILD_TREE / "devel" / "lib" / "rtcf" / "rt_runner").exists()
@@ -145,13 +145,13 @@ def test_the_workspace_has_nothing_in_the_way_of_rtcfs_own_programs(workspace: P
          "orocos_library()"),
         ("orocos_executable(deploy main.cpp)",
          "orocos_executable(deploy): rtcf does not run programs", "orocos_component()"),
-        # What has only nothing to do here is no error.
+        # A call that only has no effect here is no error.
         ("orocos_typekit(types types.hpp)", "orocos_typekit(types) does nothing", ""),
         ("orocos_typegen_headers(types.hpp)", "orocos_typegen_headers() does nothing", ""),
     ],
     ids=lambda text: str(text).partition("(")[0],
 )  # fmt: skip
-def test_what_has_no_place_in_rtcf_is_said_when_cmake_runs(
+def test_unsupported_cmake_calls_are_reported(
     tmp_path: Path, line: str, said: str, instead: str
 ) -> None:
     (tmp_path / "CMakeLists.txt").write_text(
@@ -167,13 +167,13 @@ def test_what_has_no_place_in_rtcf_is_said_when_cmake_runs(
         timeout=BUILD_S,
         check=False,
     )
-    # CMake folds what is an error.
+    # CMake folds error messages.
     output = " ".join(f"{done.stdout} {done.stderr}".split())
     assert said in output
     assert (done.returncode != DONE) == bool(instead), output
     if instead:
         assert instead in output
-        assert "CMakeLists.txt:5 (orocos_" in output, "which line it is"
+        assert "CMakeLists.txt:5 (orocos_" in output, "the line is named"
 
 
 def package(folder: Path, name: str, depends: str, lines: str) -> None:
@@ -192,14 +192,14 @@ def package(folder: Path, name: str, depends: str, lines: str) -> None:
 @pytest.mark.parametrize(
     ("depends", "lines"),
     [
-        # As RTCF's own begins.
+        # The start of RTCF 2021's own CMakeLists.txt.
         ("", "find_package(catkin REQUIRED COMPONENTS roscpp rtt_ros)"),
-        # One of that name which knows nothing of rtcf.
+        # A package of that name without rtcf.
         ("<depend>std_msgs</depend>", "find_package(catkin REQUIRED)\ncatkin_package()"),
     ],
     ids=["rtcf's checkout", "another package"],
 )
-def test_a_package_that_hides_rtcf_is_said_when_cmake_runs(
+def test_a_package_that_hides_rtcf_is_reported_by_cmake(
     tmp_path: Path, depends: str, lines: str
 ) -> None:
     package(tmp_path / "src" / "left" / "rtcf", "rtcf", depends, lines)

@@ -1,4 +1,4 @@
-"""`rtcfctl -H`: rtcfd of another machine, by way of a real sshd, which here is of this machine."""
+"""`rtcfctl -H`: rtcfd of another machine through a real sshd, which here runs on this machine."""
 
 import os
 import signal
@@ -23,7 +23,7 @@ def _answers(port: int) -> bool:
 
 @pytest.fixture(scope="module")
 def way(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
-    """Give what to run instead of ssh: one that knows a host `robot`."""
+    """Yield a replacement for ssh that knows a host `robot`."""
     folder = tmp_path_factory.mktemp("ssh")
     for key in ("host_key", "user_key"):
         command = ["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", str(folder / key)]
@@ -40,7 +40,7 @@ def way(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         f" UserKnownHostsFile {folder}/known\n StrictHostKeyChecking accept-new\n"
         " IdentitiesOnly yes\n BatchMode yes\n LogLevel ERROR\n"
     )
-    Path("/run/sshd").mkdir(exist_ok=True)  # as its service does
+    Path("/run/sshd").mkdir(exist_ok=True)  # as ssh.service does
     with (
         (folder / "log").open("wb") as log,
         subprocess.Popen(
@@ -56,7 +56,7 @@ def way(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
 
 @pytest.fixture
 def elsewhere(way: str, daemon: Daemon) -> dict[str, str]:
-    """Give the environment of one who sits at another machine."""
+    """Return the environment of a user at another machine."""
     found = daemon.environment() | {"RTCF_SSH": way}
     del found["RTCF_SOCKET"]
     return found
@@ -71,7 +71,7 @@ def ctl(elsewhere: dict[str, str], daemon: Daemon) -> Ctl:
     return run
 
 
-def test_its_loops_are_looked_at_and_changed(ctl: Ctl, client: rtcf.Client) -> None:
+def test_its_loops_can_be_queried_and_changed(ctl: Ctl, client: rtcf.Client) -> None:
     assert ctl("load", "rtcf_test", "Counter").stdout == "loaded /Counter\n"
     started = ctl("start")
     assert started.returncode == 0, started.stderr
@@ -81,7 +81,7 @@ def test_its_loops_are_looked_at_and_changed(ctl: Ctl, client: rtcf.Client) -> N
     assert "stopped" in ctl("status").stdout
 
 
-def test_files_are_of_this_side(ctl: Ctl, client: rtcf.Client, tmp_path: Path) -> None:
+def test_files_are_local(ctl: Ctl, client: rtcf.Client, tmp_path: Path) -> None:
     ctl("load", "rtcf_test", "Counter")
     saved = ctl("save", str(tmp_path / "graph.yaml"))
     assert saved.returncode == 0, saved.stderr
@@ -94,7 +94,7 @@ def test_files_are_of_this_side(ctl: Ctl, client: rtcf.Client, tmp_path: Path) -
         assert len(recording.cycles) > 10
 
 
-def test_ctrl_c_ends_what_is_watched_and_leaves_nothing(
+def test_ctrl_c_ends_a_watch_and_leaves_nothing(
     elsewhere: dict[str, str], daemon: Daemon, client: rtcf.Client, tmp_path: Path
 ) -> None:
     client.load(rtcf.component("rtcf_test", "Counter"))
@@ -104,7 +104,7 @@ def test_ctrl_c_ends_what_is_watched_and_leaves_nothing(
     with subprocess.Popen(
         ["rtcfctl", "-H", "robot", "--socket", str(daemon.socket), "echo", "/Counter.out"],
         env=elsewhere | {"TMPDIR": str(folder)}, stdout=subprocess.PIPE, text=True,
-        # As a terminal does it: all of the foreground gets Ctrl-C.
+        # Like a terminal, which sends Ctrl-C to all foreground processes.
         start_new_session=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     ) as process:  # fmt: skip
@@ -131,7 +131,7 @@ def test_ctrl_c_ends_what_is_watched_and_leaves_nothing(
         ("robot", ("--socket", "/nowhere/s", "status"), 3, "/nowhere/s of robot"),
     ],
 )  # fmt: skip
-def test_refused_in_a_line(
+def test_errors_are_one_line(
     ctl: Ctl, host: str, words: tuple[str, ...], code: int, said: str
 ) -> None:
     done = ctl(*words, host=host)
@@ -140,7 +140,7 @@ def test_refused_in_a_line(
     assert said in line
 
 
-def test_without_ssh_it_is_said(elsewhere: dict[str, str]) -> None:
+def test_a_missing_ssh_is_reported(elsewhere: dict[str, str]) -> None:
     done = subprocess.run(
         ["rtcfctl", "-H", "robot", "status"], env=elsewhere | {"RTCF_SSH": "/no/ssh"},
         capture_output=True, text=True, timeout=60,
@@ -151,7 +151,7 @@ def test_without_ssh_it_is_said(elsewhere: dict[str, str]) -> None:
     )
 
 
-def test_completion_asks_no_other_machine(elsewhere: dict[str, str]) -> None:
+def test_completion_connects_to_no_other_machine(elsewhere: dict[str, str]) -> None:
     done = subprocess.run(
         ["rtcfctl", "__complete", "-H", "robot", "info", ""], env=elsewhere | {"RTCF_SSH": "false"},
         capture_output=True, text=True, timeout=60,

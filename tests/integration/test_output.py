@@ -1,4 +1,4 @@
-"""What rtcfctl prints for machines: each verb speaks JSON and YAML."""
+"""rtcfctl's output for programs: JSON and YAML of each verb."""
 
 import json
 import os
@@ -10,7 +10,7 @@ import pytest
 import yaml
 from daemon_process import Daemon
 
-# In an order in which each is accepted.
+# In an order in which each command succeeds.
 SESSION = [
     "status",
     "types",
@@ -39,7 +39,7 @@ SESSION = [
     "runner remove arm",
 ]
 
-# What goes on in a loop with faults, and what is refused; each fault is another.
+# Events in a loop with faults, and rejected commands; each fault is different.
 TROUBLE = [
     "load rtcf_faults NotFinite --name odd --param after:=3",
     "load rtcf_faults Throws --name jumps --param after:=3 --optional",
@@ -65,14 +65,14 @@ TROUBLE = [
     "start",
     "status",
 ]
-# Without what makes a loop real time.
+# Without real-time rights.
 NO_RIGHTS = ("setpriv", "--inh-caps=-all", "--bounding-set=-sys_nice,-ipc_lock,-sys_resource",
              "prlimit", "--rtprio=0", "--memlock=65536")  # fmt: skip
 CLAUSES = re.compile(r"\n|  +|; |, |(?<=\w): |[()]")
 
 
 @pytest.mark.parametrize("kind", ["json", "yaml"])
-def test_each_verb_speaks_to_machines(daemon: Daemon, kind: str) -> None:
+def test_each_verb_has_json_and_yaml_output(daemon: Daemon, kind: str) -> None:
     for command in SESSION:
         done = daemon.ctl(*shlex.split(command), "-o", kind)
         assert done.returncode == 0, (command, done.stderr)
@@ -81,7 +81,7 @@ def test_each_verb_speaks_to_machines(daemon: Daemon, kind: str) -> None:
         assert isinstance(found, dict | list), command
 
 
-def test_values_have_the_types_they_were_declared_with(daemon: Daemon) -> None:
+def test_values_have_their_declared_types(daemon: Daemon) -> None:
     daemon.ctl("load", "rtcf_test", "Knobs", "--name", "k", "--param", "label:='5'")
     daemon.ctl("step", "1")
     found = json.loads(daemon.ctl("info", "k", "-o", "json").stdout)
@@ -98,11 +98,11 @@ def test_values_have_the_types_they_were_declared_with(daemon: Daemon) -> None:
     assert ports["product"]["direction"] == "output"
 
 
-def test_nothing_is_said_twice_in_one_answer(tmp_path: Path) -> None:
+def test_no_answer_repeats_a_line(tmp_path: Path) -> None:
     daemon = Daemon(tmp_path, wrapper=NO_RIGHTS if os.geteuid() == 0 else NO_RIGHTS[3:])
     daemon.start()
     try:
-        # `types` names libraries that lack the same.
+        # `types` lists the same missing library several times.
         for command in [each for each in SESSION[:-2] if each != "types"] + TROUBLE:
             done = daemon.ctl("-v", *shlex.split(command))
             answer = f"{done.stdout}\n{done.stderr}"

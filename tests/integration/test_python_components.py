@@ -1,4 +1,4 @@
-"""Components written in Python, compiled, in a real loop: values, state, logs and faults."""
+"""Compiled Python components in a real loop: values, state, logs and faults."""
 
 import re
 import subprocess
@@ -29,7 +29,7 @@ COMPILE_DEADLINE_S = 900.0
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Build the components once, as anyone's project does; return the folder of packages."""
+    """Build the components once, as a user's project does; return the folder of packages."""
     project = tmp_path_factory.mktemp("project")
     (project / "CMakeLists.txt").write_text(PROJECT.format(source=SOURCE, messages=MESSAGES))
     for arguments in (["-S", ".", "-B", "build", f"-Drtcf_DIR={RTCF_DIR}"], ["--build", "build"]):
@@ -48,7 +48,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def daemon(tmp_path: Path, folder: Path) -> Iterator[Daemon]:
-    """Give an rtcfd that finds them."""
+    """Yield an rtcfd that finds the components."""
     daemon = Daemon(tmp_path, arguments=("--path", str(folder)))
     daemon.start()
     yield daemon
@@ -69,7 +69,7 @@ def _ports(client: rtcf.Client, name: str) -> dict[str, graph_pb2.PortInfo]:
     return {each.name: each for each in client.get_component(name).ports}
 
 
-def test_it_computes_in_the_loop_what_it_says(daemon: Daemon, client: rtcf.Client) -> None:
+def test_the_loop_computes_the_same_as_the_source(daemon: Daemon, client: rtcf.Client) -> None:
     _load_both(client)
     assert client.get_order() == ["/ramp", "/observer"]
     client.step(250)
@@ -88,9 +88,7 @@ def test_it_computes_in_the_loop_what_it_says(daemon: Daemon, client: rtcf.Clien
     assert [float(each) for each in shown] == pytest.approx([x, estimate], rel=1e-5)
 
 
-def test_an_input_keeps_its_value_from_one_writer_to_the_next(
-    client: rtcf.Client, daemon: Daemon
-) -> None:
+def test_an_input_keeps_its_value_between_writers(client: rtcf.Client, daemon: Daemon) -> None:
     def seen(cycles: int) -> list[str]:
         client.step(cycles)
         states = _states(client, "watcher")
@@ -108,7 +106,7 @@ def test_an_input_keeps_its_value_from_one_writer_to_the_next(
     assert seen(2) == ["4", "6", "1", "2000000", "1"]
 
 
-def test_a_queue_gets_each_message_of_cycles_that_its_reader_skips(
+def test_a_queue_holds_messages_of_cycles_that_its_reader_skips(
     client: rtcf.Client, daemon: Daemon
 ) -> None:
     client.load(rtcf.component("py", "Ramp", name="ramp"))
@@ -116,14 +114,14 @@ def test_a_queue_gets_each_message_of_cycles_that_its_reader_skips(
     client.step(40)
     states = _states(client, "gatherer")
     messages = int(states["messages"])
-    assert 37 <= messages <= 40  # the last ones may wait for its next turn
+    assert 37 <= messages <= 40  # the last ones may wait for the reader's next cycle
     assert (states["last"], states["in_order"]) == (str(messages), "1")
     seconds = sum(each * 0.001 for each in range(1, messages + 1))
     assert float(states["seconds"]) == pytest.approx(seconds)
     assert states["oldest"] == "3000000"
 
 
-def test_messages_are_those_of_any_component(client: rtcf.Client, daemon: Daemon) -> None:
+def test_messages_are_as_in_cpp_components(client: rtcf.Client, daemon: Daemon) -> None:
     client.load(rtcf.component("py", "Joints", name="joints"))
     client.load(rtcf.component("py", "Arm", name="arm"))
     client.step(20)
@@ -150,9 +148,7 @@ def test_messages_are_those_of_any_component(client: rtcf.Client, daemon: Daemon
     assert "position[1]: 0.4 " in joints and "stamp: 0.018999995 " in joints
 
 
-def test_a_message_with_more_than_is_declared_is_not_taken(
-    client: rtcf.Client, daemon: Daemon
-) -> None:
+def test_a_message_longer_than_declared_is_rejected(client: rtcf.Client, daemon: Daemon) -> None:
     client.load(rtcf.component("py", "Crowd", name="crowd"))
     client.load(rtcf.component("py", "Arm", name="arm"))
     client.step(5)
@@ -161,9 +157,7 @@ def test_a_message_with_more_than_is_declared_is_not_taken(
     wait_for(lambda: said in daemon.log(), "the warning")
 
 
-def test_what_derives_from_parameters_changes_with_them(
-    client: rtcf.Client, daemon: Daemon
-) -> None:
+def test_derived_values_follow_their_parameters(client: rtcf.Client, daemon: Daemon) -> None:
     client.load(rtcf.component("py", "Ramp", name="ramp"))
     parameters = ["length:=0.2", "gains_1:=3.0"]
     spec = rtcf.component(
@@ -196,7 +190,7 @@ def test_what_derives_from_parameters_changes_with_them(
     agrees_after(50)
 
 
-def test_its_declarations_are_those_of_any_component(client: rtcf.Client, daemon: Daemon) -> None:
+def test_declarations_are_as_in_cpp_components(client: rtcf.Client, daemon: Daemon) -> None:
     _load_both(client)
     ramp = client.get_component("ramp")
     assert ramp.doc == "Counts cycles, in all types of a port"
@@ -214,7 +208,9 @@ def test_its_declarations_are_those_of_any_component(client: rtcf.Client, daemon
     assert refused.returncode == 1 and "step" in refused.stderr
 
 
-def test_a_parameter_set_counts_from_the_next_cycle(client: rtcf.Client, daemon: Daemon) -> None:
+def test_a_parameter_change_takes_effect_in_the_next_cycle(
+    client: rtcf.Client, daemon: Daemon
+) -> None:
     _load_both(client)
     client.step(10)
     assert daemon.ctl("set", "ramp", "step:=10").returncode == 0
@@ -222,7 +218,7 @@ def test_a_parameter_set_counts_from_the_next_cycle(client: rtcf.Client, daemon:
     assert _states(client, "ramp")["total"] == "130"
 
 
-def test_state_goes_over_to_a_replacement_and_back_by_reset(
+def test_state_is_kept_by_a_replacement_and_restored_by_reset(
     client: rtcf.Client, daemon: Daemon
 ) -> None:
     _load_both(client)
@@ -235,13 +231,13 @@ def test_state_goes_over_to_a_replacement_and_back_by_reset(
     assert _states(client, "ramp")["total"] == "0"
 
 
-def test_it_logs_what_its_arguments_were(client: rtcf.Client, daemon: Daemon) -> None:
+def test_log_records_contain_their_arguments(client: rtcf.Client, daemon: Daemon) -> None:
     _load_both(client)
     client.step(5)
     wait_for(lambda: "third value 0.003 after 3 ms" in daemon.log(), "the record")
 
 
-def test_safe_is_its_last_cycle(client: rtcf.Client, daemon: Daemon) -> None:
+def test_safe_runs_in_the_last_cycle(client: rtcf.Client, daemon: Daemon) -> None:
     _load_both(client)
     client.start()
     wait_for(lambda: state(client).iteration > 20, "20 cycles")
@@ -277,14 +273,14 @@ def test_a_fault_names_file_line_and_text(client: rtcf.Client, daemon: Daemon, w
     assert "666" not in _ports(client, "bad")["out"].value
 
 
-def test_what_start_raises_refuses_the_start(client: rtcf.Client, daemon: Daemon) -> None:
+def test_an_exception_in_start_fails_the_start(client: rtcf.Client, daemon: Daemon) -> None:
     client.load(rtcf.component("py", "Failing", name="bad", parameters=["way:=9"]))
     with pytest.raises(rtcf.RefusedError, match=r"controllers\.py:\d+: .*does not want to start"):
         client.start()
 
 
 @pytest.mark.parametrize("component", ["Observer", "Gatherer", "Joints"])
-def test_a_check_finds_no_state_that_is_not_declared(folder: Path, component: str) -> None:
+def test_a_check_finds_no_undeclared_state(folder: Path, component: str) -> None:
     executor = BUILD_TREE / "bin" / "rtcf-executor"
     library = folder / "py" / "controllers.so"
     options = ["--package", "py", "--type", component, "--cycles", "500"]
@@ -299,7 +295,7 @@ def test_a_check_finds_no_state_that_is_not_declared(folder: Path, component: st
     assert done.returncode == 0 and "undeclared" not in done.stderr, done.stderr
 
 
-def test_the_loop_has_no_python_in_it(client: rtcf.Client, daemon: Daemon) -> None:
+def test_the_loop_contains_no_python(client: rtcf.Client, daemon: Daemon) -> None:
     _load_both(client)
     client.start()
     wait_for(lambda: state(client).iteration > 20, "20 cycles")

@@ -1,4 +1,4 @@
-"""A component's Python source given to rtcfctl: compiled, kept, swapped when it is saved."""
+"""Python sources given to rtcfctl: compiled, cached, and swapped in when saved."""
 
 import importlib.machinery
 import importlib.util
@@ -21,7 +21,7 @@ COMPILE_DEADLINE_S = 900.0
 
 @pytest.fixture
 def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Let rtcfctl and rtcfd have a cache of this test's own."""
+    """Set a private cache for rtcfctl and rtcfd."""
     cache = tmp_path / "cache"
     monkeypatch.setenv("XDG_CACHE_HOME", str(cache))
     return cache
@@ -29,7 +29,7 @@ def own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def daemon(tmp_path: Path, own_cache: Path) -> Iterator[Daemon]:
-    """Give an rtcfd that looks there."""
+    """Yield an rtcfd that uses this cache."""
     daemon = Daemon(tmp_path)
     daemon.start()
     yield daemon
@@ -55,7 +55,7 @@ class Counts(Component):
 """
 
 
-# Python's ints have no bound, those of the loop 64 bits.
+# Python's ints are unbounded, the loop's have 64 bits.
 OVERFLOW = "1 + self.count * 10**18 % 7"
 TUNED = """\
 from rtcf.component import Component, Output, Parameter
@@ -72,7 +72,7 @@ class Tuned(Component):
 
 
 class Watching:
-    """`rtcfctl load --watch`, and what it says."""
+    """`rtcfctl load --watch`, and its output."""
 
     def __init__(self, daemon: Daemon, *words: str) -> None:
         self._said = daemon.folder / "said"
@@ -112,13 +112,13 @@ def _history(client: rtcf.Client) -> list[tuple[str, str, object]]:
 
 
 def _save(source: Path, text: str) -> None:
-    """Write at once: a file that is written in steps is swapped in for each of them."""
+    """Replace the file at once: each partial write would be swapped in."""
     part = source.with_suffix(".part")
     part.write_text(text)
     part.replace(source)
 
 
-def test_what_was_tuned_stays_when_a_source_is_saved(
+def test_tuned_values_stay_when_a_source_is_saved(
     tmp_path: Path, daemon: Daemon, client: rtcf.Client
 ) -> None:
     source = tmp_path / "tuned.py"
@@ -127,7 +127,7 @@ def test_what_was_tuned_stays_when_a_source_is_saved(
         watching.wait_for("loaded /Tuned")
         assert _parameters(client) == {"kp": 1.0, "ki": 0.5}
         assert daemon.ctl("set", "Tuned", "kp:=50").returncode == 0
-        # Another default of a tuned or given parameter changes nothing.
+        # A new default of a tuned or given parameter changes nothing.
         _save(source, TUNED.format(kp=2.0, most=90.0, ki=0.75))
         watching.wait_for("reloaded /Tuned")
         assert f"reloaded /Tuned from {source}; kept kp 50\n" in watching.said
@@ -145,14 +145,14 @@ def test_what_was_tuned_stays_when_a_source_is_saved(
         assert _parameters(client) == {"kp": 3.0, "ki": 3.0}
         history += [("replace", "kp", 3.0)]
         assert _history(client) == history
-        # Nobody has tuned it by now: its default counts.
+        # The parameter was not tuned, so its default applies.
         _save(source, TUNED.format(kp=4.0, most=9.0, ki=1.0))
         watching.wait_for("reloaded /Tuned", 3)
         assert _parameters(client)["kp"] == 4.0
         assert _history(client)[: len(history)] == history
 
 
-def test_code_that_differs_from_the_interpreter_is_refused_unless_asked_for(
+def test_code_that_differs_from_the_interpreter_is_rejected_by_default(
     tmp_path: Path, daemon: Daemon, client: rtcf.Client
 ) -> None:
     source = tmp_path / "counts.py"
@@ -166,12 +166,12 @@ def test_code_that_differs_from_the_interpreter_is_refused_unless_asked_for(
             rf"skips this\n",
             done.stderr,
         ), done.stderr
-        # The library of --no-verify is no reason to trust it.
+        # A library loaded with --no-verify is not trusted later.
         assert daemon.ctl("load", str(source), "Counts", "--no-verify").returncode == 0
         client.unload(["Counts"])
 
 
-def test_a_source_that_differs_when_it_is_saved_leaves_the_loop_as_it_is(
+def test_a_saved_source_that_differs_does_not_change_the_loop(
     tmp_path: Path, daemon: Daemon, client: rtcf.Client
 ) -> None:
     source = tmp_path / "counts.py"
@@ -197,7 +197,7 @@ def test_a_source_that_differs_when_it_is_saved_leaves_the_loop_as_it_is(
 
 @pytest.fixture
 def calls(tmp_path: Path, own_cache: Path) -> Path:
-    """Give a file with the calls of a compiler, which is that of the build tree `tmp_path`."""
+    """Return a file that lists the calls of a compiler of the build tree `tmp_path`."""
     file = tmp_path / "calls"
     compiler = tmp_path / "bin" / "rtcf-compile"
     compiler.parent.mkdir()
@@ -221,14 +221,14 @@ def test_a_library_is_verified_once(tmp_path: Path, calls: Path) -> None:
 
     assert called(verify=False) == ["counts.py -o counts.so"]
     assert called(verify=False) == []
-    assert called(verify=True) == ["counts.py --verify 1s"], "as it is there already"
+    assert called(verify=True) == ["counts.py --verify 1s"], "the library exists already"
     assert called(verify=True) == called(verify=False) == []
     source.write_text(COUNTS + "\n")
     assert called(verify=True) == ["counts.py --verify 1s -o counts.so"]
     assert called(verify=True) == called(verify=False) == []
 
 
-def test_a_source_is_loaded_swapped_when_it_is_saved_and_kept(
+def test_a_source_is_loaded_cached_and_swapped_in_when_saved(
     own_cache: Path, tmp_path: Path, daemon: Daemon, client: rtcf.Client
 ) -> None:
     source = tmp_path / "counts.py"
@@ -266,7 +266,7 @@ def test_a_source_is_loaded_swapped_when_it_is_saved_and_kept(
     assert library.stat().st_mtime_ns == second
 
 
-def test_what_is_saved_while_a_source_is_compiled_is_seen(tmp_path: Path) -> None:
+def test_a_save_during_compilation_is_noticed(tmp_path: Path) -> None:
     source = tmp_path / "counts.py"
     source.write_text(COUNTS)
     looks = python_source.looks(str(source))
@@ -277,7 +277,7 @@ def test_what_is_saved_while_a_source_is_compiled_is_seen(tmp_path: Path) -> Non
     assert not seeing.is_alive()
 
 
-def test_a_library_of_another_debian_counts_as_of_another_source(
+def test_a_library_of_another_debian_is_recompiled(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     source = tmp_path / "counts.py"
@@ -295,7 +295,7 @@ def test_a_library_of_another_debian_counts_as_of_another_source(
         "../../lib/librtcf_python.a",
     ],
 )
-def test_a_library_of_another_compiler_counts_as_of_another_source(
+def test_a_library_of_another_compiler_is_recompiled(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, changed: str
 ) -> None:
     found = importlib.util.find_spec("rtcf_compile")
@@ -346,9 +346,7 @@ class Counts(Component):
 
 
 @pytest.mark.parametrize("name", ["θ", "2dof", "_", "f" * 100])
-def test_names_that_are_not_ascii_work_where_ros_has_none(
-    daemon: Daemon, client: rtcf.Client, name: str
-) -> None:
+def test_non_ascii_names_work_outside_ros(daemon: Daemon, client: rtcf.Client, name: str) -> None:
     source = daemon.folder / f"{name}.py"
     source.write_text(FREELY)
     done = daemon.ctl("load", str(source), "Counts")
@@ -433,7 +431,7 @@ def test_an_enum_parameter_is_set_by_name_as_in_cpp(daemon: Daemon, client: rtcf
     assert _parameters(client, "other") == {"mode": "HÄLT"}
 
 
-def test_a_source_that_is_wrong_is_refused_in_one_line(own_cache: Path, daemon: Daemon) -> None:
+def test_a_wrong_source_is_rejected_in_one_line(own_cache: Path, daemon: Daemon) -> None:
     source = daemon.folder / "counts.py"
     done = daemon.ctl("load", str(source), "Counts")
     assert (done.returncode, done.stderr) == (1, f"rtcfctl: {source}: no such file\n")

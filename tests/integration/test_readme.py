@@ -1,4 +1,4 @@
-"""What README's tour and the examples of manual pages tell a reader to type, word for word."""
+"""The commands of README's tour and of the manual pages' examples, run verbatim."""
 
 import subprocess
 from pathlib import Path
@@ -11,13 +11,13 @@ from values import state
 
 
 def type_in(daemon: Daemon, lines: list[list[str]]) -> None:
-    """Type commands of rtcfctl, with the daemon's folder for /tmp; each succeeds."""
+    """Run rtcfctl commands, with the daemon's folder as /tmp; each must succeed."""
     for words in lines:
         done = daemon.ctl(*(word.replace("/tmp/", f"{daemon.folder}/") for word in words[1:]))
         assert done.returncode == 0, (words, done.stderr)
 
 
-def test_the_tour_goes_as_it_is_told(daemon: Daemon) -> None:
+def test_the_tour_runs_as_documented(daemon: Daemon) -> None:
     lines = pages.tour()
     assert len(lines) > 10
     type_in(daemon, lines)

@@ -1,5 +1,5 @@
-"""The whole executor under RealtimeSanitizer: load, topics, hot swaps, parameters and faults,
-and nothing in its real-time thread that may block."""
+"""The whole executor under RealtimeSanitizer: load, topics, hot swaps, parameters and faults;
+its real-time thread makes no blocking call."""
 
 import random
 import re
@@ -42,7 +42,7 @@ def mixer(name: str, *remaps: str) -> graph_pb2.ComponentSpec:
 
 
 def change(client: rtcf.Client, chance: random.Random) -> None:
-    """Change something of the graph beside Fig. 1."""
+    """Make a random change to the graph outside Fig. 1."""
     name = chance.choice("abc")
     port = [control_pb2.PortName(component=name, port="in1")]
     match chance.randrange(8):
@@ -63,7 +63,7 @@ def change(client: rtcf.Client, chance: random.Random) -> None:
             client.set_runner(runner_pb2.RunnerSettings(frequency_hz=frequency))
 
 
-def test_load_topics_and_changes_break_no_rule(ros_daemon: Daemon, master: Master) -> None:
+def test_load_topics_and_changes_are_realtime_safe(ros_daemon: Daemon, master: Master) -> None:
     chance = random.Random(3)
     refused = 0
     with rtcf.Client(ros_daemon.socket) as client:
@@ -93,7 +93,7 @@ def test_load_topics_and_changes_break_no_rule(ros_daemon: Daemon, master: Maste
     assert reports(ros_daemon) == []
 
 
-def test_faults_that_the_loop_survives_break_no_rule(sanitized: Daemon) -> None:
+def test_survived_faults_are_realtime_safe(sanitized: Daemon) -> None:
     with rtcf.Client(sanitized.socket) as client:
         client.set_runner(runner_pb2.RunnerSettings(max_overruns=0, frequency_hz=5000.0))
         client.load(rtcf.component("rtcf_test", "Witness"))
@@ -112,9 +112,7 @@ def test_faults_that_the_loop_survives_break_no_rule(sanitized: Daemon) -> None:
 
 
 @pytest.mark.parametrize("optional", [True, False])
-def test_of_an_exception_only_the_throw_itself_is_reported(
-    sanitized: Daemon, optional: bool
-) -> None:
+def test_only_the_throw_of_an_exception_is_reported(sanitized: Daemon, optional: bool) -> None:
     with rtcf.Client(sanitized.socket) as client:
         client.load(rtcf.component("rtcf_test", "Witness"))
         client.load(rtcf.component("rtcf_faults", "Throws", name="bad", optional=optional))
@@ -122,17 +120,17 @@ def test_of_an_exception_only_the_throw_itself_is_reported(
         wait_for(lambda: client.get_component("bad").fault, "the fault")
     assert sanitized.end() == 0
     found = reports(sanitized)
-    assert found, "C++ allocates an exception"
+    assert found, "throwing allocates, which must be reported"
     for each in found:
         stack = " ".join(frame.function for frame in each.frames)
-        # Made where it is thrown, freed at the end of the clause that caught it.
+        # Allocated at the throw, freed at the end of the catch block.
         assert re.search(
             r"Throws::fault\(\)|__cxa_|~runtime_error\(\)|^free \S* ?rtcf::executor::Cycle::update",
             stack,
         ), stack
 
 
-def test_what_a_component_does_wrong_is_reported(sanitized: Daemon) -> None:
+def test_violations_of_a_component_are_reported(sanitized: Daemon) -> None:
     with rtcf.Client(sanitized.socket) as client:
         client.load(rtcf.component("rtcf_faults", "Sleeps"))
         client.start()

@@ -1,6 +1,6 @@
-"""What the kernel sees of the real-time thread: no page faults, one wait a cycle, no more.
+"""The kernel's view of the real-time thread: no page faults, and a single wait per cycle.
 
-Nothing here is about how long something takes, so that it holds on any kernel.
+These tests measure no durations, so that they hold on any kernel.
 """
 
 import os
@@ -21,13 +21,13 @@ from values import iteration, port_value, wait_until_after
 
 FREQUENCY_HZ = 2000.0
 CYCLES = 10_000
-SETTLED = 1000  # cycles after which there is nothing that happens only once
+SETTLED = 1000  # cycles after which all one-time effects are over
 LOCKED_KB = 64 * 1024
 
 
 @pytest.fixture(scope="module")
 def mapped(tmp_path_factory: pytest.TempPathFactory, master: Master) -> Iterator["Mapped"]:
-    """Give Fig. 1 running with its ROS topics, a subscriber and a publisher at them."""
+    """Yield Fig. 1 running with its ROS topics, a subscriber and a publisher."""
     folder = tmp_path_factory.mktemp("mapped")
     daemon = Daemon(folder, with_ros(master.uri, fig_1.WHITELIST))
     daemon.start()
@@ -43,8 +43,8 @@ def mapped(tmp_path_factory: pytest.TempPathFactory, master: Master) -> Iterator
         yield Mapped(client, status.pid, status.realtime_tid)
         client.stop()
         sent = iteration(client)
-        # The mappings were active all the time: every cycle's value has arrived, but those that
-        # were lost, and counted, where a busy machine held up the thread that takes them.
+        # The mappings were active all the time: the value of every cycle has arrived, except those
+        # lost and counted where a busy machine delayed the receiving thread.
         lost = client.get_status().runners[0].tap_dropped
         assert lost < sent
         nodes[0].wait_for_values(sent - lost)
@@ -63,25 +63,25 @@ class Mapped:
     thread: int
 
     def run(self, cycles: int) -> int:
-        """Let it run for so many cycles; return how many they were."""
+        """Run it for some cycles; return their number."""
         first = iteration(self.client)
         return wait_until_after(self.client, first + cycles) - first
 
 
-def test_the_loop_makes_no_page_fault_and_waits_once_a_cycle(mapped: Mapped) -> None:
+def test_the_loop_has_no_page_fault_and_waits_once_per_cycle(mapped: Mapped) -> None:
     at_most = iteration(mapped.client)
     before = read_counters(mapped.pid, mapped.thread)
     cycles = mapped.run(CYCLES)
     counted = read_counters(mapped.pid, mapped.thread) - before
     at_most = iteration(mapped.client) - at_most
     assert counted.page_faults == 0
-    # A wait whose time has come already is none to the kernel: on a busy machine they may be many.
+    # The kernel counts no wait whose time has passed already, which happens on a busy machine.
     assert cycles * 0.5 < counted.voluntary_switches <= at_most + 1
 
 
 def test_perf_counts_one_system_call_a_cycle(mapped: Mapped, tmp_path: Path) -> None:
     if refusal := Perf.refusal(mapped.thread):
-        # Then the tests above and below, which need no permission, are what there is.
+        # The other tests of this file, which need no permission, must suffice.
         warnings.warn(f"perf may not count here: {refusal}", stacklevel=1)
         assert mapped.run(CYCLES) >= CYCLES
         return
@@ -95,17 +95,17 @@ def test_perf_counts_one_system_call_a_cycle(mapped: Mapped, tmp_path: Path) -> 
     assert perf.preempted_by_own == 0
 
 
-def test_no_thread_of_ours_can_take_the_cpu_from_the_loop(mapped: Mapped) -> None:
+def test_no_thread_of_rtcf_can_preempt_the_loop(mapped: Mapped) -> None:
     policies = {}
     for thread in map(int, os.listdir(f"/proc/{mapped.pid}/task")):
-        with suppress(ProcessLookupError):  # it has ended
+        with suppress(ProcessLookupError):  # the thread has ended
             policies[thread] = os.sched_getscheduler(thread)
     realtime = os.sched_getscheduler(mapped.thread)
     assert len(policies) > 1
     assert {policy for thread, policy in policies.items() if thread != mapped.thread} == {
         os.SCHED_OTHER
     }
-    # Without the right to it the loop runs degraded, and then says so.
+    # Without that right the loop runs degraded and reports it.
     degraded = mapped.client.get_status().runners[0].degraded
     assert realtime == os.SCHED_FIFO or any("SCHED_FIFO" in line for line in degraded)
 
@@ -117,12 +117,12 @@ def test_the_executor_locks_at_most_64_mb(mapped: Mapped) -> None:
 
 
 def seal(client: rtcf.Client) -> None:
-    """Let the running loop call the kernel only to wait."""
+    """Restrict the running loop to the system call that waits."""
     client.load(rtcf.component("rtcf_test", "Sealed"))
     wait_for(lambda: port_value(client, "Sealed", "sealed") == 1.0, "the seal")
 
 
-def test_a_loop_that_may_only_wait_runs_on(mapped: Mapped) -> None:
+def test_a_loop_restricted_to_waiting_continues(mapped: Mapped) -> None:
     seal(mapped.client)
     assert mapped.run(CYCLES) >= CYCLES
     status = mapped.client.get_status().runners[0]
@@ -131,7 +131,7 @@ def test_a_loop_that_may_only_wait_runs_on(mapped: Mapped) -> None:
     assert status_field(folder, "Seccomp") == "2"  # SECCOMP_MODE_FILTER
 
 
-def test_one_system_call_of_a_component_ends_a_loop_that_may_only_wait(
+def test_a_system_call_of_a_component_ends_a_restricted_loop(
     daemon: Daemon, client: rtcf.Client
 ) -> None:
     client.load(rtcf.component("rtcf_test", "Counter"))

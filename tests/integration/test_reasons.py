@@ -1,4 +1,4 @@
-"""Refusals of a real rtcfd as programs see them: reason, domain and what it is about."""
+"""Errors of a real rtcfd for programs: reason, domain and subject."""
 
 import subprocess
 import sys
@@ -15,7 +15,7 @@ from rtcf.v1 import control_pb2, control_pb2_grpc, errors_pb2
 TREE = Path(__file__).resolve().parents[2]
 
 
-def test_a_program_learns_the_reason_and_the_name_that_was_meant(client: rtcf.Client) -> None:
+def test_an_error_has_a_reason_and_suggests_a_name(client: rtcf.Client) -> None:
     with pytest.raises(refusals.RunnerNotFoundError) as refused:
         client.start("rt_runer")
     assert refused.value.about == {"runner": "rt_runer", "suggestion": "rt_runner"}

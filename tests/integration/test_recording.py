@@ -1,4 +1,4 @@
-"""Recordings: what a loop did, in a file that others read, too."""
+"""Recordings: the cycles of a loop in a file that other programs can read."""
 
 import fcntl
 import json
@@ -18,7 +18,7 @@ import pytest
 import rtcf
 from daemon_process import BUILD_TREE, Daemon, clean_environment, wait_for
 
-# MCAP's own reader, which is not in Debian.
+# MCAP's reference reader, which is not in Debian.
 _MCAP = ("mcap==1.6.0", "lz4==4.4.5", "zstandard==0.25.0")
 _DUMP = """
 import json, sys
@@ -44,7 +44,7 @@ with open(sys.argv[1], "rb") as file:
 
 @pytest.fixture(scope="session")
 def mcap_python() -> Path:
-    """A Python that has MCAP's own reader."""
+    """A Python with MCAP's reference reader."""
     folder = BUILD_TREE / "venv-mcap"
     python = folder / "bin" / "python"
     asked = [str(python), "-c", "import importlib.metadata as m; print(m.version('mcap'))"]
@@ -67,7 +67,7 @@ def _recorded(daemon: Daemon, file: Path, *words: str) -> None:
 
 
 def _begun(daemon: Daemon, file: Path) -> subprocess.Popen[bytes]:
-    """Return a rtcfctl that records, and has written some of it."""
+    """Return a rtcfctl that records and has written some cycles."""
     process = subprocess.Popen(
         [BUILD_TREE / "bin" / "rtcfctl", "--socket", daemon.socket, "record", "-o", file],
         env=clean_environment(),
@@ -97,7 +97,7 @@ def test_every_cycle_is_in_the_file(running: Daemon, tmp_path: Path) -> None:
         assert np.all(recording.durations_ns >= 0)
 
 
-def test_a_slice_is_what_lies_between_two_stamps(running: Daemon, tmp_path: Path) -> None:
+def test_a_slice_has_the_cycles_between_two_stamps(running: Daemon, tmp_path: Path) -> None:
     file = tmp_path / "run.mcap"
     _recorded(running, file, "wave.phase", "--duration", "1s")
     with rtcf.read_recording(file) as recording:
@@ -108,7 +108,9 @@ def test_a_slice_is_what_lies_between_two_stamps(running: Daemon, tmp_path: Path
         assert np.array_equal(part.values, whole.values[100:200])
 
 
-def test_mcaps_own_reader_reads_it(running: Daemon, tmp_path: Path, mcap_python: Path) -> None:
+def test_mcaps_reference_reader_reads_it(
+    running: Daemon, tmp_path: Path, mcap_python: Path
+) -> None:
     file = tmp_path / "run.mcap"
     _recorded(running, file, "--duration", "0.5s")
     done = subprocess.run(
@@ -137,7 +139,7 @@ with open(sys.argv[1], "rb") as file:
 """
 
 
-def test_a_file_whose_writer_was_killed_can_be_read(
+def test_a_file_of_a_killed_writer_can_be_read(
     running: Daemon, tmp_path: Path, mcap_python: Path
 ) -> None:
     file = tmp_path / "run.mcap"
@@ -178,7 +180,7 @@ def test_ctrl_c_ends_the_file_in_order(running: Daemon, tmp_path: Path) -> None:
         assert recording.whole
 
 
-def test_ports_join_while_it_is_recorded(
+def test_new_ports_are_added_during_a_recording(
     daemon: Daemon, client: rtcf.Client, tmp_path: Path
 ) -> None:
     client.load(rtcf.component("rtcf_examples", "Wave", name="wave"))
@@ -198,7 +200,7 @@ def test_ports_join_while_it_is_recorded(
         assert 0 < len(late.cycles) < len(cycles)
 
 
-def test_refused_and_no_file_is_touched(running: Daemon, tmp_path: Path) -> None:
+def test_errors_touch_no_file(running: Daemon, tmp_path: Path) -> None:
     file = tmp_path / "run.mcap"
     done = running.ctl("record", "-o", str(file), "nobody")
     assert done.returncode == 1
@@ -218,7 +220,7 @@ def test_refused_and_no_file_is_touched(running: Daemon, tmp_path: Path) -> None
 
 @pytest.fixture
 def full_disk(tmp_path: Path) -> Iterator[Path]:
-    """Give a folder on a disk that takes no byte."""
+    """Yield a folder on a full disk."""
     disk = tmp_path / "full"
     disk.mkdir()
     mounting = ["mount", "-t", "tmpfs", "-o", "size=4k", "none", str(disk)]
@@ -232,9 +234,7 @@ def full_disk(tmp_path: Path) -> Iterator[Path]:
         subprocess.run(["umount", "--lazy", disk], check=True)
 
 
-def test_a_disk_that_takes_nothing_is_named_and_left_as_it_was(
-    running: Daemon, full_disk: Path
-) -> None:
+def test_a_full_disk_is_named_and_left_unchanged(running: Daemon, full_disk: Path) -> None:
     assert running.ctl("incident", "take").returncode == 0
     full = "No space left on device"
     for verb, what in {
@@ -251,8 +251,10 @@ def test_a_disk_that_takes_nothing_is_named_and_left_as_it_was(
         assert [each.name for each in full_disk.iterdir()] == ["filler"], verb
 
 
-def test_a_disk_that_takes_no_cycle_is_left_as_it_was(running: Daemon, full_disk: Path) -> None:
-    # Room for a file's head alone.
+def test_a_disk_without_room_for_a_cycle_is_left_unchanged(
+    running: Daemon, full_disk: Path
+) -> None:
+    # Room for the head of a file only.
     subprocess.run(["mount", "-o", "remount,size=8k", full_disk], check=True)
     done = running.ctl("record", "--duration", "0.5", "-o", str(full_disk / "out"))
     assert done.returncode == 1
@@ -261,8 +263,8 @@ def test_a_disk_that_takes_no_cycle_is_left_as_it_was(running: Daemon, full_disk
     assert [each.name for each in full_disk.iterdir()] == ["filler"]
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="a disk of its own takes root")
-def test_a_full_disk_ends_it_with_a_line_and_what_was_written_can_be_read(
+@pytest.mark.skipif(os.geteuid() != 0, reason="requires root to mount a disk")
+def test_a_disk_that_fills_up_ends_the_recording_with_a_readable_file(
     running: Daemon, tmp_path: Path
 ) -> None:
     disk = tmp_path / "disk"
@@ -279,7 +281,7 @@ def test_a_full_disk_ends_it_with_a_line_and_what_was_written_can_be_read(
         subprocess.run(["umount", disk], check=True)
 
 
-def test_where_there_is_no_room_at_all_it_is_said_in_one_line(running: Daemon) -> None:
+def test_a_device_without_room_is_reported_in_one_line(running: Daemon) -> None:
     done = running.ctl("record", "-o", "/dev/full", "--force")
     assert done.returncode == 1
     assert done.stderr.splitlines() == [
@@ -296,7 +298,7 @@ def _cycles(*files: Path) -> list[int]:
 
 
 @pytest.mark.parametrize("bound", [("--duration", "300ms"), ("--size", "16KiB")])
-def test_files_that_follow_each_other_miss_no_cycle(
+def test_consecutive_files_miss_no_cycle(
     running: Daemon, tmp_path: Path, bound: tuple[str, str]
 ) -> None:
     files = [tmp_path / name for name in ("run.mcap", "run-1.mcap", "run-2.mcap")]
@@ -324,7 +326,7 @@ def test_a_file_ends_when_it_is_large_enough(running: Daemon, tmp_path: Path) ->
     assert len(_cycles(file)) > 10
 
 
-def test_what_is_around_a_moment_is_in_the_file(running: Daemon, tmp_path: Path) -> None:
+def test_the_cycles_around_a_condition_are_in_the_file(running: Daemon, tmp_path: Path) -> None:
     file = tmp_path / "run.mcap"
     done = running.ctl(
         "record", "-o", str(file), "wave.wave", "--trigger", "wave.phase < 0.0005", "--pre",
@@ -338,7 +340,7 @@ def test_what_is_around_a_moment_is_in_the_file(running: Daemon, tmp_path: Path)
         stamps_ns = recording.read("/wave.phase").stamps_ns
     (place,) = (cycles == hit).nonzero()[0].tolist()
     assert phase[place] < 0.0005
-    # It may have begun within so much of the hit.
+    # The recording may start within this distance of the hit.
     assert (phase[:place] >= 0.0005).all()
     assert stamps_ns[place] - stamps_ns[0] <= 200_000_000
     assert 99_000_000 <= stamps_ns[-1] - stamps_ns[place] <= 100_000_000
@@ -356,7 +358,7 @@ def test_what_is_around_a_moment_is_in_the_file(running: Daemon, tmp_path: Path)
         (("--trigger", "wave.nothing > 1"), "/wave.nothing is not a number of this stream"),
     ],
 )
-def test_what_cannot_be_recorded_is_refused_before_there_is_a_file(
+def test_an_impossible_recording_is_rejected_before_a_file_exists(
     running: Daemon, tmp_path: Path, words: tuple[str, ...], said: str
 ) -> None:
     file = tmp_path / "run.mcap"
@@ -366,7 +368,7 @@ def test_what_cannot_be_recorded_is_refused_before_there_is_a_file(
     assert not file.exists()
 
 
-def test_the_last_cycles_of_a_loop_are_in_the_file_at_once(
+def test_the_last_cycles_of_a_loop_are_written_immediately(
     running: Daemon, client: rtcf.Client, tmp_path: Path
 ) -> None:
     file = tmp_path / "run.mcap"
@@ -382,17 +384,17 @@ def test_the_last_cycles_of_a_loop_are_in_the_file_at_once(
     wait_for(lambda: file.exists() and file.stat().st_size > 20_000, "a chunk in the file")
     client.stop()
     end = client.get_status().runners[0].iteration
-    # That in which components made safe; nothing comes after it that would have it written.
+    # The cycle in which components made safe; no later cycle would flush it.
     wait_for(lambda: last() == end, "the last cycle in the file")
     process.kill()
     process.wait()
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_a_signal_breaks_off_nothing_that_is_being_written(
+def test_a_signal_interrupts_no_write(
     running: Daemon, tmp_path: Path, number: signal.Signals
 ) -> None:
-    # A disk that takes a page, and then nothing more for a while.
+    # A disk that accepts one page, and then blocks for a while.
     disk = tmp_path / "disk"
     os.mkfifo(disk)
     reader = os.open(disk, os.O_RDONLY | os.O_NONBLOCK)
@@ -401,14 +403,14 @@ def test_a_signal_breaks_off_nothing_that_is_being_written(
         [BUILD_TREE / "bin" / "rtcfctl", "--socket", running.socket, "record", "-o", disk,
          "--force"],
         env=clean_environment(),
-        # Where tests run in the background, or by nohup, these are ignored.
+        # These signals are ignored where tests run in the background, or under nohup.
         preexec_fn=lambda: (
             signal.signal(signal.SIGINT, signal.default_int_handler),
             signal.signal(signal.SIGHUP, signal.SIG_DFL),
         ),
     )  # fmt: skip
     writer = os.open(disk, os.O_WRONLY)
-    wait_for(lambda: not select.select([], [writer], [], 0)[1], "a disk that takes nothing more")
+    wait_for(lambda: not select.select([], [writer], [], 0)[1], "a full disk")
     os.close(writer)
     process.send_signal(number)
     pending = Path(f"/proc/{process.pid}/status")
@@ -428,7 +430,7 @@ def test_a_signal_breaks_off_nothing_that_is_being_written(
             assert np.array_equal(recording.read(name).cycles, recording.cycles), name
 
 
-def test_what_is_no_recording_is_said(tmp_path: Path) -> None:
+def test_a_file_that_is_no_recording_is_reported(tmp_path: Path) -> None:
     file = tmp_path / "x.mcap"
     with pytest.raises(rtcf.RecordingError, match="No such file"):
         rtcf.read_recording(file)

@@ -1,5 +1,4 @@
-"""What is refused: one clear line and exit code 1, and nothing has changed; with the loop
-stopped, and running."""
+"""Errors: one clear line, exit code 1, and no change; with the loop stopped, and running."""
 
 import json
 import re
@@ -25,7 +24,7 @@ NEW = f"load {MIMO} --name new"
 
 @dataclass(frozen=True)
 class Refusal:
-    """A command, and what its line must tell, in any order."""
+    """A command, and the words that its error line must contain, in any order."""
 
     command: str
     words: list[str] = field(default_factory=list)
@@ -150,7 +149,7 @@ REFUSALS = {
 
 @dataclass(frozen=True)
 class Loaded:
-    """A daemon with GRAPH; shared by all refusals, as none may change it."""
+    """A daemon with GRAPH, shared by all errors, none of which may change it."""
 
     daemon: Daemon
     client: rtcf.Client
@@ -158,10 +157,10 @@ class Loaded:
 
 
 def picture(client: rtcf.Client) -> list[Any]:
-    """Return all that a refusal must not change, as `rtcfctl -o json` would print it."""
+    """Return all state that an error must not change, as printed by `rtcfctl -o json`."""
     runners = client.get_status().runners
     for runner in runners:
-        # These go on by themselves, or with what else the machine does.
+        # These change by themselves, or with the load of the machine.
         for figure in ("iteration", "overruns", "missed", "late", "log_dropped"):
             runner.ClearField(figure)
     return [
@@ -190,7 +189,7 @@ def loaded(
 
 
 @pytest.mark.parametrize("refusal", REFUSALS.values(), ids=REFUSALS)
-def test_refused_in_one_line_and_nothing_changed(loaded: Loaded, refusal: Refusal) -> None:
+def test_errors_are_one_line_and_change_nothing(loaded: Loaded, refusal: Refusal) -> None:
     done = loaded.daemon.ctl(*shlex.split(refusal.command))
     assert done.returncode == 1, done
     assert done.stdout == ""
@@ -200,7 +199,7 @@ def test_refused_in_one_line_and_nothing_changed(loaded: Loaded, refusal: Refusa
     assert picture(loaded.client) == loaded.picture
 
 
-def test_refusals_do_not_stop_the_loop(loaded: Loaded) -> None:
+def test_errors_do_not_stop_the_loop(loaded: Loaded) -> None:
     status = loaded.client.get_status("rt_runner").runners[0]
     if status.state == runner_pb2.RUNNER_STATE_STOPPED:
         assert status.iteration == 0
@@ -208,7 +207,7 @@ def test_refusals_do_not_stop_the_loop(loaded: Loaded) -> None:
         wait_for(lambda: iteration(loaded.client) > status.iteration + 100, "100 cycles")
 
 
-def test_each_suggested_break_lets_the_loop_be_loaded(daemon: Daemon) -> None:
+def test_each_suggested_break_makes_the_load_succeed(daemon: Daemon) -> None:
     load_a = f"load {IDENTITY} --name a --remap in:=/y --remap out:=/x"
     load_b = f"load {IDENTITY} --name b --remap in:=/x --remap out:=/y"
     assert daemon.ctl(*load_a.split()).returncode == 0
@@ -229,7 +228,7 @@ def test_each_suggested_break_lets_the_loop_be_loaded(daemon: Daemon) -> None:
     assert daemon.ctl("order").stdout.split() == ["/b", "/a"]
 
 
-def test_unbreaking_the_last_break_of_a_loop_is_refused(daemon: Daemon) -> None:
+def test_removing_the_last_break_of_a_loop_is_rejected(daemon: Daemon) -> None:
     daemon.ctl(*f"load {IDENTITY} --name a --remap in:=/y --remap out:=/x --break in".split())
     daemon.ctl(*f"load {IDENTITY} --name b --remap in:=/x --remap out:=/y".split())
     refused = daemon.ctl("unbreak", "a.in")
@@ -238,7 +237,7 @@ def test_unbreaking_the_last_break_of_a_loop_is_refused(daemon: Daemon) -> None:
     assert daemon.ctl("order").stdout.split() == ["/a", "/b"]
 
 
-def test_a_start_that_a_component_refuses_leaves_the_loop_stopped(daemon: Daemon) -> None:
+def test_a_failed_start_hook_leaves_the_loop_stopped(daemon: Daemon) -> None:
     daemon.ctl("load", TEST, "Witness")
     daemon.ctl("load", TEST, "FailingStart", "--name", "last")
     refused = daemon.ctl("start")
@@ -248,11 +247,11 @@ def test_a_start_that_a_component_refuses_leaves_the_loop_stopped(daemon: Daemon
     )
     (runner,) = json.loads(daemon.ctl("runner", "list", "-o", "json").stdout)
     assert (runner["state"], runner["iteration"]) == ("stopped", 0)
-    # What had been started is stopped again.
+    # Components that had started are stopped again.
     wait_for(lambda: "hook stop" in daemon.log(), "the stop hook")
 
 
-def test_a_component_that_does_not_start_is_not_loaded_into_a_running_loop(daemon: Daemon) -> None:
+def test_a_component_that_fails_to_start_is_not_loaded_into_a_running_loop(daemon: Daemon) -> None:
     daemon.ctl("load", TEST, "Counter")
     daemon.ctl("start")
     before = daemon.ctl("list", "-o", "json").stdout
@@ -262,7 +261,7 @@ def test_a_component_that_does_not_start_is_not_loaded_into_a_running_loop(daemo
     assert daemon.ctl("list", "-o", "json").stdout == before
 
 
-def test_what_is_not_trusted_is_not_to_be_given_to_others(tmp_path: Path) -> None:
+def test_advice_for_untrusted_folders_widens_no_rights(tmp_path: Path) -> None:
     folder = tmp_path / "packages"
     shutil.copytree(BUILD_TREE / "lib" / "rtcf" / "rtcf_examples", folder / "open" / "rtcf_open")
     (folder / "open" / "rtcf_open").chmod(0o777)

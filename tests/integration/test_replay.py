@@ -1,4 +1,4 @@
-"""`rtcfctl replay`: what a recording makes of a loop, and that it does so again."""
+"""`rtcfctl replay`: the outputs of a loop for a recording, identical in each replay."""
 
 import json
 import subprocess
@@ -21,7 +21,7 @@ PERIOD_NS = 1_000_000
 
 @pytest.fixture
 def daemon(tmp_path: Path) -> Iterator[Daemon]:
-    """Give a daemon without ROS, whose loop has Fig. 1 and its mapped connections."""
+    """Yield a daemon without ROS, whose loop is Fig. 1 with its mapped connections."""
     daemon = Daemon(tmp_path, f"[runner.ros]\nenabled = false\nwhitelist = '{fig_1.WHITELIST}'\n")
     daemon.start()
     with rtcf.Client(daemon.socket) as client:
@@ -48,7 +48,7 @@ def _read(path: Path) -> dict[str, list[tuple[int, bytes]]]:
 
 
 def _simulate(inputs: dict[int, float], cycles: int) -> Iterator[float]:
-    """Yield R3's output of each cycle; `inputs` are what R2 finds new at in4, by cycle."""
+    """Yield R3's output in each cycle; `inputs` are the new values at R2.in4, by cycle."""
     r1 = r3 = None
     for cycle in range(cycles):
         h1 = fig_1.mimo_sum(r3, r1)
@@ -59,10 +59,8 @@ def _simulate(inputs: dict[int, float], cycles: int) -> Iterator[float]:
         yield r3
 
 
-def test_each_message_is_read_by_the_first_cycle_that_is_not_before_it(
-    daemon: Daemon, tmp_path: Path
-) -> None:
-    # On a cycle, just after one, just before one, two for the same one, many at once.
+def test_each_message_is_read_by_the_next_cycle(daemon: Daemon, tmp_path: Path) -> None:
+    # On a cycle, just after one, just before one, two for the same cycle, many at once.
     messages: list[tuple[str, int, object]] = [
         ("/other", 0, String("is read by nobody")),
         ("/G2_R2", 3 * PERIOD_NS, Float64(0.1)),
@@ -83,7 +81,7 @@ def test_each_message_is_read_by_the_first_cycle_that_is_not_before_it(
         assert summary["injected"] == len(messages) - 1
         assert summary["outputs"] == 10000
         assert summary["unread"] == ["/other"]
-        # Between the two, the loop is left with other values than it began with.
+        # Between the two, the loop gets other values than at its start.
         assert daemon.ctl("step", "17").returncode == 0
     first, second = (_read(output) for output in outputs)
     assert first == second
@@ -94,7 +92,7 @@ def test_each_message_is_read_by_the_first_cycle_that_is_not_before_it(
     assert values == list(_simulate(expected, 5000))
 
 
-def test_what_is_printed_can_be_read(daemon: Daemon, tmp_path: Path) -> None:
+def test_the_output_can_be_parsed(daemon: Daemon, tmp_path: Path) -> None:
     bag = _write(tmp_path / "in.bag", [("/x", 0, Float64(1)), ("/x", 2_500_000, Float64(1))])
     done = daemon.ctl("replay", str(bag))
     assert done.returncode == 0, done.stderr
@@ -107,9 +105,7 @@ def test_what_is_printed_can_be_read(daemon: Daemon, tmp_path: Path) -> None:
     assert status["runners"][0]["state"] == "stopped"
 
 
-def test_a_bag_that_cannot_be_replayed_is_refused_in_one_line(
-    daemon: Daemon, tmp_path: Path
-) -> None:
+def test_an_unsuitable_bag_is_rejected_in_one_line(daemon: Daemon, tmp_path: Path) -> None:
     text = tmp_path / "text.bag"
     text.write_text("no bag")
     empty = _write(tmp_path / "empty.bag", [])
@@ -133,7 +129,7 @@ def test_a_bag_that_cannot_be_replayed_is_refused_in_one_line(
     assert "runs in real time: stop it first" in done.stderr
 
 
-def test_a_full_disk_leaves_no_half_bag(daemon: Daemon, tmp_path: Path) -> None:
+def test_a_full_disk_leaves_no_partial_bag(daemon: Daemon, tmp_path: Path) -> None:
     messages: list[tuple[str, int, object]] = [
         ("/G2_R2", k * PERIOD_NS, Float64(1)) for k in range(3000)
     ]
@@ -155,7 +151,7 @@ def test_a_full_disk_leaves_no_half_bag(daemon: Daemon, tmp_path: Path) -> None:
         subprocess.run(["umount", disk], check=True)
 
 
-def test_a_graph_is_not_changed_while_it_replays(daemon: Daemon) -> None:
+def test_graph_changes_are_rejected_during_a_replay(daemon: Daemon) -> None:
     with rtcf.Client(daemon.socket) as client, client.replay() as replay:
         replay.run(control_pb2.ReplayRequest(begin=True, start_ns=START_NS))
         begun = replay.run(control_pb2.ReplayRequest(until_ns=START_NS + 9 * PERIOD_NS))
@@ -177,17 +173,17 @@ def test_a_replay_ends_with_its_client(daemon: Daemon) -> None:
         wait_for(lambda: _unloads(client, "H1"), "the end of the replay")
 
 
-def test_who_leaves_a_replay_that_somebody_stopped_ends_no_other_loop(daemon: Daemon) -> None:
+def test_a_client_leaving_a_stopped_replay_ends_no_other_loop(daemon: Daemon) -> None:
     with rtcf.Client(daemon.socket) as client:
         with client.replay() as replay:
             replay.run(control_pb2.ReplayRequest(begin=True, start_ns=START_NS))
             client.stop()
             client.start()
-        client.set_breaks([rtcf.parse_port("H1.in1")], True)  # in its turn, behind what follows
+        client.set_breaks([rtcf.parse_port("H1.in1")], True)  # queued behind the following calls
         assert client.get_status().runners[0].state == runner_pb2.RUNNER_STATE_RUNNING
 
 
-def test_a_replay_begins_once_and_first(daemon: Daemon) -> None:
+def test_a_replay_starts_only_once_and_first(daemon: Daemon) -> None:
     with rtcf.Client(daemon.socket) as client:
         with client.replay() as replay, pytest.raises(refusals.RequestMalformedError):
             replay.run(control_pb2.ReplayRequest(until_ns=START_NS))

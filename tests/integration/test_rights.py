@@ -1,5 +1,5 @@
-"""Loops on accounts and under limits that do not allow real time: refused or degraded, and it
-is said which right is missing."""
+"""Loops without real-time rights or under limits: rejected or degraded, naming the missing
+right."""
 
 import os
 import re
@@ -17,10 +17,10 @@ from values import iteration
 
 @dataclass(frozen=True)
 class Lack:
-    """A right that is taken away, and what is said then."""
+    """A right that is withdrawn, and the resulting messages."""
 
-    limit: str  # of prlimit(1): what anybody has without the capability
-    capability: str  # what root has
+    limit: str  # option of prlimit(1): the limit for users without the capability
+    capability: str  # root's way to the right
     problem: str
     remedies: list[str]
     settings: str = ""
@@ -30,7 +30,7 @@ class Lack:
         limited = ["prlimit", self.limit]
         if os.geteuid() != 0:
             return limited
-        # Programs of root have no capability that is not in the bounding set.
+        # Programs run by root lack capabilities that are not in the bounding set.
         without = f"-{self.capability}"
         return [*limited, "setpriv", "--inh-caps", without, "--bounding-set", without]
 
@@ -60,9 +60,7 @@ def running(folder: Path, lack: Lack, realtime: str) -> Iterator[Daemon]:
 
 
 @pytest.mark.parametrize("lack", LACKS.values(), ids=LACKS)
-def test_real_time_that_is_required_is_refused_with_what_is_missing(
-    tmp_path: Path, lack: Lack
-) -> None:
+def test_required_real_time_fails_and_names_the_missing_right(tmp_path: Path, lack: Lack) -> None:
     with running(tmp_path, lack, "required") as daemon:
         done = daemon.ctl("load", "rtcf_test", "Witness")
         assert done.returncode == 0, done.stderr
@@ -74,7 +72,7 @@ def test_real_time_that_is_required_is_refused_with_what_is_missing(
         with rtcf.Client(daemon.socket) as client:
             status = client.get_status("rt_runner").runners[0]
             assert (status.state, status.iteration) == (runner_pb2.RUNNER_STATE_STOPPED, 0)
-        # What had been started is stopped again; and the advice is true.
+        # Components that had started are stopped again, and the advice works.
         wait_for(lambda: "hook stop" in daemon.log(), "the stop hook")
         assert daemon.ctl("runner", "set", "--realtime", "preferred").returncode == 0
         started = daemon.ctl("start")
@@ -85,9 +83,7 @@ def test_real_time_that_is_required_is_refused_with_what_is_missing(
 
 
 @pytest.mark.parametrize("lack", LACKS.values(), ids=LACKS)
-def test_real_time_that_is_preferred_runs_degraded_and_says_so_first(
-    tmp_path: Path, lack: Lack
-) -> None:
+def test_preferred_real_time_runs_degraded_with_a_warning(tmp_path: Path, lack: Lack) -> None:
     with running(tmp_path, lack, "preferred") as daemon, rtcf.Client(daemon.socket) as client:
         assert daemon.ctl("load", "rtcf_test", "Counter").returncode == 0
         assert any(lack.problem in each for each in client.start().degraded)
@@ -106,7 +102,7 @@ def test_real_time_that_is_preferred_runs_degraded_and_says_so_first(
 
 def test_a_full_bucket_does_not_stop_a_loop_that_runs_degraded(tmp_path: Path) -> None:
     with running(tmp_path, NO_FIFO, "preferred") as daemon, rtcf.Client(daemon.socket) as client:
-        # 100 µs in each cycle of 50 µs: late in every one.
+        # 100 µs in each cycle of 50 µs, so every cycle is late.
         client.set_runner(runner_pb2.RunnerSettings(frequency_hz=20000.0, max_overruns=5))
         client.load(rtcf.component("rtcf_faults", "Sleeps", parameters=["after:=0"]))
         client.start()
@@ -122,14 +118,14 @@ def test_a_full_bucket_does_not_stop_a_loop_that_runs_degraded(tmp_path: Path) -
         assert any("most of them in /Sleeps" in line for line in lines)
 
 
-def test_a_loop_that_keeps_being_late_is_shouted_with_its_cause(tmp_path: Path) -> None:
+def test_a_constantly_late_loop_is_alarmed_with_its_cause(tmp_path: Path) -> None:
     with running(tmp_path, NO_FIFO, "preferred") as daemon, rtcf.Client(daemon.socket) as client:
         client.set_runner(runner_pb2.RunnerSettings(frequency_hz=20000.0))
         client.load(rtcf.component("rtcf_faults", "Sleeps", parameters=["after:=0"]))
         client.start()
 
-        # It is told each 10 s; the second time tells that it goes on. A busy machine may be the
-        # cause once, but not each time.
+        # Repeated every 10 s; the second message shows that it continues. A busy machine may be
+        # the cause once, but not each time.
         def late() -> str:
             said = daemon.ctl("status").stdout.splitlines()
             late = (each for each in said if "IS LATE" in each)

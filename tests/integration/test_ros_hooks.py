@@ -1,4 +1,4 @@
-"""Components that use ROS in their hooks, by rtcf/ros.hpp."""
+"""Components whose hooks use ROS, through rtcf/ros.hpp."""
 
 import subprocess
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ from values import iteration, port_value
 
 
 def user(hook: str = "configure") -> graph_pb2.ComponentSpec:
-    """Return RosUser as /arm/user, whose topic /arm/ear is remapped to /voice."""
+    """Return RosUser as /arm/user, with its topic /arm/ear remapped to /voice."""
     return rtcf.component(
         "rtcf_test_ros",
         "RosUser",
@@ -27,7 +27,7 @@ def user(hook: str = "configure") -> graph_pb2.ComponentSpec:
 
 @pytest.fixture
 def lonely(tmp_path: Path) -> Iterator[tuple[Daemon, rtcf.Client, Master]]:
-    """Give a daemon and the master that it looks for, which is not started."""
+    """Yield a daemon, its client and its master, which is not running."""
     master = Master(tmp_path)
     daemon = Daemon(tmp_path, with_ros(master.uri, ""))
     daemon.start()
@@ -45,23 +45,23 @@ def test_hooks_have_node_handles_with_the_components_names(tmp_path: Path, maste
             client.load(user())
             client.start()
             wait_for(lambda: port_value(client, "/arm/user", "gain") == 2.5, "the parameter")
-            # Subscribed under its remapped name, and called back.
+            # Subscribed under the remapped name, with its callback called.
             sender = master.node("latch", "/voice", "7.25")
             wait_for(lambda: port_value(client, "/arm/user", "heard") == 7.25, "the message")
             sender.end()
-            # Advertised likewise.
+            # Advertised in the same way.
             listener = master.node("record", "/answer")
             listener.wait_for_values(1)
             assert listener.values() == [2.5]
             listener.end()
             client.unload(["/arm/user"])
-            wait_for(lambda: "/answer" not in master.topics()[0], "the end of what it published")
-            wait_for(lambda: "/voice" not in master.topics()[1], "the end of what it heard")
+            wait_for(lambda: "/answer" not in master.topics()[0], "the end of its publication")
+            wait_for(lambda: "/voice" not in master.topics()[1], "the end of its subscription")
     finally:
         daemon.end()
 
 
-def test_handles_of_many_hooks_cost_a_slow_master_no_call_each(
+def test_handles_of_many_hooks_need_few_calls_to_a_slow_master(
     tmp_path: Path, master: Master
 ) -> None:
     way = HoldingMaster(master.port)
@@ -70,7 +70,7 @@ def test_handles_of_many_hooks_cost_a_slow_master_no_call_each(
     try:
         with rtcf.Client(daemon.socket) as client:
             wait_for(lambda: _ros(client).connected, "the node")
-            before = way.calls(b"getPid")  # by which the node sees whether the master is there
+            before = way.calls(b"getPid")  # by which the node checks the master
             client.apply(
                 rtcf.component(
                     "rtcf_test_ros", "RosUser", name=f"user{index}", parameters=["in:=handle"]
@@ -85,7 +85,7 @@ def test_handles_of_many_hooks_cost_a_slow_master_no_call_each(
         way.close()
 
 
-def test_a_component_that_needs_ros_is_refused_without_a_master(
+def test_a_component_that_needs_ros_is_rejected_without_a_master(
     lonely: tuple[Daemon, rtcf.Client, Master],
 ) -> None:
     daemon, client, master = lonely
@@ -97,7 +97,7 @@ def test_a_component_that_needs_ros_is_refused_without_a_master(
     assert list(client.list_components()) == []
 
 
-def test_load_waits_for_a_master_if_told_to(
+def test_load_waits_for_a_master_if_requested(
     lonely: tuple[Daemon, rtcf.Client, Master],
 ) -> None:
     daemon, client, master = lonely
@@ -108,7 +108,7 @@ def test_load_waits_for_a_master_if_told_to(
         text=True,
     )
     wait_for(lambda: "no ROS master" in _ros(client).problem, "the node to look for a master")
-    # Other changes go on meanwhile.
+    # Other changes continue meanwhile.
     client.load(rtcf.component("rtcf_test", "Knobs", name="knobs"))
     assert load.poll() is None
     master.start()
@@ -121,7 +121,7 @@ def test_load_waits_for_a_master_if_told_to(
         master.end()
 
 
-def test_a_lease_waits_for_a_master_if_told_to(
+def test_a_lease_waits_for_a_master_if_requested(
     lonely: tuple[Daemon, rtcf.Client, Master],
 ) -> None:
     _, client, master = lonely
@@ -132,11 +132,11 @@ def test_a_lease_waits_for_a_master_if_told_to(
     assert list(client.list_components()) == []
     master.start()
     try:
-        # Whatever else is said: how it comes to be loaded, and what it logs.
+        # Other messages may follow: details of the load, and log records.
         assert any(each.WhichOneof("kind") == "loaded" for each in messages)
         assert [each.full_name for each in client.list_components()] == ["/arm/user"]
         lease.end()
-        wait_for(lambda: not list(client.list_components()), "the component to leave")
+        wait_for(lambda: not list(client.list_components()), "the unload of the component")
     finally:
         master.end()
 

@@ -1,4 +1,4 @@
-"""What components log, on /rosout and in rtcfd's log; levels, set as rqt_logger_level does."""
+"""Log records of components on /rosout and in rtcfd's log, and levels set by rqt_logger_level."""
 
 import time
 from collections.abc import Iterator
@@ -16,7 +16,7 @@ _INFO, _WARN, _DEBUG = 2, 4, 1
 
 @pytest.fixture
 def speaking(tmp_path: Path, master: Master) -> Iterator[tuple[Daemon, rtcf.Client, Node, str]]:
-    """Give a daemon, its client, a node that listens to /rosout, and the name of ours."""
+    """Yield a daemon, its client, a node that receives /rosout, and the name of the loop's node."""
     daemon = Daemon(tmp_path, with_ros(master.uri, ""))
     daemon.start()
     with rtcf.Client(daemon.socket) as client:
@@ -31,7 +31,7 @@ def speaking(tmp_path: Path, master: Master) -> Iterator[tuple[Daemon, rtcf.Clie
 
 
 def logged(daemon: Daemon, text: str) -> str:
-    """Return the line of rtcfd's log that has a text, once it is there."""
+    """Return the line of rtcfd's log with a text, once it exists."""
 
     def found() -> str:
         return next((line for line in daemon.log().splitlines() if text in line), "")
@@ -40,7 +40,7 @@ def logged(daemon: Daemon, text: str) -> str:
     return line
 
 
-def test_every_record_is_on_rosout_and_in_the_log_under_its_component(
+def test_every_record_is_on_rosout_and_in_the_log_with_its_component(
     speaking: tuple[Daemon, rtcf.Client, Node, str],
 ) -> None:
     daemon, client, listener, node = speaking
@@ -65,12 +65,12 @@ def test_every_record_is_on_rosout_and_in_the_log_under_its_component(
         assert "/arm/speaker" in line
         assert "speaker.cpp:" in line
     assert "for those who debug" not in daemon.log()
-    # What the executor itself says is under the node's name, as for any node.
+    # Records of the executor itself have the node's name, as for any node.
     client.stop()
     assert all(each["name"] in ("/arm/speaker", node) for each in listener.records())
 
 
-def test_levels_are_set_as_rqt_logger_level_does(
+def test_rqt_logger_level_can_set_levels(
     speaking: tuple[Daemon, rtcf.Client, Node, str], master: Master
 ) -> None:
     daemon, client, listener, node = speaking
@@ -85,7 +85,7 @@ def test_levels_are_set_as_rqt_logger_level_does(
     before = levels()
     assert before["ros.rtcf.speaker"] == before["ros.rtcf"] == before["ros"] == "info"
     master.call(f"{node}/set_logger_level", "{logger: ros.rtcf.speaker, level: debug}")
-    # Of a component in the cycle, and of that one only.
+    # For a component in the cycle, and for this one only.
     debug = wait_for(
         lambda: [each for each in listener.records() if each["msg"] == "each cycle"], "a record"
     )
@@ -93,12 +93,12 @@ def test_levels_are_set_as_rqt_logger_level_does(
     wait_for(lambda: "each cycle" in daemon.log(), "the record in the log")
     assert levels()["ros.rtcf.speaker"] == "debug"
     assert levels()["ros.rtcf.other"] == "info"
-    # And back.
+    # And the other way round.
     master.call(f"{node}/set_logger_level", "{logger: ros.rtcf.speaker, level: error}")
     quiet_from = iteration(client)
 
     def heard_up_to(*markers: str) -> int:
-        # A record of a hook may pass some of the cycle that are on their way with it.
+        # A record of a hook may overtake records of the cycle that are sent at the same time.
         for name in markers:
             client.load(rtcf.component("rtcf_test_ros", "Speaker", name=name))
             wait_for(
@@ -111,15 +111,15 @@ def test_levels_are_set_as_rqt_logger_level_does(
     count = heard_up_to("a", "b")
     wait_for(lambda: iteration(client) > quiet_from + 50, "more cycles")
     assert heard_up_to("c", "d") == count
-    # For macros in hooks too; the parent's level holds for those that have none of their own.
+    # For macros in hooks too; a parent's level applies to loggers without their own.
     master.call(f"{node}/set_logger_level", "{logger: ros.rtcf, level: debug}")
     client.load(rtcf.component("rtcf_test_ros", "Speaker", name="late"))
     wait_for(lambda: "by macro, for those who debug" in daemon.log(), "the macro's record")
-    # Debian 12's log4cxx would have crashed by now.
+    # Debian 12's log4cxx would have crashed before this point.
     assert client.get_status("rt_runner").runners[0].state == runner_pb2.RUNNER_STATE_RUNNING
 
 
-def test_how_often_one_line_is_handed_on_is_a_setting(
+def test_the_rate_limit_of_a_line_is_a_setting(
     speaking: tuple[Daemon, rtcf.Client, Node, str], master: Master
 ) -> None:
     daemon, client, listener, node = speaking
@@ -129,7 +129,7 @@ def test_how_often_one_line_is_handed_on_is_a_setting(
     master.call(f"{node}/set_logger_level", "{logger: ros.rtcf.speaker, level: debug}")
 
     def between() -> list[int]:
-        """Return how many records of the line there were up to each count, and since the last."""
+        """Return the numbers of records of the line before each count, and since the last."""
         found = [0]
         for each in listener.records():
             if "more records of this line within a second" in each["msg"]:
@@ -138,10 +138,10 @@ def test_how_often_one_line_is_handed_on_is_a_setting(
                 found[-1] += 1
         return found
 
-    # A second in which the loop did a few cycles at least: 50 of them, on a machine with time.
-    wait_for(lambda: any(count <= 2 for count in between()[1:-1]), "what is more to be left out")
+    # A second in which the loop ran a few cycles; 50 on an idle machine.
+    wait_for(lambda: any(count <= 2 for count in between()[1:-1]), "the rate limit to take effect")
     assert daemon.ctl("runner", "set", "--log-limit", "0").returncode == 0
-    # All are handed on. Of what was left out before, one count may still be on its way.
+    # All are forwarded. One count of records suppressed earlier may still arrive.
     seconds = len(between())
     wait_for(lambda: between()[-1] > 120, "every record")
     assert len(between()) <= seconds + 1

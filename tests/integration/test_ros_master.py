@@ -1,4 +1,4 @@
-"""rtcfd without a ROS master, and with one that comes later."""
+"""rtcfd without a ROS master, and with one that starts later."""
 
 import time
 from pathlib import Path
@@ -19,7 +19,7 @@ def test_topics_appear_once_a_master_is_there(tmp_path: Path) -> None:
         with rtcf.Client(daemon.socket) as client:
             fig_1.load(client)
             client.start()
-            wait_for(lambda: iteration(client) > 100, "a loop that runs without a master")
+            wait_for(lambda: iteration(client) > 100, "a running loop without a master")
             wait_for(lambda: master.uri in _ros(client).problem, "the node to look for a master")
             ros = _ros(client)
             assert (ros.connected, ros.publications, ros.subscriptions) == (False, 0, 0)
@@ -29,7 +29,7 @@ def test_topics_appear_once_a_master_is_there(tmp_path: Path) -> None:
             try:
                 _wait_for_topics(master)
                 seconds = time.monotonic() - begin
-                # A figure to look at, not a limit: the machine may be busy.
+                # For information only, not a limit: the machine may be busy.
                 print(f"topics {seconds:.2f} s after the master began to answer")
                 wait_for(lambda: _ros(client).connected, "the status to say so")
                 node = master.node("record", "/R1_H1R2")
@@ -41,7 +41,7 @@ def test_topics_appear_once_a_master_is_there(tmp_path: Path) -> None:
 
             status = client.get_status("rt_runner").runners[0]
             assert status.state == runner_pb2.RUNNER_STATE_RUNNING
-            wait_for(lambda: iteration(client) > status.iteration + 100, "the loop to go on")
+            wait_for(lambda: iteration(client) > status.iteration + 100, "the loop to continue")
     finally:
         daemon.end()
 
@@ -58,7 +58,7 @@ def _wait_for_topics(master: Master) -> None:
 
     wait_for(there, "the topics of the loop")
     published, subscribed = master.topics()
-    # What the whitelist does not name stays inside.
+    # Names outside the whitelist stay internal.
     assert not {"/H1_F1", "/F1_R2R3", "/R2_R3"} & (published | subscribed)
-    # An input that a component feeds takes nothing from ROS.
+    # An input with a writer in the loop does not subscribe.
     assert not {"/R3_G2H1", "/R1_H1R2"} & subscribed

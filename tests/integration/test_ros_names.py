@@ -1,4 +1,4 @@
-"""Names at a master that several loops share, and what is left there when they go."""
+"""Names at a master shared by several loops, and names that remain there after their end."""
 
 import json
 from collections.abc import Iterator
@@ -46,7 +46,7 @@ def _all_names(master_uri: str) -> list[list[object]]:
 
 @pytest.fixture
 def stack() -> Iterator[ExitStack]:
-    """Give what ends all that a test has started."""
+    """Yield a stack that ends everything that a test starts."""
     with ExitStack() as stack:
         yield stack
 
@@ -62,12 +62,12 @@ def test_two_daemons_of_one_machine_do_not_take_each_others_names(
     assert first != second
     both = {f"{node}/{_SERVICE}" for node in (first, second)}
     wait_for(lambda: both <= master.services(), "the services of both")
-    # Neither was asked to go.
+    # Neither was asked to shut down.
     assert [_ros(daemon).problem for daemon in (one, other)] == ["", ""]
     assert [_ros(daemon).connected for daemon in (one, other)] == [True, True]
 
 
-def test_a_namespace_that_is_taken_is_not_stolen(
+def test_a_namespace_in_use_is_not_taken_over(
     stack: ExitStack, tmp_path: Path, master: Master
 ) -> None:
     settings = with_ros(master.uri, "") + "ns = '/shared'\n"
@@ -84,7 +84,7 @@ def test_a_namespace_that_is_taken_is_not_stolen(
             assert providers == [owner]
 
 
-def test_two_machines_at_one_master_stop_each_its_own_loop(tmp_path: Path) -> None:
+def test_each_of_two_machines_at_one_master_stops_its_own_loop(tmp_path: Path) -> None:
     with two_machines() as (left, right), ExitStack() as stack:
         uri = left.start_master(tmp_path)
         daemons = []
@@ -120,12 +120,12 @@ def test_two_machines_at_one_master_stop_each_its_own_loop(tmp_path: Path) -> No
             assert stopped == runner_pb2.RUNNER_STATE_STOPPED
 
 
-def test_nothing_is_left_at_a_master_that_stays(
+def test_no_name_remains_at_a_running_master(
     stack: ExitStack, tmp_path: Path, master: Master
 ) -> None:
-    # What roscore itself has registered comes after the master.
-    wait_for(lambda: "/rosout/set_logger_level" in master.services(), "all of rosout")
-    wait_for(lambda: "/rosout" in master.topics()[1], "all of rosout")
+    # roscore's own nodes register after the master has started.
+    wait_for(lambda: "/rosout/set_logger_level" in master.services(), "rosout's registrations")
+    wait_for(lambda: "/rosout" in master.topics()[1], "rosout's registrations")
     before = _all_names(master.uri)
     parameters = rosgraph.Master("/test", master.uri)
     names = parameters.getParamNames()
@@ -137,10 +137,10 @@ def test_nothing_is_left_at_a_master_that_stays(
                 client.load(rtcf.component("rtcf_test", "Knobs", name=f"knobs_{number}"))
             client.start()
         _connected(daemon)
-        # At once, as a launch that is interrupted: with half of it told or not.
+        # Immediately, as an interrupted launch does, in the middle of its registrations.
         daemon.press_ctrl_c()
         if "may be left at the ROS master, which did not answer in time" in daemon.log():
-            # It was too busy, which is told with what helps; that is not to be so each time.
+            # The machine was too busy, and the log gives advice; this may not happen each time.
             master.run("sh", "-c", "yes | rosnode cleanup")
             for name in set(parameters.getParamNames()) - set(names):
                 parameters.deleteParam(name)

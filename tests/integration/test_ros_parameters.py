@@ -1,4 +1,4 @@
-"""Parameters by dynamic_reconfigure, as dynparam and rqt_reconfigure use it."""
+"""Parameters through dynamic_reconfigure, as used by dynparam and rqt_reconfigure."""
 
 import json
 from collections.abc import Iterator
@@ -21,7 +21,7 @@ _NAME = "/arm/knobs"
 
 @pytest.fixture
 def knobs(tmp_path: Path, master: Master) -> Iterator[tuple[Daemon, rtcf.Client]]:
-    """Give a daemon whose loop runs with Knobs, a parameter of each type, on ROS."""
+    """Yield a daemon with a running loop of Knobs, which has a parameter of each type, on ROS."""
     daemon = Daemon(tmp_path, with_ros(master.uri, ""))
     daemon.start()
     with rtcf.Client(daemon.socket) as client:
@@ -39,7 +39,7 @@ def dynparam(master: Master, *arguments: str) -> str:
 
 
 def values(client: rtcf.Client) -> dict[str, Any]:
-    """Return the values as rtcf has them."""
+    """Return the values in rtcf."""
     result = {}
     for each in client.get_component(_NAME).parameters:
         kind = each.value.WhichOneof("kind")
@@ -57,7 +57,7 @@ def test_dynparam_sets_parameters_of_all_types_in_a_running_loop(
 
     change = {"count": 4, "rate": 2.5, "label": "abcdef", "enabled": True, "mode": "run"}
     dynparam(master, "set", _NAME, json.dumps(change))
-    # Once it has returned, all holds everywhere.
+    # When the call returns, all values are in effect everywhere.
     assert values(client) == change
     wait_for(lambda: port_value(client, _NAME, "product") == 10.0, "the loop to use them")
     assert port_value(client, _NAME, "length") == 6
@@ -80,7 +80,7 @@ def test_dynparam_sets_parameters_of_all_types_in_a_running_loop(
     )
     assert state
 
-    # Who did it is known as far as ROS tells, and it can be taken back.
+    # The history names the caller as far as ROS identifies it, and the change can be undone.
     wait_for(lambda: client.get_history(_NAME), "the history")
     (rate,) = client.get_history(_NAME, "rate")
     assert (rate.who, rate.how, rate.value.double_value) == (
@@ -98,7 +98,7 @@ def test_dynparam_sets_parameters_of_all_types_in_a_running_loop(
     wait_for(lambda: master.parameter(f"{_NAME}/rate") == 7.0, "the parameter server")
 
 
-def test_the_description_has_what_was_declared(
+def test_the_description_matches_the_declaration(
     knobs: tuple[Daemon, rtcf.Client], master: Master
 ) -> None:
     text = master.run("rostopic", "echo", "-n1", f"{_NAME}/parameter_descriptions")
@@ -110,7 +110,7 @@ def test_the_description_has_what_was_declared(
     }  # fmt: skip
     assert described["label"]["description"] == "its length is an output"
     assert described["rate"]["description"] == "[m/s]"
-    # rqt_reconfigure takes it for a Python literal.
+    # rqt_reconfigure parses it as a Python literal.
     enum = yaml.safe_load(described["mode"]["edit_method"])
     assert [each["value"] for each in enum["enum"]] == ["idle", "run"]
 
@@ -122,7 +122,7 @@ def test_the_description_has_what_was_declared(
     assert of("dflt", "doubles")["rate"] == 1.5
 
 
-def test_a_value_out_of_range_is_brought_into_it_with_a_warning(
+def test_a_value_out_of_range_is_clamped_with_a_warning(
     knobs: tuple[Daemon, rtcf.Client], master: Master
 ) -> None:
     _, client = knobs
@@ -141,14 +141,14 @@ def test_a_value_out_of_range_is_brought_into_it_with_a_warning(
     )
     assert record["name"] == _NAME
     assert "count = 11 is above its maximum 10: it is set to 10" in record["msg"]
-    # As rqt_console shows it: of which topics, and from where.
+    # For rqt_console: its topics and its source line.
     assert record["topics"] == ["/arm/length", "/arm/product"]
     assert record["file"]
     assert record["function"]
     listener.end()
 
 
-def test_a_value_out_of_range_is_refused_where_that_is_set(
+def test_a_value_out_of_range_is_rejected_if_configured(
     knobs: tuple[Daemon, rtcf.Client], master: Master
 ) -> None:
     daemon, client = knobs
@@ -178,12 +178,12 @@ def test_the_loop_follows_the_parameter_server_within_its_bounds(
     node = client.get_status("rt_runner").runners[0].ros.node
     listener = master.node("rosout", node)
     listener.wait_until_connected()
-    # A number that is not to change on its way there and back.
+    # A number that must survive the round trip unchanged.
     daemon.ctl("set", _NAME, "rate:=0.30000000000000004")
     wait_for(lambda: master.parameter(f"{_NAME}/rate") == 0.30000000000000004, "the server")
 
     master.run("rosparam", "set", f"{_NAME}/count", "5")
-    wait_for(lambda: values(client)["count"] == 5, "the loop to follow")
+    wait_for(lambda: values(client)["count"] == 5, "the loop to follow the change")
     assert values(client)["rate"] == 0.30000000000000004
 
     def shown() -> tuple[Any, Any]:
@@ -192,17 +192,17 @@ def test_the_loop_follows_the_parameter_server_within_its_bounds(
 
     wait_until_it_is((5, 0.30000000000000004), shown, "dynparam")
 
-    # Several at once; what is none of the component's parameters is left alone.
+    # Several at once; parameters of other names are ignored.
     master.run("rosparam", "set", _NAME, "{rate: 2, mode: idle, other: 1}")
-    wait_for(lambda: values(client)["mode"] == "idle", "the loop to follow")
-    wait_for(lambda: values(client)["rate"] == 2.0, "the loop to follow")
-    wait_for(lambda: master.parameter(f"{_NAME}/count") == 5, "what was thrown away to return")
+    wait_for(lambda: values(client)["mode"] == "idle", "the loop to follow the change")
+    wait_for(lambda: values(client)["rate"] == 2.0, "the loop to follow the change")
+    wait_for(lambda: master.parameter(f"{_NAME}/count") == 5, "the discarded value to return")
     assert master.parameter(f"{_NAME}/other") == 1
 
-    # What it refuses does not stay.
+    # Rejected values do not stay on the server.
     for wrong, why in (("11", "is above its maximum 10"), ("many", "count")):
         master.run("rosparam", "set", f"{_NAME}/count", wrong)
-        wait_for(lambda: master.parameter(f"{_NAME}/count") == 5, "the value that holds")
+        wait_for(lambda: master.parameter(f"{_NAME}/count") == 5, "the present value")
 
         def told(text: str = why) -> bool:
             return any(
@@ -211,11 +211,11 @@ def test_the_loop_follows_the_parameter_server_within_its_bounds(
 
         wait_for(told, "the reason")
     assert values(client)["count"] == 5
-    # One that is right beside one that is wrong, which is refused once.
+    # A valid value next to an invalid one, which is rejected once.
     master.run("rosparam", "set", f"{_NAME}/count", "12")
     master.run("rosparam", "set", f"{_NAME}/mode", "run")
-    wait_for(lambda: values(client)["mode"] == "run", "the loop to follow")
-    wait_for(lambda: master.parameter(f"{_NAME}/count") == 5, "the value that holds")
+    wait_for(lambda: values(client)["mode"] == "run", "the loop to follow the change")
+    wait_for(lambda: master.parameter(f"{_NAME}/count") == 5, "the present value")
 
     def refused() -> int:
         return sum("= 12 is above" in each["msg"] for each in listener.records())
@@ -227,7 +227,7 @@ def test_the_loop_follows_the_parameter_server_within_its_bounds(
     listener.end()
 
 
-def test_a_component_that_leaves_takes_its_server_along(
+def test_unloading_a_component_ends_its_server(
     knobs: tuple[Daemon, rtcf.Client], master: Master
 ) -> None:
     _, client = knobs
@@ -238,7 +238,7 @@ def test_a_component_that_leaves_takes_its_server_along(
         names = published | master.services()
         return not any(name.startswith(f"{_NAME}/") for name in names)
 
-    wait_for(gone, "its topics and its service to go")
+    wait_for(gone, "the removal of its topics and its service")
 
 
 def _load(client: rtcf.Client, *parameters: str) -> None:
@@ -259,7 +259,7 @@ def _holds(client: rtcf.Client, master: Master, rate: float) -> None:
     ("given", "there", "holds"),
     [([], None, 1.5), ([], 3.0, 3.0), (["rate:=2.5"], 3.0, 2.5), (["rate:=2.5"], None, 2.5)],
 )
-def test_of_a_component_that_is_loaded_a_given_value_wins_then_the_parameter_server_s(
+def test_a_load_uses_given_values_then_those_of_the_parameter_server(
     tmp_path: Path, master: Master, given: list[str], there: float | None, holds: float
 ) -> None:
     daemon = Daemon(tmp_path, with_ros(master.uri, ""))
@@ -268,24 +268,24 @@ def test_of_a_component_that_is_loaded_a_given_value_wins_then_the_parameter_ser
         with rtcf.Client(daemon.socket) as client:
             client.set_runner(runner_pb2.RunnerSettings(frequency_hz=200.0))
             wait_for(lambda: client.get_status("rt_runner").runners[0].ros.connected, "the node")
-            # What people have put there stays, of other tests too.
+            # Users' parameters stay on the server, also those of other tests.
             if master.parameter(_NAME) is not None:
                 master.run("rosparam", "delete", _NAME)
             if there is not None:
                 master.run("rosparam", "set", f"{_NAME}/rate", str(there))
             _load(client, *given)
             _holds(client, master, holds)
-            # It leaves nothing of its own, and what was somebody else's.
+            # It removes its own parameters, and keeps those of others.
             client.unload([_NAME])
-            wait_for(lambda: master.parameter(f"{_NAME}/rate") == there, "what was there before")
-            wait_for(lambda: master.parameter(f"{_NAME}/count") is None, "the others to go")
+            wait_for(lambda: master.parameter(f"{_NAME}/rate") == there, "the earlier value")
+            wait_for(lambda: master.parameter(f"{_NAME}/count") is None, "the removal")
     finally:
         daemon.end()
         if there is not None:
             master.run("rosparam", "delete", _NAME)
 
 
-def test_a_new_master_s_values_win_over_those_of_the_loop(tmp_path: Path) -> None:
+def test_a_new_masters_values_replace_those_of_the_loop(tmp_path: Path) -> None:
     master = Master(tmp_path)
     master.start()
     daemon = Daemon(tmp_path, with_ros(master.uri, ""))
@@ -299,12 +299,12 @@ def test_a_new_master_s_values_win_over_those_of_the_loop(tmp_path: Path) -> Non
             wait_for(
                 lambda: not client.get_status("rt_runner").runners[0].ros.connected, "its absence"
             )
-            # A launch file sets its parameters before anything else is there.
+            # A launch file sets its parameters before anything else starts.
             with stopped(client.get_status("rt_runner").runners[0].pid):
                 master.start()
                 master.run("rosparam", "set", f"{_NAME}/rate", "9.0")
             _holds(client, master, 9.0)
-            wait_for(lambda: master.parameter(f"{_NAME}/count") == 3, "what it did not have")
+            wait_for(lambda: master.parameter(f"{_NAME}/count") == 3, "the missing events")
     finally:
         daemon.end()
         master.end()
@@ -312,7 +312,7 @@ def test_a_new_master_s_values_win_over_those_of_the_loop(tmp_path: Path) -> Non
 
 @pytest.fixture
 def waiting(tmp_path: Path) -> Iterator[tuple[rtcf.Client, Master]]:
-    """Give a loop with Knobs whose master has not come yet, and that master."""
+    """Yield a client of a loop with Knobs whose master has not started yet, and that master."""
     master = Master(tmp_path)
     daemon = Daemon(tmp_path, with_ros(master.uri, ""))
     daemon.start()
@@ -328,7 +328,7 @@ def waiting(tmp_path: Path) -> Iterator[tuple[rtcf.Client, Master]]:
     daemon.end()
 
 
-def test_the_first_master_s_values_win_over_those_of_the_loop(
+def test_the_first_masters_values_replace_those_of_the_loop(
     waiting: tuple[rtcf.Client, Master],
 ) -> None:
     client, master = waiting
@@ -337,13 +337,13 @@ def test_the_first_master_s_values_win_over_those_of_the_loop(
         master.run("rosparam", "set", f"{_NAME}/rate", "9.0")
     try:
         _holds(client, master, 9.0)
-        wait_for(lambda: master.parameter(f"{_NAME}/count") == 3, "what it did not have")
+        wait_for(lambda: master.parameter(f"{_NAME}/count") == 3, "the missing events")
         assert values(client)["count"] == 3
     finally:
         master.end()
 
 
-def test_a_launch_file_s_values_win_over_those_of_the_loop(
+def test_a_launch_files_values_replace_those_of_the_loop(
     waiting: tuple[rtcf.Client, Master], tmp_path: Path
 ) -> None:
     client, master = waiting
@@ -354,22 +354,20 @@ def test_a_launch_file_s_values_win_over_those_of_the_loop(
         '<node name="waits" pkg="rtcf" type="rt_launcher" args="rtcf_examples Wave"/></launch>'
     )
     try:
-        # With a master of its own, which has them before anything else.
+        # With its own master, which has the parameters before anything else starts.
         with stopped(client.get_status("rt_runner").runners[0].pid):
             launch = launching.start("/usr/bin/roslaunch", "-p", str(master.port), str(file))
             wait_for(lambda: rosgraph.is_master_online(master.uri), "the master")
             wait_for(lambda: master.parameter(f"{_NAME}/rate") == 9.0, "the launch file's values")
         _holds(client, master, 9.0)
-        wait_for(lambda: master.parameter(f"{_NAME}/count") == 3, "what it did not have")
+        wait_for(lambda: master.parameter(f"{_NAME}/count") == 3, "the missing events")
         assert values(client)["count"] == 3
         launch.end()
     finally:
         launching.end()
 
 
-def test_a_text_that_xml_cannot_carry_is_not_sent_again_and_again(
-    tmp_path: Path, master: Master
-) -> None:
+def test_a_text_invalid_in_xml_is_not_sent_repeatedly(tmp_path: Path, master: Master) -> None:
     way = HoldingMaster(master.port)
     daemon = Daemon(tmp_path, with_ros(way.uri, ""))
     daemon.start()
@@ -381,7 +379,7 @@ def test_a_text_that_xml_cannot_carry_is_not_sent_again_and_again(
             wait_for(lambda: master.parameter(f"{_NAME}/label") == "abcd", "the text")
             assert way.calls(b"setParam", f"{_NAME}/label".encode()) == 1
             daemon.ctl("set", _NAME, "label:=a\x01b")
-            # Turn after turn the others go on, and it stays where it is.
+            # The other parameters continue to be updated, and this one stays unchanged.
             for rate in (4.0, 5.0, 6.0):
                 daemon.ctl("set", _NAME, f"rate:={rate}")
                 _holds(client, master, rate)
@@ -392,7 +390,7 @@ def test_a_text_that_xml_cannot_carry_is_not_sent_again_and_again(
         way.close()
 
 
-def test_a_text_that_xml_cannot_carry_stays_off_the_parameter_server(
+def test_a_text_invalid_in_xml_is_not_on_the_parameter_server(
     knobs: tuple[Daemon, rtcf.Client], master: Master
 ) -> None:
     daemon, client = knobs
@@ -409,6 +407,6 @@ def test_a_text_that_xml_cannot_carry_stays_off_the_parameter_server(
     wait_for(lambda: f"{_NAME}/label" in ros().problem, "the status to say so")
     assert ros().connected
     assert master.parameter(f"{_NAME}/label") == before
-    # All others go on.
+    # All others continue.
     daemon.ctl("set", _NAME, "rate:=4")
     wait_for(lambda: master.parameter(f"{_NAME}/rate") == 4.0, "the parameter server")

@@ -1,4 +1,4 @@
-"""A loop at 2 kHz and masters that go and come: all is registered again."""
+"""A loop at 2 kHz with masters that end and start: everything is registered again."""
 
 import time
 from pathlib import Path
@@ -26,7 +26,7 @@ def _registered(master: Master, node: str) -> bool:
     )
 
 
-# The second is for a machine that has nothing else to do.
+# The second case is for an otherwise idle machine.
 @pytest.mark.parametrize(
     ("restarts", "limit_s"), [(2, DEADLINE_S), pytest.param(20, 2.0, marks=pytest.mark.long)]
 )
@@ -64,7 +64,7 @@ def test_everything_is_registered_again_with_each_new_master(
                 begin = time.monotonic()
                 wait_for(lambda: _registered(master, node), "the registrations", limit_s)
                 print(f"restart {restart}: registered in {time.monotonic() - begin:.2f} s")
-            # And it is of use: values flow to and from peers of the last master.
+            # The registrations work: values flow to and from peers of the latest master.
             sender = master.node("text", "/t/heard", "12")
             wait_for(lambda: port_value(client, "/t/text", "length") == 12, "a message")
             sender.end()
@@ -82,7 +82,7 @@ def test_everything_is_registered_again_with_each_new_master(
         master.end()
 
 
-def test_several_masters_at_once_do_not_meet(tmp_path: Path) -> None:
+def test_loops_at_several_masters_are_independent(tmp_path: Path) -> None:
     masters = []
     daemons = []
     try:
@@ -105,7 +105,7 @@ def test_several_masters_at_once_do_not_meet(tmp_path: Path) -> None:
                     )
                 )
                 client.start()
-        # Of the same names, each at its own master.
+        # With the same names, each at its own master.
         for index, master in enumerate(masters):
             listener = master.node("sizes", "/t/said")
             listener.wait_for_values(3)

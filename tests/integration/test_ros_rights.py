@@ -1,4 +1,4 @@
-"""What ROS peers may do with a loop, and whose master is followed at all."""
+"""Rights of ROS peers over a loop, and the masters that a loop follows."""
 
 import subprocess
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ _KNOBS = "/arm/knobs"
 
 @pytest.fixture(params=["none", "observe", "tune", "operate"])
 def peers(request: pytest.FixtureRequest) -> str:
-    """Give a right of ROS peers."""
+    """Return a right of ROS peers."""
     return str(request.param)
 
 
@@ -37,7 +37,7 @@ def _rate(client: rtcf.Client) -> float:
     return float(rate.value.double_value)
 
 
-def test_peers_may_do_what_the_setting_says(tmp_path: Path, master: Master, peers: str) -> None:
+def test_peers_have_the_right_of_the_setting(tmp_path: Path, master: Master, peers: str) -> None:
     daemon = Daemon(tmp_path, with_ros(master.uri, "/arm/heard") + f'peers = "{peers}"\n')
     daemon.start()
     try:
@@ -51,13 +51,13 @@ def test_peers_may_do_what_the_setting_says(tmp_path: Path, master: Master, peer
             )
             shown = {each["name"]: each["value"] for each in answer["config"]["doubles"]}
             assert shown["rate"] == (2.5 if tunes else 1.5)
-            # What it writes there itself is to be there before what we write over it.
-            wait_for(lambda: master.parameter(f"{_KNOBS}/rate") == shown["rate"], "what holds")
+            # Wait for its own write to the server before overwriting the value.
+            wait_for(lambda: master.parameter(f"{_KNOBS}/rate") == shown["rate"], "its write")
             master.run("rosparam", "set", f"{_KNOBS}/rate", "4.0")
             if tunes:
-                wait_for(lambda: _rate(client) == 4.0, "the loop to follow")
+                wait_for(lambda: _rate(client) == 4.0, "the loop to follow the change")
             else:
-                wait_for(lambda: master.parameter(f"{_KNOBS}/rate") == 1.5, "what holds")
+                wait_for(lambda: master.parameter(f"{_KNOBS}/rate") == 1.5, "the present values")
                 assert _rate(client) == 1.5
             if peers == "operate":
                 wait_for(lambda: "/arm/heard" in master.topics()[1], "the topic")
@@ -70,7 +70,7 @@ def test_peers_may_do_what_the_setting_says(tmp_path: Path, master: Master, peer
 
 @pytest.fixture
 def strangers_master(tmp_path: Path) -> Iterator[str]:
-    """Give the URI of a master that another user of this machine has started."""
+    """Yield the URI of a master started by another user of this machine."""
     port = reserve_port()
     uri = f"http://localhost:{port}"
     home = tmp_path / "stranger"
@@ -117,7 +117,7 @@ def test_a_master_of_a_user_without_the_right_is_not_followed(
         ("observe", runner_pb2.SIM_TIME_ALWAYS, True),
     ],
 )
-def test_a_strangers_word_that_time_is_simulated_counts_where_it_may_operate(
+def test_a_foreign_master_sets_simulated_time_only_with_operate(
     tmp_path: Path, master: Master, peers: str, choice: runner_pb2.SimTime, simulated: bool
 ) -> None:
     parameters = rosgraph.Master("/test", master.uri)
@@ -131,7 +131,7 @@ def test_a_strangers_word_that_time_is_simulated_counts_where_it_may_operate(
             client.load(rtcf.component("rtcf_test", "Knobs", name="knobs", ns="/arm"))
             client.start()
             assert client.get_status("rt_runner").runners[0].simulated == simulated
-            if simulated:  # without a clock there is no cycle
+            if simulated:  # without a clock no cycle runs
                 wait_for(lambda: "/clock" in master.topics()[1], "the topic of the clock")
                 assert iteration(client) == 0
             else:
@@ -149,7 +149,7 @@ def test_a_strangers_word_that_time_is_simulated_counts_where_it_may_operate(
         (("_ros_peers:=observe",), runner_pb2.RIGHT_OBSERVE),
     ],
 )
-def test_of_a_launch_they_may_what_its_user_may_unless_it_says_otherwise(
+def test_peers_of_a_launch_have_its_users_rights_by_default(
     tmp_path: Path, master: Master, said: tuple[str, ...], right: runner_pb2.Right
 ) -> None:
     daemon = Daemon(tmp_path, with_ros(master.uri, "") + 'peers = "none"\n')
@@ -172,7 +172,7 @@ def test_of_a_launch_they_may_what_its_user_may_unless_it_says_otherwise(
             answer = master.call("/rt_runner/deactivate_rt_loop")
             assert answer["success"] == (right == runner_pb2.RIGHT_ADMIN), answer
             assert client.get_status("rt_runner").runners[0].settings.ros.peers == right
-            # Afterwards the runner has its own again.
+            # Afterwards the runner has its own setting again.
             assert runner.end() == 0
             settings = client.get_status("rt_runner").runners[0].settings
             assert settings.ros.peers == runner_pb2.RIGHT_NONE

@@ -1,4 +1,4 @@
-"""Connections that become ROS topics: which, how often, how large, how old."""
+"""Connections as ROS topics: selection, decimation, size, age."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,7 +14,7 @@ from values import iteration, port_value
 
 @pytest.fixture
 def ros_daemon(tmp_path: Path, master: Master) -> Iterator[tuple[Daemon, rtcf.Client]]:
-    """Give a daemon and its client; nothing is mapped."""
+    """Yield a daemon without mapped connections, and its client."""
     daemon = Daemon(tmp_path, with_ros(master.uri, ""))
     daemon.start()
     with rtcf.Client(daemon.socket) as client:
@@ -29,7 +29,7 @@ def ros(client: rtcf.Client) -> runner_pb2.RosStatus:
     return status
 
 
-def test_whitelist_and_blacklist_are_changed_while_the_loop_runs(
+def test_whitelist_and_blacklist_change_while_the_loop_runs(
     ros_daemon: tuple[Daemon, rtcf.Client], master: Master
 ) -> None:
     daemon, client = ros_daemon
@@ -59,7 +59,7 @@ def test_whitelist_and_blacklist_are_changed_while_the_loop_runs(
     assert status.state == runner_pb2.RUNNER_STATE_RUNNING
 
 
-def test_messages_of_variable_size_flow_both_ways_and_those_too_large_are_reported(
+def test_messages_of_variable_size_flow_both_ways_up_to_the_limit(
     ros_daemon: tuple[Daemon, rtcf.Client], master: Master
 ) -> None:
     daemon, client = ros_daemon
@@ -77,7 +77,7 @@ def test_messages_of_variable_size_flow_both_ways_and_those_too_large_are_report
     sender.end()
     assert ros(client).too_large == 0
 
-    # More than there is room for: counted and said once, in both directions.
+    # Larger than the limit: counted and reported once, in both directions.
     daemon.ctl("runner", "set", "--largest-message", "1")
     wait_for(lambda: ros(client).too_large > 20, "messages that are too large")
     wait_for(lambda: "/v/said: " in daemon.log(), "the report")
@@ -87,14 +87,14 @@ def test_messages_of_variable_size_flow_both_ways_and_those_too_large_are_report
     assert port_value(client, "/v/text", "length") == 5000
     sender.end()
     assert "larger than 1 KiB" in daemon.ctl("status").stdout
-    # As large as that, and a little less.
+    # Of exactly that size, and slightly smaller.
     daemon.ctl("runner", "set", "--largest-message", "1000")
     daemon.ctl("set", "/v/text", f"size:={1000 * 1024 - 4}")
     wait_for(lambda: listener.values()[-1] == 1000.0 * 1024 - 4, "the largest message")
     listener.end()
 
 
-def test_the_age_of_an_input_tells_that_its_peer_is_silent(
+def test_the_age_of_an_input_shows_a_silent_peer(
     ros_daemon: tuple[Daemon, rtcf.Client], master: Master
 ) -> None:
     _, client = ros_daemon
@@ -105,8 +105,8 @@ def test_the_age_of_an_input_tells_that_its_peer_is_silent(
     sender = master.node("text", "/a/heard", "3")
     wait_for(lambda: port_value(client, "/a/text", "length") == 3, "the message")
     sender.end()
-    wait_for(lambda: port_value(client, "/a/text", "age") > 5e8, "half a second of silence")
-    # Another one is a new value again.
+    wait_for(lambda: port_value(client, "/a/text", "age") > 5e8, "half a second without messages")
+    # A new peer's message is a new value again.
     sender = master.node("text", "/a/heard", "4")
     wait_for(lambda: port_value(client, "/a/text", "length") == 4, "the next message")
     sender.end()
@@ -121,7 +121,7 @@ def test_decimation_publishes_each_nth_value(
     )
     assert result.returncode == 0
     client.load(rtcf.component("rtcf_test_ros", "Text", name="text", ns="/d"))
-    # The node has its topics before the first cycle, so that all values are counted.
+    # The topics exist before the first cycle, so that all values are counted.
     wait_for(lambda: "/d/age" in master.topics()[0], "the topics")
     counter = master.node("count", "/d/age")
     counter.wait_until_connected()
@@ -135,7 +135,7 @@ def test_decimation_publishes_each_nth_value(
     every.end()
 
 
-def test_a_latched_topic_gives_its_last_value_to_those_who_come_late(
+def test_a_latched_topic_sends_its_last_value_to_late_subscribers(
     ros_daemon: tuple[Daemon, rtcf.Client], master: Master
 ) -> None:
     _, client = ros_daemon
@@ -152,7 +152,7 @@ def test_a_latched_topic_gives_its_last_value_to_those_who_come_late(
     listener.end()
 
 
-def test_what_was_latched_before_there_was_a_master_is_not_lost(tmp_path: Path) -> None:
+def test_values_latched_before_the_master_starts_are_sent(tmp_path: Path) -> None:
     master = Master(tmp_path)
     daemon = Daemon(tmp_path, with_ros(master.uri, "/l/.*") + "latch = '/l/said'\n")
     daemon.start()
@@ -195,7 +195,7 @@ def test_settings_of_topics_are_checked(
     assert all(word in line for word in words), line
 
 
-def test_the_executor_keeps_up_with_twenty_topics_at_2_khz(
+def test_twenty_topics_at_2_khz_lose_nothing(
     ros_daemon: tuple[Daemon, rtcf.Client], master: Master
 ) -> None:
     _, client = ros_daemon
@@ -221,16 +221,14 @@ def test_the_executor_keeps_up_with_twenty_topics_at_2_khz(
         wait_for(lambda: iteration(client) > begin + 6000, "6000 cycles")
         return int(client.get_statistics().tap_dropped - before)
 
-    # It has half a second of them in store. If the machine is too busy for it for longer there is
-    # a next time; who does not keep up loses some each time.
+    # The node buffers half a second of messages. If the machine delays it longer, it tries again;
+    # a node that is too slow loses messages each time.
     assert any(lost_in_6000_cycles() == 0 for _ in range(10))
     client.stop()
     subscribers.end()
 
 
-def test_topics_flow_while_the_master_is_told_of_others_that_go(
-    tmp_path: Path, master: Master
-) -> None:
+def test_topics_flow_while_others_are_unregistered(tmp_path: Path, master: Master) -> None:
     way = HoldingMaster(master.port)
     daemon = Daemon(tmp_path, with_ros(way.uri, "/stays/.*|/goes/.*"))
     daemon.start()
@@ -241,8 +239,8 @@ def test_topics_flow_while_the_master_is_told_of_others_that_go(
             client.start()
             listener = master.node("numbers", "/stays/out")
             listener.wait_for_values(1)
-            # The node waits a second for an answer: if the machine is too busy for a look in
-            # that time, there is a next time. Where topics wait as well, no look finds them flow.
+            # The node waits a second for an answer. If the machine is too busy for a look in that
+            # time, it tries again. If topics wait, too, no look ever sees them flow.
             assert any(_flows_during_an_unload(client, master, way, listener) for _ in range(10))
             listener.end()
     finally:
@@ -258,11 +256,11 @@ def _flows_during_an_unload(
     way.hold()
     client.unload(["/goes/counter"])
     wait_for(lambda: way.holding, "the withdrawal")
-    # Its number is that of the cycle in which it is written: what is newer has passed since.
+    # A cycle's value is its number, so a greater value was received after this point.
     begin = iteration(client)
 
     def flows() -> bool:
-        # In this order: it is there, and the withdrawal is not answered yet.
+        # In this order: the value has arrived, and the unregistering call is still unanswered.
         return listener.values()[-1] > begin and way.holding
 
     wait_for(lambda: flows() or not way.holding, "a value, or the end of the wait for the master")

@@ -1,11 +1,11 @@
-"""rostest: launch files with a test in them, several at once, each at a master of its own."""
+"""rostest: several launch files with tests at once, each with its own master."""
 
 from pathlib import Path
 
 from daemon_process import DEADLINE_S, clean_environment, wait_for
 from launch_processes import Process, build_tree_environment, left_over
 
-# Node and topic names are the same in all; `wave` is published only by a loop that runs.
+# Node and topic names are the same in all; `wave` is published only by a running loop.
 TEST = """
 <launch>
   <node name="rt_runner" pkg="rtcf" type="rt_runner" output="screen">
@@ -38,7 +38,7 @@ def test_rostests_at_random_ports_run_side_by_side(tmp_path: Path) -> None:
         environment = build_tree_environment(
             clean_environment() | {"ROS_HOME": str(folder), "ROS_HOSTNAME": "localhost"}
         )
-        # publishtest takes the first python3 there is, which must be Debian's.
+        # publishtest uses the first python3 on PATH, which must be Debian's.
         environment["PATH"] = f"/usr/bin:{environment['PATH']}"
         command = ["/usr/bin/rostest", "--package=rtcf_examples", f"--pkgdir={folder}", str(file)]
         tests.append(Process(command, environment, folder))

@@ -1,6 +1,6 @@
-"""What rqt_console, rqt_logger_level, rqt_reconfigure and rqt_graph do on the wire.
+"""The wire-level actions of rqt_console, rqt_logger_level, rqt_reconfigure and rqt_graph.
 
-rqt itself is not in Debian 12; the modules by which it looks at nodes are.
+rqt itself is not in Debian 12; the modules by which it queries nodes are.
 """
 
 from collections.abc import Iterator
@@ -18,7 +18,7 @@ _WARN = 4
 
 @pytest.fixture
 def loop(tmp_path: Path, master: Master) -> Iterator[tuple[Daemon, rtcf.Client, str]]:
-    """Give a daemon whose loop speaks, hears and can be tuned; and the name of its node."""
+    """Yield a daemon, its client and the name of its node; the loop logs, reads and is tunable."""
     daemon = Daemon(tmp_path, with_ros(master.uri, "/t/.*"))
     daemon.start()
     with rtcf.Client(daemon.socket) as client:
@@ -33,11 +33,11 @@ def loop(tmp_path: Path, master: Master) -> Iterator[tuple[Daemon, rtcf.Client, 
 
 
 def lines(peer: Node, key: str) -> list[Any]:
-    """Return what a peer has printed under a key."""
+    """Return the values that a peer has printed under a key."""
     return [record[key] for record in peer.records() if key in record]
 
 
-def test_rqt_graph_sees_who_is_connected_by_what(
+def test_rqt_graph_sees_nodes_and_topics(
     loop: tuple[Daemon, rtcf.Client, str], master: Master
 ) -> None:
     _, _, node = loop
@@ -54,7 +54,7 @@ def test_rqt_graph_sees_who_is_connected_by_what(
     sender.end()
 
 
-def test_rqt_reconfigure_finds_shows_and_changes_parameters(
+def test_rqt_reconfigure_shows_and_changes_parameters(
     loop: tuple[Daemon, rtcf.Client, str], master: Master
 ) -> None:
     daemon, _, _ = loop
@@ -69,7 +69,7 @@ def test_rqt_reconfigure_finds_shows_and_changes_parameters(
     assert wait_for(lambda: lines(peer, "described"), "the description")[0] == {
         "enabled": "bool", "count": "int", "rate": "double", "label": "str", "mode": "str",
     }  # fmt: skip
-    # What others change appears in its window.
+    # Changes by other clients appear in its window.
     daemon.ctl("set", "/k/knobs", "rate:=7", "count:=3")
     wait_for(lambda: shows(rate=7.0, count=3), "another's change to be shown")
     peer.end()
@@ -81,16 +81,16 @@ def test_rqt_console_and_rqt_logger_level_work_together(
     _, client, node = loop
     console = master.node("console", "/s")
     console.wait_until_connected()
-    # Which passes on what it hears.
-    wait_for(lambda: "/rosout" in master.listeners(node, "/rosout"), "rosout to hear the loop")
+    # rosout, which forwards the records.
+    wait_for(lambda: "/rosout" in master.listeners(node, "/rosout"), "rosout's connection")
     client.load(rtcf.component("rtcf_test_ros", "Speaker", name="s"))
     client.start()
     wait_for(lambda: _WARN in lines(console, "level"), "a warning out of the cycle")
     assert "each cycle" not in lines(console, "msg")
-    # It lists the nodes that have these services, and the loggers that they name.
+    # It lists the nodes with these services, and their loggers.
     assert f"{node}/set_logger_level" in master.run("rosservice", "list", "-n").split()
     loggers = master.call(f"{node}/get_loggers")["loggers"]
     assert {"name": "ros.rtcf.s", "level": "info"} in loggers
     master.call(f"{node}/set_logger_level", "{logger: ros.rtcf.s, level: debug}")
-    wait_for(lambda: "each cycle" in lines(console, "msg"), "what debugging shows")
+    wait_for(lambda: "each cycle" in lines(console, "msg"), "the debug record")
     console.end()

@@ -1,4 +1,4 @@
-"""Components that were written for RTCF 2021, with ROS as they knew it."""
+"""Components written for RTCF 2021, with the ROS interface that they expect."""
 
 import json
 import re
@@ -19,12 +19,12 @@ BUILD_S = 600.0
 
 @pytest.fixture
 def settings(master: Master) -> str:
-    """Let the loops of `daemon` have a ROS node."""
+    """Return settings with a ROS node for the loops of `daemon`."""
     return with_ros(master.uri, "/ros/.*")
 
 
 def test_listing_1_of_the_paper_runs(daemon: Daemon, master: Master) -> None:
-    """Two of them as in Listing 2: what is written to /ros/in comes out of /ros/out."""
+    """Two of them as in Listing 2: values written to /ros/in appear on /ros/out."""
     _set_parameter(master, "/test_param", "4.25")
     with rtcf.Client(daemon.socket) as client:
         load = ("load", "rtcf_compat", "PaperExample", "--name")
@@ -64,7 +64,7 @@ def tuned(tmp_path_factory: pytest.TempPathFactory) -> Path:
                 "-DPYTHON_EXECUTABLE=/usr/bin/python3",
             ),
             *("-DCATKIN_BUILD_BINARY_PACKAGE=ON", "-DCATKIN_ENABLE_TESTING=OFF"),
-            # Nothing to debug or to be fast here.
+            # Debug information and speed do not matter here.
             "-DCMAKE_CXX_FLAGS=-O0",
         ],
         ["cmake", "--build", str(folder)],
@@ -83,7 +83,7 @@ def tuned(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_cfg_file_tunes_a_running_loop(tmp_path: Path, master: Master, tuned: Path) -> None:
-    # What is on the parameter server already counts from the beginning.
+    # A value on the parameter server applies from the start.
     _set_parameter(master, "/arm/tuned/steps", "4")
     daemon = Daemon(tmp_path, f"[daemon]\npath = ['{tuned}']\n" + with_ros(master.uri, ""))
     daemon.start()
@@ -92,7 +92,7 @@ def test_cfg_file_tunes_a_running_loop(tmp_path: Path, master: Master, tuned: Pa
             client.load(rtcf.component("tuned", "Tuned", name="tuned", ns="/arm"))
             client.start()
             wait_for(lambda: _value(daemon, "/arm/tuned", "value") == -1.0, "the default")
-            # Four types at once, in one change.
+            # Four types in one change.
             _dynparam(master, "set", "/arm/tuned", "{enabled: true, gain: 0.5, label: 'two words'}")
             wait_for(lambda: _value(daemon, "/arm/tuned", "value") == 2.0, "the new values")
             # Out of bounds: the server clamps.
@@ -113,9 +113,9 @@ def _set_parameter(master: Master, name: str, value: str) -> None:
 
 
 def _dynparam(master: Master, *arguments: str) -> str:
-    """Call dynparam, as rosrun would."""
+    """Run dynparam as rosrun does."""
     done = subprocess.run(
-        # By Debian's Python, not by the first on PATH.
+        # With Debian's Python, not the first one on PATH.
         ["/usr/bin/python3", "/usr/lib/dynamic_reconfigure/dynparam", *arguments],
         env=master.environment(),
         capture_output=True,

@@ -1,4 +1,4 @@
-"""`rtcfctl run`: a loop in a daemon of its own, with what was saved or rebuilt since."""
+"""`rtcfctl run`: a loop in a private daemon, reloading saved and rebuilt files."""
 
 import os
 import shutil
@@ -14,8 +14,8 @@ import rtcf
 from daemon_process import BUILD_TREE, NO_ROS, Daemon, clean_environment, wait_for
 from rtcf.v1 import runner_pb2
 
-_STRANGER = 54321  # a uid that no user has
-_DEADLINE_S = 120.0  # of a compiler on a busy machine
+_STRANGER = 54321  # an unused uid
+_DEADLINE_S = 120.0  # for a compiler on a busy machine
 GRAPH = """\
 runner: rt_runner
 settings:
@@ -41,7 +41,7 @@ class Counts(Component):
 
 
 class Running:
-    """One under way, and what it has said."""
+    """A running `rtcfctl run`, and its output."""
 
     def __init__(self, process: "subprocess.Popen[bytes]", out: Path, socket: Path) -> None:
         self.process = process
@@ -59,7 +59,7 @@ class Running:
 
 @contextmanager
 def running(folder: Path, *words: str, at: Path | None = None) -> Iterator[Running]:
-    """Type it in a folder; it is ended by Ctrl-C.  `at`: its socket."""
+    """Run it in a folder until Ctrl-C. `at`: its socket."""
     out, socket = folder / "said", at or folder / "s"
     environment = clean_environment() | {
         "PATH": f"{BUILD_TREE / 'bin'}:{os.environ['PATH']}",
@@ -87,7 +87,7 @@ def amplitude(client: rtcf.Client) -> float:
     return float(found.value.double_value)
 
 
-def test_a_graph_file_runs_until_ctrl_c_and_is_applied_again_when_it_is_saved(
+def test_a_graph_file_runs_until_ctrl_c_and_is_reapplied_when_saved(
     tmp_path: Path,
 ) -> None:
     file = tmp_path / "graph.yaml"
@@ -102,17 +102,17 @@ def test_a_graph_file_runs_until_ctrl_c_and_is_applied_again_when_it_is_saved(
             assert amplitude(client) == 2.5
             file.write_text(GRAPH.format(amplitude="[much"))
             loop.wait_for("rtcfctl: graph.yaml:")
-            assert amplitude(client) == 2.5, "what runs goes on"
+            assert amplitude(client) == 2.5, "the running graph stays"
             (status,) = client.get_status().runners
         executor = status.pid
         loop.process.send_signal(signal.SIGINT)
         assert loop.process.wait() == 0
     assert not loop.socket.exists()
     assert not Path(f"/proc/{executor}").exists()
-    assert loop.said.count("rtcfctl: graph.yaml:") == 1, "said once"
+    assert loop.said.count("rtcfctl: graph.yaml:") == 1, "the message occurs once"
 
 
-def test_what_was_tuned_stays_when_a_graph_file_is_saved(tmp_path: Path) -> None:
+def test_tuned_values_stay_when_a_graph_file_is_saved(tmp_path: Path) -> None:
     def values() -> dict[str, float]:
         found = client.get_component("wave").parameters
         return {each.name: each.value.double_value for each in found}
@@ -130,7 +130,7 @@ def test_what_was_tuned_stays_when_a_graph_file_is_saved(tmp_path: Path) -> None
             assert "/wave keeps amplitude = 3.5, rate = 7.0, set since" in loop.said
             assert (values()["amplitude"], values()["rate"]) == (3.5, 7.0)
             assert client.get_history("wave") == before, "a save sets nothing"
-            # What the file says now counts.
+            # The new value in the file applies.
             file.write_text(GRAPH.format(amplitude=2.5))
             wait_for(lambda: values()["amplitude"] == 2.5, "the file's value", _DEADLINE_S)
             assert values()["rate"] == 7.0
@@ -140,7 +140,7 @@ def test_what_was_tuned_stays_when_a_graph_file_is_saved(tmp_path: Path) -> None
 
 
 def test_a_rebuilt_library_is_swapped_in(tmp_path: Path) -> None:
-    # Of a package that is nowhere else.
+    # A package that exists nowhere else.
     library = tmp_path / "build" / "lib" / "rtcf" / "my_waves" / "my_waves.so"
     library.parent.mkdir(parents=True)
     shutil.copy(BUILD_TREE / "lib" / "rtcf" / "rtcf_examples" / "rtcf_examples.so", library)
@@ -159,14 +159,14 @@ def test_a_rebuilt_library_is_swapped_in(tmp_path: Path) -> None:
             (wave,) = client.list_components()
             assert not wave.library_changed
             (rate,) = (p for p in wave.parameters if p.name == "rate")
-            assert rate.value.double_value == 3.0, "what was tuned stays"
+            assert rate.value.double_value == 3.0, "the tuned value stays"
             library.write_bytes(b"half of a library")
             loop.wait_for("rtcfctl: ")
             (wave,) = client.list_components()
-            assert wave.library_changed, "the one that was there still runs"
+            assert wave.library_changed, "the old code still runs"
 
 
-def test_a_python_source_is_compiled_and_swapped_in_when_it_is_saved(tmp_path: Path) -> None:
+def test_a_python_source_is_compiled_and_swapped_in_when_saved(tmp_path: Path) -> None:
     source = tmp_path / "counts.py"
     source.write_text(COUNTS.format(step=1))
     with running(tmp_path, "counts.py", "Counts") as loop:
@@ -181,7 +181,7 @@ def test_a_python_source_is_compiled_and_swapped_in_when_it_is_saved(tmp_path: P
     assert (values[1:] < values[:-1]).all()
 
 
-def test_a_python_source_that_differs_from_the_interpreter_is_not_run(tmp_path: Path) -> None:
+def test_a_python_source_that_differs_from_the_interpreter_does_not_run(tmp_path: Path) -> None:
     source = tmp_path / "counts.py"
     differs = "1 + self.count * 10**18 % 7"
     source.write_text(COUNTS.format(step=differs))
@@ -192,7 +192,7 @@ def test_a_python_source_that_differs_from_the_interpreter_is_not_run(tmp_path: 
         loop.wait_for("running; Ctrl-C ends it")
 
 
-def test_a_python_source_that_differs_when_it_is_saved_leaves_the_loop_as_it_is(
+def test_a_saved_python_source_that_differs_does_not_change_the_loop(
     tmp_path: Path,
 ) -> None:
     source = tmp_path / "counts.py"
@@ -203,7 +203,7 @@ def test_a_python_source_that_differs_when_it_is_saved_leaves_the_loop_as_it_is(
         loop.wait_for("--no-verify skips this")
         source.write_text(COUNTS.format(step=-1))
         loop.wait_for("reloaded counts.py")
-    assert loop.said.count("--no-verify skips this") == 1, "said once"
+    assert loop.said.count("--no-verify skips this") == 1, "the message occurs once"
 
 
 def test_a_loop_may_be_left_stopped(tmp_path: Path) -> None:
@@ -215,7 +215,7 @@ def test_a_loop_may_be_left_stopped(tmp_path: Path) -> None:
             assert status.iteration == 0
 
 
-def test_the_end_of_its_daemon_is_said(tmp_path: Path) -> None:
+def test_the_end_of_its_daemon_is_reported(tmp_path: Path) -> None:
     (tmp_path / "graph.yaml").write_text(GRAPH.format(amplitude=1.5))
     with running(tmp_path, "graph.yaml") as loop:
         loop.wait_for("running; Ctrl-C ends it")
@@ -226,7 +226,7 @@ def test_the_end_of_its_daemon_is_said(tmp_path: Path) -> None:
     assert "rtcfctl: " in loop.said.splitlines()[-1]
 
 
-def test_the_daemon_that_serves_its_socket_already_is_left_alone(tmp_path: Path) -> None:
+def test_a_daemon_that_already_uses_its_socket_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "graph.yaml").write_text(GRAPH.format(amplitude=1.5))
     (tmp_path / "other").mkdir()
     other = Daemon(tmp_path / "other", NO_ROS)
@@ -244,8 +244,8 @@ def test_the_daemon_that_serves_its_socket_already_is_left_alone(tmp_path: Path)
         other.end()
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="takes on another user")
-def test_nothing_is_asked_at_a_socket_of_another_user(tmp_path: Path) -> None:
+@pytest.mark.skipif(os.geteuid() != 0, reason="requires root to act as another user")
+def test_a_socket_of_another_user_is_not_used(tmp_path: Path) -> None:
     (tmp_path / "graph.yaml").write_text(GRAPH.format(amplitude=1.5))
     path = tmp_path / "theirs"
     with socket.socket(socket.AF_UNIX) as theirs:
@@ -260,7 +260,7 @@ def test_nothing_is_asked_at_a_socket_of_another_user(tmp_path: Path) -> None:
         )
         with pytest.raises(BlockingIOError):
             theirs.accept()
-    assert path.exists(), "it is theirs"
+    assert path.exists(), "the other user's socket stays"
 
 
 @pytest.mark.parametrize(
@@ -274,7 +274,7 @@ def test_nothing_is_asked_at_a_socket_of_another_user(tmp_path: Path) -> None:
         (("wrong.yaml",), 1, 'no package "none"'),
     ],
 )
-def test_refused_in_a_line(tmp_path: Path, words: tuple[str, ...], code: int, said: str) -> None:
+def test_errors_are_one_line(tmp_path: Path, words: tuple[str, ...], code: int, said: str) -> None:
     (tmp_path / "graph.yaml").write_text(GRAPH.format(amplitude=1.5))
     wrong = GRAPH.format(amplitude=1.5).replace("rtcf_examples", "none")
     (tmp_path / "wrong.yaml").write_text(wrong)

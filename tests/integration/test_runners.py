@@ -1,4 +1,4 @@
-"""Several runners: what happens to one is not felt by another."""
+"""Several runners: events in one do not affect another."""
 
 import os
 from collections.abc import Callable
@@ -12,17 +12,17 @@ from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 from values import iteration
 
 ROUNDS = 6
-CHANGES = 24  # in a round, about
-CYCLES = 400  # of the bystander, in a round
+CHANGES = 24  # per round, approximately
+CYCLES = 400  # of the bystander, per round
 
 
 @dataclass(frozen=True)
 class Window:
-    """What was counted in some cycles of the bystander."""
+    """The counts over some cycles of the bystander."""
 
     cycles: int
-    preempted: int  # its real-time thread
-    sleeps_off: int  # system calls of the thread that slept, other than one in each cycle
+    preempted: int  # involuntary switches of its real-time thread
+    sleeps_off: int  # sleeping system calls of the thread, beyond one per cycle
     shootdowns: int  # TLB, on its CPU
 
 
@@ -37,7 +37,7 @@ def shootdowns(cpu: int) -> int:
     return 0
 
 
-def test_starting_changing_and_crashing_one_does_not_touch_another(client: rtcf.Client) -> None:
+def test_starting_changing_and_crashing_one_does_not_affect_another(client: rtcf.Client) -> None:
     allowed = sorted(os.sched_getaffinity(0))
     mine, other = allowed[0], allowed[-1]
     bystander = Bystander(client, runner_pb2.RunnerSettings(frequency_hz=1000.0, cpu=mine))
@@ -55,15 +55,15 @@ def test_starting_changing_and_crashing_one_does_not_touch_another(client: rtcf.
     quiet, busy = [], []
     for _ in range(ROUNDS):
         busy.append(window(lambda: life_of_a_runner(client, "other", other), CYCLES))
-        # As long, as others go on all the time.
+        # The same number of cycles without changes, since other processes run all the time.
         quiet.append(window(lambda: None, busy[-1].cycles))
     bystander.check()
     print("quiet:", *quiet, sep="\n  ")
     print("busy:", *busy, sep="\n  ")
-    # Others share this machine and its counters. What the changes caused would be in each of
-    # the rounds, so that the quietest ones tell.
+    # Other processes of this machine affect the counters. Effects of the changes would occur in
+    # each round, so the quietest round decides.
     assert min(each.preempted for each in busy) == 0
-    # The counters of thread and loop are not read at one moment.
+    # The counters of thread and loop are read at slightly different times.
     assert min(abs(each.sleeps_off) for each in busy) < CHANGES
     others = max(each.shootdowns for each in quiet)
     assert min(each.shootdowns for each in busy) < others + CHANGES
@@ -90,7 +90,7 @@ def test_loops_that_share_a_cpu_are_named_and_the_faster_one_has_the_higher_prio
         said = daemon.ctl(*command).stdout
         line = f"CPU {cpu} has several loops, fast (priority {fast.settings.priority}), slow"
         assert line in said
-    # The one that was there first has noticed nothing.
+    # The first one is undisturbed.
     assert slow.realtime_tid == thread
     assert os.sched_getparam(thread).sched_priority == before
     client.stop("fast")
@@ -100,7 +100,7 @@ def test_loops_that_share_a_cpu_are_named_and_the_faster_one_has_the_higher_prio
 
 
 def life_of_a_runner(client: rtcf.Client, name: str, cpu: int) -> None:
-    """Add a runner, change its running graph in every way, crash it, and take it away."""
+    """Add a runner, change its running graph in every way, crash it, and remove it."""
     client.add_runner(name, runner_pb2.RunnerSettings(frequency_hz=1000.0, cpu=cpu))
     client.load(_mixer("a"), name)
     client.start(name)
@@ -129,7 +129,7 @@ def _mixer(name: str) -> graph_pb2.ComponentSpec:
     )
 
 
-def test_a_bare_stop_names_the_loops_that_run_on(daemon: Daemon, client: rtcf.Client) -> None:
+def test_a_bare_stop_names_the_loops_that_keep_running(daemon: Daemon, client: rtcf.Client) -> None:
     client.add_runner("second")
     client.add_runner("third")
     for runner in ("rt_runner", "second"):
@@ -140,13 +140,13 @@ def test_a_bare_stop_names_the_loops_that_run_on(daemon: Daemon, client: rtcf.Cl
     note = "still running: second; `rtcfctl stop --all` stops all loops"
     assert done.stderr == f"rtcfctl: note: {note}\n"
     client.start()
-    # Who names a runner means that one.
+    # A named runner is the only one that stops.
     done = daemon.ctl("-r", "second", "stop")
     assert (done.returncode, done.stdout, done.stderr) == (0, "stopped\n", "")
     assert daemon.ctl("stop").stderr == ""
 
 
-def test_loops_claim_their_cpus_where_only_their_user_writes(
+def test_cpu_claims_are_in_a_folder_that_only_their_user_can_write(
     daemon: Daemon, client: rtcf.Client
 ) -> None:
     client.add_runner("second")

@@ -1,4 +1,4 @@
-"""The scope's server: who comes in, and what pages are told."""
+"""The scope's server: access, and the data that pages receive."""
 
 import asyncio
 import json
@@ -18,7 +18,7 @@ from scope_visit import CYCLES, HEAD, SHOT, Visit
 
 @pytest.fixture(scope="module")
 def looping(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
-    """Give a daemon with a loop that runs, for all tests here."""
+    """Yield a daemon with a running loop, shared by all tests here."""
     daemon = Daemon(tmp_path_factory.mktemp("loop"))
     daemon.start()
     with rtcf.Client(daemon.socket) as client:
@@ -31,13 +31,13 @@ def looping(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
 
 @pytest.fixture(scope="module")
 def scope(looping: Daemon) -> Iterator[ScopeProcess]:
-    """Give a scope that only looks."""
+    """Yield a read-only scope."""
     with ScopeProcess(looping) as scope:
         yield scope
 
 
 @pytest.mark.parametrize("path", ["/api/about", "/api/graph", "/api/mcap", "/stream", "/nowhere"])
-def test_without_the_token_nothing_is_told(scope: ScopeProcess, path: str) -> None:
+def test_without_the_token_no_data_is_sent(scope: ScopeProcess, path: str) -> None:
     for token in ("", "x" * len(scope.token), scope.token[:-1]):
         status, text = scope.ask(path, token=token)
         assert (status, text.decode()) == (
@@ -46,13 +46,13 @@ def test_without_the_token_nothing_is_told(scope: ScopeProcess, path: str) -> No
     assert scope.ask(f"{path}?token={scope.token}", token="")[0] == 403
 
 
-def test_the_page_itself_is_no_secret(scope: ScopeProcess) -> None:
+def test_the_page_itself_needs_no_token(scope: ScopeProcess) -> None:
     for path, text in (("/", b"<title>rtcf scope</title>"), ("/page/main.js", b"import")):
         status, said = scope.ask(path, token="")
         assert status == 200 and text in said
 
 
-def test_who_lacks_the_token_of_a_file_is_told_of_the_file(looping: Daemon, tmp_path: Path) -> None:
+def test_a_page_without_the_token_of_a_file_names_the_file(looping: Daemon, tmp_path: Path) -> None:
     file = tmp_path / "token"
     with ScopeProcess(looping, "--token-file", str(file)) as scope:
         status, text = scope.ask("/api/about", token="")
@@ -63,7 +63,7 @@ def test_who_lacks_the_token_of_a_file_is_told_of_the_file(looping: Daemon, tmp_
 
 
 @pytest.mark.parametrize("host", ["evil.example", "evil.example:80", "127.0.0.1.evil.example", "["])
-def test_a_name_that_is_not_this_machines_is_refused(scope: ScopeProcess, host: str) -> None:
+def test_a_foreign_host_name_is_rejected(scope: ScopeProcess, host: str) -> None:
     status, text = scope.ask("/api/about", Host=host)
     assert (status, text.decode()) == (403, f"unknown host name {host}: allow it with --name\n")
     for ours in (f"localhost:{scope.port}", f"[::1]:{scope.port}", "127.0.0.1:1"):
@@ -71,7 +71,7 @@ def test_a_name_that_is_not_this_machines_is_refused(scope: ScopeProcess, host: 
 
 
 @pytest.mark.parametrize("origin", ["http://evil.example", "null", "http://127.0.0.1:1"])
-def test_pages_of_others_may_not_ask(scope: ScopeProcess, origin: str) -> None:
+def test_pages_of_other_origins_are_rejected(scope: ScopeProcess, origin: str) -> None:
     upgrade = {"Connection": "Upgrade", "Upgrade": "websocket"}
     asked: list[tuple[str, dict[str, str]]] = [("/api/about", {}), ("/stream", upgrade)]
     for path, headers in asked:
@@ -91,7 +91,7 @@ def test_no_path_leads_out_of_the_page(scope: ScopeProcess, path: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["..", "%2e%2e%2fa", "..%2f..%2fetc%2fpasswd", ".a", "a%00b"])
-def test_layouts_and_recordings_have_names_and_no_paths(scope: ScopeProcess, name: str) -> None:
+def test_layouts_and_recordings_have_names_not_paths(scope: ScopeProcess, name: str) -> None:
     for path in (f"/api/layouts/{name}", f"/api/recordings/{name}"):
         status, text = scope.ask(path)
         assert status in (400, 404) and b"root:" not in text
@@ -113,10 +113,10 @@ def test_a_layout_is_kept_until_it_is_removed(scope: ScopeProcess) -> None:
     assert (status, json.loads(text)) == (400, {"refused": "no layout my arm"})
 
 
-def test_a_flood_of_connections_is_refused_and_passes(scope: ScopeProcess) -> None:
+def test_a_flood_of_connections_is_rejected_and_survived(scope: ScopeProcess) -> None:
     flood = [socket.create_connection(("127.0.0.1", scope.port)) for _ in range(200)]
     try:
-        # Who has shown no token is hung up on, and makes room for another one.
+        # Connections without a token are closed to make room for another one.
         for each in flood:
             each.settimeout(DEADLINE_S)
         assert any(b"503" in each.recv(200) for each in flood)
@@ -133,7 +133,7 @@ def _answers(scope: ScopeProcess) -> bool:
         return False
 
 
-def test_without_the_right_no_parameter_is_set(scope: ScopeProcess) -> None:
+def test_without_the_right_parameters_cannot_be_set(scope: ScopeProcess) -> None:
     change = json.dumps({"component": "/wave", "parameter": "rate", "value": 2.0})
     status, text = scope.ask("/api/parameter", "POST", change)
     assert (status, json.loads(text)) == (
@@ -177,14 +177,14 @@ def test_tabs_share_one_stream_and_miss_no_cycle_when_another_comes(scope: Scope
             head, columns = await first.binary(CYCLES, traces=1)
             seen.append(columns)
             async with Visit(scope) as second:
-                # Others are watched from here on.
+                # Other signals are watched from here on.
                 await second.say(watch=["/wave.wave", "/mimo.out1"])
                 while len(seen) < 40:
                     head, columns = await first.binary(CYCLES)
                     assert columns.shape[0] == 5
                     lost += head[6]
                     seen.append(columns)
-                # From when the stream with its signals takes over.
+                # The start of the stream with both pages' signals.
                 await second.binary(CYCLES, traces=2)
             cycles = np.hstack([each[1] for each in seen])
             assert np.all(np.diff(cycles) >= 1)
@@ -195,7 +195,7 @@ def test_tabs_share_one_stream_and_miss_no_cycle_when_another_comes(scope: Scope
     asyncio.run(look())
 
 
-def test_what_happens_and_what_is_logged_is_told(looping: Daemon, scope: ScopeProcess) -> None:
+def test_events_and_log_records_are_sent(looping: Daemon, scope: ScopeProcess) -> None:
     def tune(amplitude: str) -> None:
         with rtcf.Client(looping.socket) as client:
             client.set_parameters("wave", [rtcf.parse_parameter(f"amplitude:={amplitude}")])
@@ -220,13 +220,13 @@ def test_what_happens_and_what_is_logged_is_told(looping: Daemon, scope: ScopePr
     assert record["iteration"] > 0
 
 
-def test_a_trigger_shows_the_cycle_that_it_waits_for_and_its_neighbours(
+def test_a_trigger_shows_its_cycle_and_the_neighbouring_ones(
     scope: ScopeProcess,
 ) -> None:
     async def look() -> None:
         async with Visit(scope) as page:
             await page.say(watch=["/wave.phase"])
-            for _ in range(10):  # so that there are cycles before the hit
+            for _ in range(10):  # cycles before the hit
                 await page.binary(CYCLES)
             await page.say(
                 trigger={"kind": "edge", "signal": "/wave.phase", "slope": "falling", "low": 0.5,
@@ -237,7 +237,7 @@ def test_a_trigger_shows_the_cycle_that_it_waits_for_and_its_neighbours(
             assert (hit, columns.shape) == (30, (5, 50))
             assert phase[hit - 1] > 0.5 >= phase[hit]
             assert (await page.text("trigger"))["state"] == "done"
-            # A single shot is one: the next fall comes a second later, and nothing with it.
+            # A single trigger hits once: the next falling edge, a second later, sends no shot.
             for _ in range(80):
                 assert (await page.binary(CYCLES))[0][0] == CYCLES
 
@@ -293,7 +293,7 @@ def test_a_trigger_on_several_signals_shows_its_cycle(scope: ScopeProcess) -> No
         ({"watch": "/wave.wave"}, "watch must be a list of signal names"),
     ],
 )  # fmt: skip
-def test_what_a_page_may_not_ask_is_refused_in_one_line(
+def test_forbidden_requests_of_a_page_are_rejected_in_one_line(
     scope: ScopeProcess, told: dict[str, Any], said: str
 ) -> None:
     async def ask() -> str:
@@ -304,7 +304,7 @@ def test_what_a_page_may_not_ask_is_refused_in_one_line(
     assert asyncio.run(ask()) == said
 
 
-def test_a_page_that_does_not_read_holds_up_nobody(scope: ScopeProcess) -> None:
+def test_a_page_that_does_not_read_blocks_nobody(scope: ScopeProcess) -> None:
     async def look() -> None:
         async with Visit(scope) as slow, Visit(scope) as quick:
             for page in (slow, quick):
@@ -317,7 +317,7 @@ def test_a_page_that_does_not_read_holds_up_nobody(scope: ScopeProcess) -> None:
     asyncio.run(look())
 
 
-def test_the_last_cycles_are_had_as_a_recording(scope: ScopeProcess, tmp_path: Path) -> None:
+def test_the_last_cycles_can_be_saved_as_a_recording(scope: ScopeProcess, tmp_path: Path) -> None:
     async def look() -> tuple[float, float]:
         async with Visit(scope) as page:
             await page.say(watch=["/wave.phase"])
@@ -338,7 +338,7 @@ def test_the_last_cycles_are_had_as_a_recording(scope: ScopeProcess, tmp_path: P
     assert scope.ask("/api/mcap?first=1e15&last=2e15")[0] == 400
 
 
-def test_recordings_are_told_as_they_were_recorded(looping: Daemon, tmp_path: Path) -> None:
+def test_recordings_are_sent_unchanged(looping: Daemon, tmp_path: Path) -> None:
     file = tmp_path / "run.mcap"
     done = looping.ctl("record", "-o", str(file), "wave", "--duration", "0.3s")
     assert done.returncode == 0, done.stderr
@@ -375,7 +375,7 @@ def test_tabs_that_are_killed_leave_nothing(looping: Daemon, scope: ScopeProcess
             await page.say(watch=["/wave.phase", "/mimo.out1"])
             await page.binary(CYCLES)
         for each in pages:
-            # No farewell, as of a browser that was killed.
+            # No closing handshake, as when a browser is killed.
             for connection in each.http.connector._conns.values():  # type: ignore[union-attr]
                 for protocol, _ in connection:
                     protocol.transport.abort()  # type: ignore[union-attr]
@@ -393,11 +393,13 @@ def test_tabs_that_are_killed_leave_nothing(looping: Daemon, scope: ScopeProcess
     )
 
 
-def test_over_ssh_the_way_through_is_told(looping: Daemon, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_over_ssh_the_tunnel_command_is_printed(
+    looping: Daemon, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("SSH_CONNECTION", "10.0.0.2 50000 10.0.0.1 22")
     monkeypatch.setenv("USER", "alice")
     with ScopeProcess(looping) as scope:
-        wait_for(lambda: "ssh" in scope.log.read_text(), "the way through")
+        wait_for(lambda: "ssh" in scope.log.read_text(), "the tunnel command")
         said = scope.log.read_text().splitlines()[1]
     assert said == (
         f"from your machine:  ssh -N -L {scope.port}:127.0.0.1:{scope.port} alice@10.0.0.1"
@@ -413,7 +415,7 @@ def test_over_ssh_the_way_through_is_told(looping: Daemon, monkeypatch: pytest.M
         (["--token-file", "/dev/null"], "rtcfctl: /dev/null: a token has 16 letters"),
     ],
 )
-def test_a_wrong_command_line_is_refused(looping: Daemon, arguments: list[str], said: str) -> None:
+def test_a_wrong_command_line_is_rejected(looping: Daemon, arguments: list[str], said: str) -> None:
     done = looping.ctl("scope", *arguments)
     assert done.returncode in (1, 2)
     assert said in done.stderr and done.stderr.count("\n") == 1

@@ -1,4 +1,4 @@
-"""The way into the scope: its token, the sessions that it gives, and requests that are none."""
+"""Access to the scope: its token, its sessions, and invalid requests."""
 
 import asyncio
 import http.server
@@ -30,7 +30,7 @@ LAYOUT = '{"panes":[{"traces":["/wave.wave"]}],"span":2}'
 
 @pytest.fixture(scope="module")
 def looping(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
-    """Give a daemon with a loop that runs, for all tests here."""
+    """Yield a daemon with a running loop, shared by all tests here."""
     daemon = Daemon(tmp_path_factory.mktemp("loop"))
     daemon.start()
     with rtcf.Client(daemon.socket) as client:
@@ -55,12 +55,12 @@ def chromium(tmp_path: Path) -> Iterator[Browser]:
 # Sessions
 
 
-def test_the_token_gives_a_session_that_stands_for_it(scope: ScopeProcess) -> None:
+def test_the_token_gives_a_session_that_replaces_it(scope: ScopeProcess) -> None:
     first, second = scope.session(), scope.session()
     assert len({first, second, scope.token}) == 3
     for session in (first, second):
         assert scope.ask("/api/about", token=session)[0] == 200
-        # It gives no further one.
+        # A session cannot open another session.
         assert scope.ask("/api/session", "POST", token=session)[0] == 403
     assert scope.ask("/api/session", "POST", token=scope.token[:-1])[0] == 403
     assert scope.ask("/api/session", "POST", token="")[0] == 403
@@ -119,13 +119,13 @@ def test_the_token_leaves_the_address_and_the_layout_stays(
     assert not [each for each in history if scope.token in each["url"]]
     assert page.ask("JSON.parse(decodeURIComponent(location.hash.slice(1))).span") == 2
     assert _kept(page) not in ("", scope.token)
-    # A bookmark opens with it, whatever tab it is.
+    # A bookmark with the layout opens with the session, in any tab.
     marked = chromium.page(f"http://127.0.0.1:{scope.port}/#{quote(LAYOUT)}")
     marked.wait("scope.live.end > 10 && document.getElementById('trouble').hidden")
     assert page.errors == marked.errors == []
 
 
-def test_a_page_without_a_session_says_how_to_get_one(
+def test_a_page_without_a_session_explains_how_to_get_one(
     chromium: Browser, scope: ScopeProcess
 ) -> None:
     page = chromium.page(f"http://127.0.0.1:{scope.port}/#{quote(LAYOUT)}")
@@ -133,13 +133,13 @@ def test_a_page_without_a_session_says_how_to_get_one(
         "document.getElementById('trouble').textContent === "
         "'access requires the token: open the address that rtcfctl scope printed'"
     )
-    # It goes on once another tab has one.
+    # It continues once another tab has a session.
     chromium.page(scope.address).wait("scope.rate")
     page.wait("scope.live.end > 10 && document.getElementById('trouble').hidden")
     assert page.ask("scope.traces().length") == 1
 
 
-def test_a_page_whose_server_was_started_anew_says_how_to_go_on(
+def test_a_page_of_a_restarted_server_explains_how_to_continue(
     chromium: Browser, looping: Daemon, tmp_path: Path
 ) -> None:
     kept = ("--token-file", str(tmp_path / "token"))
@@ -154,7 +154,7 @@ def test_a_page_whose_server_was_started_anew_says_how_to_go_on(
 
 
 class _Recorder:
-    """A server on another port of this host that keeps all that it gets."""
+    """A server on another port of this host that stores all requests."""
 
     def __init__(self, script: str) -> None:
         self.got: list[str] = []
@@ -182,7 +182,7 @@ class _Recorder:
         self._server.server_close()
 
 
-def test_another_port_of_the_host_gets_nothing_and_may_ask_nothing(
+def test_another_port_of_the_host_gets_no_secret_and_no_access(
     chromium: Browser, scope: ScopeProcess
 ) -> None:
     ours = f"http://127.0.0.1:{scope.port}"
@@ -209,7 +209,7 @@ def test_another_port_of_the_host_gets_nothing_and_may_ask_nothing(
         page.ask(f"void (location.href = '{recorder.address}/by-script')")
         page.wait("window.done")
         assert page.ask("done") == ["refused", "refused", "refused", "", "", 0, ""]
-        # And from a page of it back.
+        # And back from a page of the scope.
         page.ask(f"void (location.href = '{ours}/')")
         page.wait("scope.rate")
         page.ask(
@@ -227,7 +227,7 @@ def test_another_port_of_the_host_gets_nothing_and_may_ask_nothing(
 
 
 def _command_lines() -> str:
-    """Return what a user who is nobody sees of all processes."""
+    """Return all command lines of processes that the user nobody can read."""
     look = "cat /proc/[0-9]*/cmdline 2>/dev/null | tr '\\0' ' '; ps -eo args 2>/dev/null; true"
     user: dict[str, Any] = {"user": NOBODY, "group": NOBODY} if os.geteuid() == 0 else {}
     done: subprocess.CompletedProcess[str] = subprocess.run(
@@ -236,7 +236,7 @@ def _command_lines() -> str:
     return done.stdout
 
 
-def test_another_user_sees_no_token_where_a_browser_is_opened(
+def test_another_user_sees_no_token_when_a_browser_is_opened(
     looping: Daemon, tmp_path: Path, chromium: Browser
 ) -> None:
     run = tmp_path / "run"
@@ -258,18 +258,18 @@ def test_another_user_sees_no_token_where_a_browser_is_opened(
             assert stat.S_IMODE(file.stat().st_mode) == 0o600
             assert stat.S_IMODE(file.parent.stat().st_mode) == 0o700
             assert file.is_relative_to(run)
-            # It leads to the page, once.
+            # It opens the page, but only once.
             page = chromium.page(address)
             page.wait("scope.rate")
             assert page.ask("location.search") == ""
-            wait_for(lambda: not file.parent.exists(), "the file to go")
+            wait_for(lambda: not file.parent.exists(), "the removal of the file")
             assert scope.ask("/api/session", "POST", token=ticket)[0] == 403
         finally:
             subprocess.run(["kill", pid], check=False)
     assert list(run.iterdir()) == []
 
 
-def test_a_file_that_no_browser_read_goes_with_the_scope(looping: Daemon, tmp_path: Path) -> None:
+def test_an_unread_token_file_is_removed_with_the_scope(looping: Daemon, tmp_path: Path) -> None:
     run = tmp_path / "run"
     run.mkdir(mode=0o700)
     display = {"DISPLAY": ":99", "BROWSER": "/bin/true", "XDG_RUNTIME_DIR": str(run)}
@@ -291,7 +291,7 @@ def _good(scope: ScopeProcess, path: bytes = b"/api/about", method: bytes = b"GE
 
 
 def _is_in_order(scope: ScopeProcess, data: bytes, patience_s: float = DEADLINE_S) -> int:
-    """Fail unless an answer is no failure of ours, in one line; return its status."""
+    """Fail if an answer is an internal error, or not one line; return its status."""
     status, body = scope.raw(data, patience_s)
     if status >= 400:
         assert status < 500, (data, body)
@@ -351,7 +351,7 @@ DEEP = b"[" * 60_000
         (lambda _: [b"GET /" + b"a" * 100_000 + b" HTTP/1.1", b"Host: 127.0.0.1"], 400),
     ],
 )  # fmt: skip
-def test_what_is_no_request_is_refused_in_one_line(
+def test_invalid_requests_are_rejected_in_one_line(
     scope: ScopeProcess, make: Callable[[ScopeProcess], list[bytes]], expected: int | None
 ) -> None:
     status = _is_in_order(scope, _request(*make(scope)))
@@ -380,7 +380,7 @@ def test_what_is_no_request_is_refused_in_one_line(
         (b"POST", b"/api/session", b"\xff", b"\xff", 200),
     ],
 )  # fmt: skip
-def test_what_is_no_json_is_refused_in_one_line(
+def test_invalid_json_is_rejected_in_one_line(
     scope: ScopeProcess, method: bytes, path: bytes, body: bytes, kind: bytes, expected: int
 ) -> None:
     headers = [*_good(scope, path, method), b"Content-Type: " + kind,
@@ -421,7 +421,7 @@ BODIES = TEXT | st.sampled_from(
 
 @st.composite
 def requests(draw: st.DrawFn) -> tuple[bool, list[bytes], bytes]:
-    """Draw whether it has the token, the lines of a head, and a body."""
+    """Draw a request: whether it has the token, the lines of its head, and its body."""
     method = draw(st.sampled_from([b"GET", b"GET", b"POST", b"PUT", b"DELETE", b"HEAD", b"\xff"]))
     version = draw(st.sampled_from([b"HTTP/1.1"] * 6 + [b"HTTP/1.0", b"HTTP/9", b"", b"\xff"]))
     line = b" ".join([method, draw(PATHS) + draw(st.just(b"") | TEXT), version])
@@ -444,14 +444,14 @@ def _seeded(most: int) -> Callable[[Any], Any]:
 def _try(scope: ScopeProcess, request: tuple[bool, list[bytes], bytes]) -> None:
     known, lines, body = request
     token = [b"Authorization: Bearer " + scope.token.encode()] if known else []
-    # Half of a request has no answer.
+    # An incomplete request gets no answer.
     _is_in_order(scope, _request(*lines, *token, b"Connection: close", body=body), patience_s=0.5)
     assert scope.process.poll() is None
 
 
 @_seeded(300)
 @hypothesis.given(request=requests())
-def test_no_request_is_a_failure_of_ours(
+def test_no_request_causes_an_internal_error(
     scope: ScopeProcess, request: tuple[bool, list[bytes], bytes]
 ) -> None:
     _try(scope, request)
@@ -460,13 +460,13 @@ def test_no_request_is_a_failure_of_ours(
 @pytest.mark.long
 @_seeded(20_000)
 @hypothesis.given(request=requests())
-def test_none_of_many_requests_is_a_failure_of_ours(
+def test_none_of_many_requests_causes_an_internal_error(
     scope: ScopeProcess, request: tuple[bool, list[bytes], bytes]
 ) -> None:
     _try(scope, request)
 
 
-def test_bytes_that_are_no_frames_end_their_page_alone(scope: ScopeProcess) -> None:
+def test_invalid_frames_end_only_their_page(scope: ScopeProcess) -> None:
     upgrade = [
         b"GET /stream HTTP/1.1", b"Host: 127.0.0.1", b"Connection: Upgrade", b"Upgrade: websocket",
         b"Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==", b"Sec-WebSocket-Version: 13",

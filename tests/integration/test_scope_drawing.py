@@ -1,4 +1,4 @@
-"""What the scope's page draws: each cycle, and the same pixels however it came to a picture."""
+"""Drawing of the scope's page: each cycle is drawn, and the pixels do not depend on the path."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -20,7 +20,7 @@ _NAMES = re.findall(r"^export (?:async )?(?:function|class) (\w+)", _HELPERS, re
 
 @pytest.fixture(scope="module")
 def loop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
-    """Give a daemon with a loop of 2 kHz, of values that are hard to draw."""
+    """Yield a daemon with a loop of 2 kHz whose values are hard to draw."""
     daemon = Daemon(tmp_path_factory.mktemp("loop"))
     daemon.start()
     with rtcf.Client(daemon.socket) as client:
@@ -48,7 +48,7 @@ Opener = Callable[..., Page]
 
 @pytest.fixture
 def visit(chromium: Browser, scope: ScopeProcess) -> Iterator[Opener]:
-    """Give what opens a page with a layout; `drawing` has the helpers in it."""
+    """Yield a function that opens a page with a layout, with the helpers of `drawing`."""
     pages = []
 
     def visit(layout: str = "", ratio: float = 1, width: int = 1280, height: int = 800) -> Page:
@@ -72,7 +72,7 @@ def visit(chromium: Browser, scope: ScopeProcess) -> Iterator[Opener]:
     ("seed", "span", "ratio"),
     [(1, 5, 1), (2, 5, 1), (3, 5, 2), (4, 1, 1.25), (5, 0.3, 1), (6, 0.05, 2), (7, 60, 1)],
 )
-def test_a_picture_that_grew_for_a_minute_is_the_one_drawn_at_once(
+def test_incremental_drawing_matches_drawing_at_once(
     visit: Opener, seed: int, span: float, ratio: float
 ) -> None:
     page = visit(ratio=ratio)
@@ -102,7 +102,7 @@ def test_a_picture_that_grew_for_a_minute_is_the_one_drawn_at_once(
     assert found["end"] > 4000 * min(span, 10)
 
 
-def test_a_view_that_is_moved_and_zoomed_is_the_one_drawn_at_once(visit: Opener) -> None:
+def test_a_moved_and_zoomed_view_matches_drawing_at_once(visit: Opener) -> None:
     page = visit()
     found = page.ask(
         """(async () => {
@@ -126,7 +126,7 @@ def test_a_view_that_is_moved_and_zoomed_is_the_one_drawn_at_once(visit: Opener)
     assert found == []
 
 
-def test_what_the_ring_no_longer_holds_goes_from_the_picture(visit: Opener) -> None:
+def test_cycles_dropped_from_the_ring_disappear_from_the_drawing(visit: Opener) -> None:
     page = visit()
     found = page.ask(
         """(async () => {
@@ -151,7 +151,7 @@ def test_what_the_ring_no_longer_holds_goes_from_the_picture(visit: Opener) -> N
 
 
 @pytest.mark.parametrize(("width", "height"), [(1280, 800), (1920, 1080), (420, 500)])
-def test_each_spike_of_one_cycle_of_a_loop_is_drawn(visit: Opener, width: int, height: int) -> None:
+def test_each_spike_of_one_cycle_is_drawn(visit: Opener, width: int, height: int) -> None:
     layout = '{"panes":[{"traces":["/ragged.spikes"]},{"traces":["/ragged.holes"]}],"span":5}'
     page = visit(layout, width=width, height=height)
     page.wait("scope.live.end > 14000 && scope.panes.length === 2")
@@ -176,7 +176,7 @@ def test_each_spike_of_one_cycle_of_a_loop_is_drawn(visit: Opener, width: int, h
     assert page.errors == []
 
 
-def test_values_that_are_no_numbers_have_a_mark(visit: Opener) -> None:
+def test_nan_values_are_marked(visit: Opener) -> None:
     page = visit('{"panes":[{"traces":["/ragged.holes"]}],"span":5}')
     found = page.wait(
         """(() => {
@@ -202,11 +202,11 @@ def test_values_that_are_no_numbers_have_a_mark(visit: Opener) -> None:
     )
     assert found["unmarked"] == 0
     assert found["wrong"] == 0
-    # What holds now is told in words, too.
+    # Text also names the present value.
     page.wait("document.querySelector('.chip b').textContent === 'NaN'")
 
 
-def test_missing_cycles_are_shown_from_the_last_to_the_next(visit: Opener) -> None:
+def test_missing_cycles_are_shaded_between_their_neighbours(visit: Opener) -> None:
     page = visit()
     found = page.ask(
         """(async () => {
@@ -248,7 +248,7 @@ def test_missing_cycles_are_shown_from_the_last_to_the_next(visit: Opener) -> No
         (12345.0, 12346.0, ""), (-30.0, 50.0, ""), (5e20, 7e20, "×10¹⁸"),
     ],
 )  # fmt: skip
-def test_ticks_are_told_apart_in_few_characters(
+def test_tick_labels_are_short_and_distinct(
     visit: Opener, low: float, high: float, notes: str
 ) -> None:
     page = _blank(visit)
@@ -263,7 +263,7 @@ def test_ticks_are_told_apart_in_few_characters(
     assert 3 <= len(texts) == len(set(texts)) == len(found["at"])
     assert max(map(len, texts)) <= 9
     assert found["note"].replace("\u202f", " ") == notes
-    # Each says its value.
+    # Each label can be converted back to its value.
     factor, base = _note(found["note"])
     for text, value in zip(texts, found["at"], strict=True):
         said = float(text.replace("−", "-").replace("\u202f", "")) * factor + base
@@ -271,7 +271,7 @@ def test_ticks_are_told_apart_in_few_characters(
 
 
 def _note(text: str) -> tuple[float, float]:
-    """Return what ticks are multiplied by, and what is added."""
+    """Return the factor and the offset of tick labels."""
     factor = 1.0
     power = re.match(r"×10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)", text)
     if power:
@@ -285,7 +285,7 @@ def _blank(visit: Opener) -> Page:
     return visit()
 
 
-def test_figures_above_a_million_are_read_as_numbers(visit: Opener) -> None:
+def test_numbers_above_a_million_are_readable(visit: Opener) -> None:
     page = visit('{"panes":[{"traces":["/ragged.large"]}],"span":5}')
     found: Any = page.ask(
         """(async () => {
@@ -299,7 +299,7 @@ def test_figures_above_a_million_are_read_as_numbers(visit: Opener) -> None:
     page.wait("/^1.370.[0-9]{3}$/.test(document.querySelector('.chip b').textContent)")
 
 
-def test_a_wave_of_one_hertz_reads_one_hertz(visit: Opener) -> None:
+def test_the_spectrum_shows_the_frequency_of_a_wave(visit: Opener) -> None:
     page = _blank(visit)
     found = page.ask(
         """(async () => {
@@ -321,7 +321,7 @@ def test_a_wave_of_one_hertz_reads_one_hertz(visit: Opener) -> None:
         assert amplitude == pytest.approx(3.0, rel=5e-3)
 
 
-def test_what_comes_back_has_no_settling_time(visit: Opener) -> None:
+def test_a_periodic_signal_has_no_settling_time(visit: Opener) -> None:
     page = _blank(visit)
     found = page.ask(
         """(async () => {
@@ -351,7 +351,7 @@ def test_events_are_lines_with_a_label_in_the_top_pane(visit: Opener, loop: Daem
     assert found[0]["lines"] == found[1]["lines"] >= 1
     assert (found[0]["labels"], found[1]["labels"]) == (found[0]["lines"], 0)
     assert "seed" in found[0]["title"]
-    # A line stands at the cycle of its event, wherever the view is.
+    # A line is at the cycle of its event, at any position of the view.
     page.ask("scope.freeze(); scope.view.span = 7; scope.changed(); scope.frame()")
     away = page.ask(
         """(() => {
@@ -382,8 +382,8 @@ def test_only_the_second_of_two_recordings_is_dashed(visit: Opener) -> None:
           made.view.show(0.5, 3.5);
           made.changed();
           made.frame();
-          // How many kinds of pixels a flat line has, and whether the ground is among them; the
-          // symbols of the second eight, with their rim, are a few columns of each.
+          // The number of pixel colours of a flat line, and whether the background is among them;
+          // the symbols of the second eight, with their rim, use a few columns each.
           const { sight } = made.panes[0], [columns] = drawing.pixels(made),
             paper = pixel(ink("paper"));
           const told = (value) => {
@@ -400,12 +400,12 @@ def test_only_the_second_of_two_recordings_is_dashed(visit: Opener) -> None:
     )
     assert [each["kinds"] for each in found["first"]] == [1] * 18
     assert [each["kinds"] for each in found["second"]] == [2] * 8
-    # Nothing is hidden between the dashes.
+    # The gaps between the dashes do not show the background.
     assert not any(each["ground"] for each in found["first"][:8] + found["second"])
     assert [each["symbols"] for each in found["first"]] == [False] * 8 + [True] * 10
 
 
-def test_the_browsers_own_parts_have_the_colours_of_the_theme(visit: Opener) -> None:
+def test_browser_controls_have_the_colours_of_the_theme(visit: Opener) -> None:
     page = _blank(visit)
     for theme in ("dark", "light"):
         page.ask(f"document.documentElement.dataset.theme = '{theme}'")

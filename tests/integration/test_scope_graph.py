@@ -1,4 +1,4 @@
-"""The scope's drawing of the graph: as wide as its panel, and nothing lies on anything else."""
+"""The scope's drawing of the graph: it is as wide as its panel, and no parts overlap."""
 
 import json
 from collections.abc import Iterator
@@ -37,7 +37,7 @@ def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 
 @pytest.fixture
 def size() -> tuple[int, int]:
-    """Give the size of the page; some tests have several."""
+    """Return the size of the page; some tests use several."""
     return 1280, 800
 
 
@@ -106,7 +106,7 @@ def test_large_graphs_are_as_wide_as_the_panel(shared: Daemon, page: Page, name:
     assert page.errors == []
 
 
-def test_a_panel_that_gets_wider_has_more_columns(shared: Daemon, page: Page) -> None:
+def test_a_wider_panel_has_more_columns(shared: Daemon, page: Page) -> None:
     with rtcf.Client(shared.socket) as client:
         client.apply([], "rt_runner")
         client.apply(graphs.chain(60), "rt_runner")
@@ -125,7 +125,7 @@ def test_a_panel_that_gets_wider_has_more_columns(shared: Daemon, page: Page) ->
         assert drawn(page)["wide"] <= max(drawn(page)["room"], 3 * 196 + 46)
 
 
-def test_places_and_lines_are_those_of_the_command_line(page: Page) -> None:
+def test_positions_and_lines_match_the_command_line(page: Page) -> None:
     page.ask("import('/page/panels/graph_layout.js').then((found) => { window.layout = found; })")
     sizes = "{ wide: 150, high: 40, gapX: 46, gapY: 24, laneX: 5, laneY: 4, port: 6 }"
     for name, lines in graphs.LINES.items():

@@ -1,4 +1,4 @@
-"""Pages of the scope beside each other: what one asks for changes nothing for another."""
+"""Several pages of the scope: requests of one do not affect another."""
 
 import asyncio
 import contextlib
@@ -29,7 +29,7 @@ def _wave(name: str) -> graph_pb2.ComponentSpec:
 
 @pytest.fixture(scope="module")
 def looping(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
-    """Give a daemon with a loop that runs, for all tests here."""
+    """Yield a daemon with a running loop, shared by all tests here."""
     daemon = Daemon(tmp_path_factory.mktemp("loop"))
     daemon.start()
     with rtcf.Client(daemon.socket) as client:
@@ -53,7 +53,7 @@ def client(looping: Daemon) -> Iterator[rtcf.Client]:
 
 
 class _Healthy:
-    """A page that shows a signal there is, and all that it hears."""
+    """A page that shows an existing signal, and everything that it receives."""
 
     def __init__(self) -> None:
         self.cycles: list[int] = []
@@ -63,7 +63,7 @@ class _Healthy:
 
     @contextlib.asynccontextmanager
     async def watching(self, scope: ScopeProcess) -> AsyncIterator["_Healthy"]:
-        """Have it look, inside."""
+        """Watch the signal during the block."""
         async with Visit(scope) as page:
             await page.say(watch=["/wave.phase"])
             await page.binary(CYCLES, traces=1)
@@ -76,7 +76,7 @@ class _Healthy:
                 await asyncio.gather(looking, return_exceptions=True)
 
     async def some(self) -> None:
-        """Wait for it to get some cycles from here on."""
+        """Wait until it has received some more cycles."""
         until = len(self.cycles) + 50
         while len(self.cycles) < until:
             self._some.clear()
@@ -92,7 +92,7 @@ class _Healthy:
             self._some.set()
 
     def check(self) -> None:
-        """Fail unless it has all cycles, and heard of nothing that is wrong."""
+        """Fail unless it has received all cycles, and no error."""
         gaps = [
             pair
             for pair in zip(self.cycles, self.cycles[1:], strict=False)
@@ -104,7 +104,7 @@ class _Healthy:
         assert not wrong
 
 
-def test_a_signal_that_is_missing_is_named_and_comes_with_its_component(
+def test_a_missing_signal_is_named_and_appears_with_its_component(
     scope: ScopeProcess, client: rtcf.Client
 ) -> None:
     async def look() -> None:
@@ -132,7 +132,7 @@ def test_a_signal_that_is_missing_is_named_and_comes_with_its_component(
     asyncio.run(look())
 
 
-def test_a_missing_signal_of_a_loop_that_stands_is_named(
+def test_a_missing_signal_of_a_stopped_loop_is_named(
     scope: ScopeProcess, client: rtcf.Client
 ) -> None:
     async def look() -> None:
@@ -151,7 +151,7 @@ def test_a_missing_signal_of_a_loop_that_stands_is_named(
         client.remove_runner("still")
 
 
-def test_traces_above_the_most_of_a_page_are_left_out_by_name(scope: ScopeProcess) -> None:
+def test_traces_above_the_limit_of_a_page_are_left_out_and_named(scope: ScopeProcess) -> None:
     async def look() -> None:
         async with Visit(scope) as page:
             await page.say(watch=["/wave.phase", *GHOSTS[:255], "/wave.wave", "/mimo.out1"])
@@ -170,7 +170,7 @@ def test_traces_above_the_most_of_a_page_are_left_out_by_name(scope: ScopeProces
     asyncio.run(look())
 
 
-def test_more_names_over_all_pages_than_a_page_may_have_are_watched(scope: ScopeProcess) -> None:
+def test_all_pages_together_may_exceed_the_limit_of_a_page(scope: ScopeProcess) -> None:
     async def look() -> None:
         async with contextlib.AsyncExitStack() as pages:
             healthy = await pages.enter_async_context(_Healthy().watching(scope))
@@ -186,7 +186,7 @@ def test_more_names_over_all_pages_than_a_page_may_have_are_watched(scope: Scope
     asyncio.run(look())
 
 
-def test_a_trigger_whose_signal_is_missing_hits_nothing_until_it_is_there(
+def test_a_trigger_on_a_missing_signal_waits_for_the_signal(
     scope: ScopeProcess, client: rtcf.Client
 ) -> None:
     async def look() -> None:
@@ -213,7 +213,7 @@ def test_a_trigger_whose_signal_is_missing_hits_nothing_until_it_is_there(
     asyncio.run(look())
 
 
-def test_a_trigger_that_is_refused_leaves_none_armed(scope: ScopeProcess) -> None:
+def test_a_rejected_trigger_disarms_the_previous_one(scope: ScopeProcess) -> None:
     async def look() -> None:
         async with Visit(scope) as page:
             await page.say(
@@ -229,7 +229,7 @@ def test_a_trigger_that_is_refused_leaves_none_armed(scope: ScopeProcess) -> Non
     asyncio.run(look())
 
 
-def test_a_runner_that_is_not_there_is_trouble_to_its_page_until_it_is(
+def test_a_missing_runner_is_reported_to_its_page_until_it_exists(
     scope: ScopeProcess, client: rtcf.Client
 ) -> None:
     async def look() -> None:
@@ -255,7 +255,7 @@ def test_a_runner_that_is_not_there_is_trouble_to_its_page_until_it_is(
 
 
 class _Control:
-    """A stream of the healthy page's signal that has nothing to do with the scope."""
+    """A stream of the healthy page's signal that bypasses the scope."""
 
     def __init__(self, daemon: Daemon) -> None:
         self.lost = 0
@@ -313,7 +313,7 @@ STEPS = st.lists(
 
 
 class _Others:
-    """Pages beside the healthy one, and what happens to components and to another runner."""
+    """Pages besides the healthy one, and changes of components and of another runner."""
 
     def __init__(self, scope: ScopeProcess, client: rtcf.Client) -> None:
         self._scope = scope
@@ -321,7 +321,7 @@ class _Others:
         self._pages: dict[int, tuple[Visit, ScopePage, asyncio.Task[None]]] = {}
 
     async def do(self, what: str, number: int, told: Any) -> None:
-        """Take one step; what is refused is no matter."""
+        """Run one step; errors do not matter."""
         if what == "open" and number not in self._pages:
             visit = Visit(self._scope, told)
             page = await visit.__aenter__()
@@ -340,7 +340,7 @@ class _Others:
                 await page.say(**{"watch" if what == "watch" else "trigger": told})
 
     async def end(self) -> None:
-        """Close all pages; bring all back to where it was."""
+        """Close all pages; restore the initial state."""
         for number in tuple(self._pages):
             await self._close(number)
         await self._try(lambda: self._client.unload(["extra"]))
@@ -395,7 +395,7 @@ def _check(looping: Daemon, scope: ScopeProcess, steps: list[tuple[str, int, Any
                     await healthy.some()
                     await others.end()
                     await healthy.some()
-                # A machine that stands still loses cycles to all.
+                # A stalled machine loses cycles in every stream.
                 if not control.lost:
                     healthy.check()
             finally:
@@ -418,7 +418,7 @@ def _seeded(most: int) -> Callable[[Any], Any]:
 @hypothesis.example(
     steps=[("open", 0, ""), ("watch", 0, GHOSTS), ("arm", 0, LEVEL | {"signal": "/gone.x"})]
 )
-def test_nothing_that_others_do_reaches_a_healthy_page(
+def test_other_pages_do_not_affect_a_healthy_page(
     looping: Daemon, scope: ScopeProcess, steps: list[tuple[str, int, Any]]
 ) -> None:
     _check(looping, scope, steps)
@@ -427,7 +427,7 @@ def test_nothing_that_others_do_reaches_a_healthy_page(
 @pytest.mark.long
 @_seeded(100)
 @hypothesis.given(steps=STEPS)
-def test_nothing_that_others_do_for_long_reaches_a_healthy_page(
+def test_other_pages_do_not_affect_a_healthy_page_for_long(
     looping: Daemon, scope: ScopeProcess, steps: list[tuple[str, int, Any]]
 ) -> None:
     _check(looping, scope, steps)

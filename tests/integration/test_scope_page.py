@@ -1,4 +1,4 @@
-"""The scope's page in a browser, on a real loop."""
+"""The scope's page in a browser, with a real loop."""
 
 import math
 import re
@@ -18,7 +18,7 @@ _WAVES = 8
 
 @pytest.fixture(scope="module")
 def loop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
-    """Give a daemon with a loop of 2 kHz, of sixteen numbers that move."""
+    """Yield a daemon with a loop of 2 kHz with sixteen changing numbers."""
     daemon = Daemon(tmp_path_factory.mktemp("loop"))
     daemon.start()
     with rtcf.Client(daemon.socket) as client:
@@ -53,7 +53,7 @@ Opener = Callable[..., Page]
 
 @pytest.fixture
 def visit(chromium: Browser) -> Iterator[Opener]:
-    """Give what opens a page of a scope with a layout; it is closed afterwards."""
+    """Yield a function that opens a scope's page with a layout, and closes it after the test."""
     pages = []
 
     def visit(scope: ScopeProcess, layout: str = "") -> Page:
@@ -83,7 +83,7 @@ def _choose_runner(page: Page, runner: str) -> None:
     page.ask(f"{select}.value = {runner!r}; {select}.onchange()")
 
 
-def test_what_was_frozen_stays_while_the_loop_goes_on(visit: Opener, scope: ScopeProcess) -> None:
+def test_a_frozen_view_stays_while_the_loop_continues(visit: Opener, scope: ScopeProcess) -> None:
     page = visit(scope, '{"panes":[{"traces":["/w0.wave"]}],"span":1}')
     page.wait("scope.live.end > 2500")
     page.ask("document.body.dispatchEvent(new KeyboardEvent('keydown', {key: ' ', bubbles: true}))")
@@ -91,15 +91,13 @@ def test_what_was_frozen_stays_while_the_loop_goes_on(visit: Opener, scope: Scop
     page.wait("scope.live.lastTime > scope.view.end + 1")
     assert page.ask("scope.view.end") == end
     assert page.wait("document.getElementById('freeze').textContent === 'Run'")
-    # All of it is there at full rate, and measured.
+    # The frozen span has the full rate, and can be measured.
     page.ask("scope.setCursor('a', scope.view.end - 1); scope.setCursor('b', scope.view.end)")
     page.wait("document.querySelector('caption').textContent.startsWith('between the cursors')")
     page.wait("document.querySelector('.drawer tbody').textContent.includes('/w0.wave')")
 
 
-def test_what_is_so_for_one_cycle_is_shown_in_the_middle(
-    visit: Opener, scope: ScopeProcess
-) -> None:
+def test_a_trigger_on_one_cycle_shows_it_in_the_middle(visit: Opener, scope: ScopeProcess) -> None:
     # A phase of 1 Hz falls in one of 2000 cycles.
     page = visit(
         scope,
@@ -123,7 +121,7 @@ def test_what_is_so_for_one_cycle_is_shown_in_the_middle(
     )
     assert shot["found"] == [[100, 0, True]]
     assert shot["count"] == 200
-    # As many cycles on either side; a busy machine leaves some out, and these take time, too.
+    # The same number of cycles on both sides; a busy machine drops some, whose time counts, too.
     assert abs(shot["begin"] + shot["end"]) < 0.2 * (shot["end"] - shot["begin"])
     assert page.errors == []
 
@@ -136,11 +134,9 @@ _SIGNAL = "document.querySelector('#trigger [name=signal]')"
 _SAID = "document.querySelector('#trigger [name=state]').textContent"
 
 
-def test_a_bookmarked_trigger_is_armed_on_the_signal_that_it_says(
-    visit: Opener, scope: ScopeProcess
-) -> None:
+def test_a_bookmarked_trigger_is_armed_on_its_signal(visit: Opener, scope: ScopeProcess) -> None:
     page = visit(scope, _TRIGGER.format("/w3.wave", 1e9))
-    # Before the page knows what signals there are, and with them.
+    # Before the page has the list of signals, and after.
     for known in ("", "&& scope.catalog.length > 2"):
         page.wait(f"scope.mode === 'trigger' {known}")
         _press(page, "#trigger [name=arm]")
@@ -155,7 +151,7 @@ def test_a_bookmarked_trigger_is_armed_on_the_signal_that_it_says(
     assert page.errors == []
 
 
-def test_a_trigger_whose_signal_has_gone_says_so_and_arms_no_other(
+def test_a_trigger_on_a_removed_signal_reports_it_and_arms_no_other(
     visit: Opener, scope: ScopeProcess
 ) -> None:
     page = visit(scope, _TRIGGER.format("/gone.wave", -1e9))
@@ -168,14 +164,14 @@ def test_a_trigger_whose_signal_has_gone_says_so_and_arms_no_other(
     assert page.ask("document.getElementById('trouble').textContent") == (
         "the trigger waits until its signals exist: /gone.wave"
     )
-    # Another one is chosen: it is armed, and hits.
+    # The user selects another signal: the trigger is armed, and hits.
     page.ask(f"{_SIGNAL}.value = '/w2.wave'; {_SIGNAL}.onchange()")
     page.wait("scope.trigger.state === 'done' && scope.shot")
     page.wait("document.getElementById('trouble').hidden")
     assert page.errors == []
 
 
-def test_what_is_armed_ends_with_a_layout_and_with_a_change_of_runner(
+def test_a_new_layout_or_runner_disarms_the_trigger(
     visit: Opener, scope: ScopeProcess, loop: Daemon
 ) -> None:
     page = visit(scope, _TRIGGER.format("/w3.wave", 1e9))
@@ -214,7 +210,7 @@ def test_what_is_armed_ends_with_a_layout_and_with_a_change_of_runner(
     assert page.errors == []
 
 
-def test_the_legend_of_a_shot_tells_the_values_of_its_hit(
+def test_the_legend_of_a_shot_shows_the_values_at_its_hit(
     visit: Opener, scope: ScopeProcess
 ) -> None:
     page = visit(scope, _TRIGGER.format("/w0.phase", 0.5))
@@ -233,7 +229,7 @@ def test_the_legend_of_a_shot_tells_the_values_of_its_hit(
     assert told[0] == told[1] != told[2]
 
 
-def test_a_layout_with_a_signal_twice_is_right_in_the_rest(
+def test_a_layout_with_a_duplicate_signal_keeps_the_others(
     visit: Opener, scope: ScopeProcess
 ) -> None:
     page = visit(
@@ -249,7 +245,7 @@ def test_a_layout_with_a_signal_twice_is_right_in_the_rest(
     assert page.errors == []
 
 
-def test_a_bookmark_with_nonsense_opens(visit: Opener, scope: ScopeProcess) -> None:
+def test_an_invalid_bookmark_opens(visit: Opener, scope: ScopeProcess) -> None:
     for layout in (
         "null", "3", '"x"', "[]", '{"panes":{}}',
         '{"trigger":{"kind":"loud","low":"x"},"mode":"trigger"}',
@@ -275,7 +271,9 @@ def test_escape_ends_the_search(visit: Opener, scope: ScopeProcess) -> None:
     assert page.ask("document.querySelectorAll('#tree .leaf').length") == all_of_them
 
 
-def test_cycles_before_a_page_was_opened_are_not_missed(visit: Opener, scope: ScopeProcess) -> None:
+def test_cycles_before_a_page_opens_do_not_count_as_dropped(
+    visit: Opener, scope: ScopeProcess
+) -> None:
     for _ in range(2):
         page = visit(scope, '{"panes":[{"traces":["/w5.wave"]}]}')
         page.wait("scope.live.end > 1000")
@@ -336,7 +334,7 @@ def test_a_slider_sets_the_parameter_of_the_running_component(
     )
     with rtcf.Client(loop.socket) as client:
         wait_for(lambda: _amplitude(client) == 1.5, "the slider's value in the loop")
-        # Dragging is a preview: only its end is a change.
+        # Dragging is a preview; only its end is a change.
         changes = [each for each in client.get_history("w1", "amplitude") if each.how != "load"]
         assert [each.value.double_value for each in changes] == [1.5]
         undo = "[...document.querySelectorAll('#parameters > button')]"
@@ -344,7 +342,7 @@ def test_a_slider_sets_the_parameter_of_the_running_component(
         page.ask(f"{undo}[0].click()")
         wait_for(lambda: _amplitude(client) == before, "the value before")
         page.wait(f"{undo}[0].hidden")
-    # The page says who it was, and follows what others set.
+    # The page names the user, and follows changes by others.
     page.wait("document.querySelector('[data-who=\"/w1.amplitude\"]').textContent")
     with rtcf.Client(loop.socket) as client:
         client.set_parameters("w1", [spec.parse_parameter("amplitude:=0.5")])
@@ -352,7 +350,7 @@ def test_a_slider_sets_the_parameter_of_the_running_component(
     assert page.errors == []
 
 
-def test_what_is_logged_is_a_mark_at_its_cycle(
+def test_a_log_record_is_a_mark_at_its_cycle(
     visit: Opener, scope: ScopeProcess, loop: Daemon
 ) -> None:
     page = visit(scope, '{"panes":[{"traces":["/w7.wave"]}]}')
@@ -365,7 +363,7 @@ def test_what_is_logged_is_a_mark_at_its_cycle(
             ".includes('/w7: amplitude 9.5 is large')"
         )
         client.set_parameters("w7", [spec.parse_parameter("amplitude:=1.0")])
-    # Within the second that the values come from.
+    # Near the time of the newest values.
     assert page.ask(
         """(() => {
           const mark = scope.marks().find((each) => each.event.what === "warn");
@@ -375,7 +373,9 @@ def test_what_is_logged_is_a_mark_at_its_cycle(
     assert page.errors == []
 
 
-def test_figures_and_spectra_of_known_values_are_right(visit: Opener, scope: ScopeProcess) -> None:
+def test_measurements_and_spectra_of_known_values_are_right(
+    visit: Opener, scope: ScopeProcess
+) -> None:
     page = visit(scope)
     page.wait("scope.rate")
     found = page.ask(
@@ -396,7 +396,7 @@ def test_figures_and_spectra_of_known_values_are_right(visit: Opener, scope: Sco
     assert found["hertz"] == 125.0
     assert math.isclose(found["size"], 3.0, rel_tol=1e-6)
     assert math.isclose(found["frequency"], 125.0, rel_tol=1e-6)
-    # Of a first order with 0.1 s: ln 9 and ln 50 of it, the second from 10 % on.
+    # For a first-order system with 0.1 s: ln 9 and ln 50 times that, the second from 10 % on.
     assert abs(found["step"]["rise"] - 0.1 * math.log(9)) < 2e-3
     assert found["step"]["overshoot"] < 1e-6
     assert abs(found["step"]["settling"] - 0.1 * (math.log(50) - math.log(10 / 9))) < 2e-3

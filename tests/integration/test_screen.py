@@ -1,4 +1,4 @@
-"""`rtcfctl top` and `plot`: on a terminal, which is left as it was found, and elsewhere."""
+"""`rtcfctl top` and `plot`: in a terminal, which is restored afterwards, and elsewhere."""
 
 import json
 import re
@@ -26,16 +26,16 @@ def terminals() -> Iterator[list[Terminal]]:
 
 
 def rows(picture: str) -> list[str]:
-    """Return the components in a picture of top."""
+    """Return the components on a screen of top."""
     return [line.split()[0] for line in picture.split("\n") if line.startswith("/")]
 
 
-def test_top_draws_what_a_loop_costs(running: Daemon, terminals: list[Terminal]) -> None:
+def test_top_shows_the_durations_of_a_loop(running: Daemon, terminals: list[Terminal]) -> None:
     terminals.append(terminal := Terminal(running, "top", "--interval", "200ms"))
     picture = terminal.see(r"/mimo +\d+\.\d\d")
     assert picture.startswith("rt_runner  running  1000 Hz  cycle ")
     assert rows(picture) == ["/mimo", "/wave"]
-    terminal.press(b"s")  # by the mean: a sine takes longest
+    terminal.press(b"s")  # by mean duration: a sine is slowest
     assert "▼MEAN" in terminal.see(r"^/wave[^\n]*\n/mimo")
     terminal.press(b"o")
     terminal.see(r"^/mimo[^\n]*\n/wave")
@@ -48,7 +48,7 @@ def test_top_draws_what_a_loop_costs(running: Daemon, terminals: list[Terminal])
 
 @pytest.fixture
 def many(daemon: Daemon, client: rtcf.Client) -> Iterator[Daemon]:
-    """Give `daemon` with a loop of many components that runs."""
+    """Yield `daemon` with a running loop of many components."""
     client.apply(graphs.chain(_MANY))
     client.start()
     yield daemon
@@ -56,7 +56,7 @@ def many(daemon: Daemon, client: rtcf.Client) -> Iterator[Daemon]:
 
 
 @pytest.mark.parametrize(("columns", "lines"), _SIZES)
-def test_all_of_the_head_fits_a_terminal(
+def test_the_whole_head_fits_the_terminal(
     many: Daemon, terminals: list[Terminal], columns: int, lines: int
 ) -> None:
     terminal = Terminal(many, "top", "--interval", "200ms", columns=columns, lines=lines)
@@ -70,7 +70,7 @@ def test_all_of_the_head_fits_a_terminal(
     assert re.search(r"mean +\d+\.\d\d  p99 +\d+\.\d\d  max +\d+\.\d+ µs", calculation)
     (counts,) = (each for each in picture if " missed" in each)
     assert re.fullmatch(r"\d+ overruns?, \d+ missed, \d+ page faults?", counts)
-    # What is missing for real time, which machines that run tests lack, is folded, not cut.
+    # Missing real-time rights, as on machines that run tests, are wrapped, not cut.
     assert not any("…" in each for each in picture)
     (title,) = (each for each in picture if each.startswith("COMPONENT"))
     for word in ("MEAN", "P99", "MAX", "SHARE", "OVER"):
@@ -91,17 +91,17 @@ def test_all_components_can_be_scrolled_to(many: Daemon, terminals: list[Termina
 
     for keys, first in (
         (b"\x1b[B", 1), (b"j", 2), (b"\x1b[A", 1), (b"k", 0), (b"k", 0),
-        (b"jjj\x1b[B\x1b[Bkk", 3),  # as fast as a key that is held down
+        (b"jjj\x1b[B\x1b[Bkk", 3),  # as fast as a held key
         (b"\x1b[6~", 3 + room - 1), (b"\x1b[5~", 3), (b"\x1bOF", _MANY - room),
         (b"\x1b[6~", _MANY - room), (b"\x1b[H", 0), (b"\x1b[F", _MANY - room), (b"\x1b[1~", 0),
-        (b"\x1b[200~\x1b[99;1u\x1bx", 0),  # keys that mean nothing
+        (b"\x1b[200~\x1b[99;1u\x1bx", 0),  # keys without a function
     ):  # fmt: skip
         terminal.press(keys)
         at(first)
     for first in range(room - 1, _MANY, room - 1):
         terminal.press(b" ")
         at(min(first, _MANY - room))
-    # Another order begins at its top.
+    # A new sort order starts at its top.
     terminal.press(b"n")
     terminal.see(rf"^1 to {room} of 200 components, by name$")
     terminal.press(b"w")
@@ -111,7 +111,7 @@ def test_all_components_can_be_scrolled_to(many: Daemon, terminals: list[Termina
     assert b"Traceback" not in terminal.shown
 
 
-def test_a_new_size_is_drawn_at_once(many: Daemon, terminals: list[Terminal]) -> None:
+def test_a_new_size_is_drawn_immediately(many: Daemon, terminals: list[Terminal]) -> None:
     terminals.append(terminal := Terminal(many, "top", "--interval", "60s"))
     terminal.see(r"^1 to 1\d of 200")
     terminal.press(b"\x1b[F")
@@ -145,7 +145,7 @@ def test_the_terminal_is_left_as_it_was_found(
     assert termios.tcgetattr(terminal.theirs) == terminal.before
 
 
-def test_top_goes_on_without_rtcfd_and_says_so(
+def test_top_continues_without_rtcfd_and_reports_it(
     daemon: Daemon, client: rtcf.Client, terminals: list[Terminal]
 ) -> None:
     client.load(rtcf.component("rtcf_examples", "Wave", name="wave"))
@@ -157,7 +157,7 @@ def test_top_goes_on_without_rtcfd_and_says_so(
     terminal.see(r"rt_runner  stopped")
 
 
-def test_elsewhere_each_look_is_a_table(running: Daemon) -> None:
+def test_without_a_terminal_top_prints_tables(running: Daemon) -> None:
     done = running.ctl("top", "-n", "2", "--interval", "100ms")
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("COMPONENT") == 2
@@ -172,7 +172,7 @@ def test_plot_draws_curves(running: Daemon, terminals: list[Terminal]) -> None:
     head, *lines, below = done.stdout.splitlines()
     assert "/wave.wave" in head and "/wave.phase" in head
     assert len(lines) == 22 and below.split() == ["-1", "s", "now"]
-    # From one end to the other, as a whole wave is in sight.
+    # The curve spans the whole width, since a whole wave is visible.
     assert all(any("\u2800" < each <= "\u28ff" for each in line) for line in lines)
     assert (lines[0].split()[0], lines[-1].split()[0]) == ("1", "-1")
     terminals.append(terminal := Terminal(running, "plot", "wave", "--span", "500ms"))
@@ -194,7 +194,7 @@ def test_plot_draws_curves(running: Daemon, terminals: list[Terminal]) -> None:
         (("plot", "wave", "-o", "json"), 2, "plot has no output for programs"),
     ],
 )
-def test_refused_in_a_line(running: Daemon, words: tuple[str, ...], code: int, said: str) -> None:
+def test_errors_are_one_line(running: Daemon, words: tuple[str, ...], code: int, said: str) -> None:
     done = running.ctl(*words)
     assert done.returncode == code
     assert said in done.stderr.splitlines()[-1]

@@ -1,4 +1,4 @@
-"""Two components that write one name: allowed where no input reads it, on ROS too, and said."""
+"""Two components that write one name: allowed, with a note, while no input reads it; ROS, too."""
 
 import subprocess
 
@@ -9,11 +9,13 @@ from ros_processes import Master
 
 @pytest.fixture
 def settings(master: Master) -> str:
-    """Let the loops of `daemon` have a ROS node."""
+    """Return settings with a ROS node for the loops of `daemon`."""
     return with_ros(master.uri, "/shared")
 
 
-def test_two_writers_share_a_topic_until_somebody_reads_it(daemon: Daemon, master: Master) -> None:
+def test_two_writers_can_share_a_topic_until_an_input_reads_it(
+    daemon: Daemon, master: Master
+) -> None:
     for name, amplitude in (("one", "1.0"), ("five", "5.0")):
         done = daemon.ctl(
             *("load", "rtcf_examples", "Wave", "--name", name, "--remap", "wave:=/shared"),

@@ -1,4 +1,4 @@
-"""A loop that follows /clock: its cycles, their times, and what it reads."""
+"""A loop that follows /clock: its cycles, their times, and its inputs."""
 
 import re
 import subprocess
@@ -34,12 +34,12 @@ class Clock:
         )
 
     def wait_until_connected(self) -> None:
-        """Return when all who are to listen do."""
+        """Wait until all subscribers are connected."""
         assert self._process.stdout is not None
         assert self._process.stdout.readline() == "connected\n"
 
     def tick(self, *ticks_ns: int) -> None:
-        """Let the clock show these times, one after another."""
+        """Publish these times, one after another."""
         assert self._process.stdin is not None
         self._process.stdin.write("".join(f"{tick}\n" for tick in ticks_ns))
         self._process.stdin.flush()
@@ -52,7 +52,7 @@ class Clock:
 
 @pytest.fixture
 def simulated(master: Master) -> Iterator[Master]:
-    """Give a master whose nodes are to follow /clock."""
+    """Yield a master whose nodes follow /clock."""
     parameters = rosgraph.Master("/test", master.uri)
     parameters.setParam("/use_sim_time", True)
     yield master
@@ -61,7 +61,7 @@ def simulated(master: Master) -> Iterator[Master]:
 
 @pytest.fixture
 def client(tmp_path: Path, simulated: Master) -> Iterator[rtcf.Client]:
-    """Give a daemon whose loop counts its cycles and passes on /in."""
+    """Yield a client of a daemon whose loop counts its cycles and forwards /in."""
     daemon = Daemon(tmp_path, with_ros(simulated.uri, "/in|/out"))
     daemon.start()
     with rtcf.Client(daemon.socket) as client:
@@ -77,7 +77,7 @@ def client(tmp_path: Path, simulated: Master) -> Iterator[rtcf.Client]:
 
 @pytest.fixture
 def clock(tmp_path: Path, simulated: Master, client: rtcf.Client) -> Iterator[Clock]:
-    """Give a clock that a running loop listens to."""
+    """Yield a clock to which a running loop is connected."""
     client.start()
     node = state(client).ros.node
     wait_for(lambda: node in simulated.subscribers("/clock"), "the loop's subscription")
@@ -95,7 +95,7 @@ def _wait_for_exactly(client: rtcf.Client, cycles: int) -> None:
 
 
 @pytest.mark.parametrize("rate_hz", [100, 999, 1001])
-def test_a_clock_of_any_rate_makes_the_exact_number_of_cycles(
+def test_a_clock_of_any_rate_gives_the_exact_number_of_cycles(
     client: rtcf.Client, clock: Clock, rate_hz: int
 ) -> None:
     status = state(client)
@@ -103,14 +103,12 @@ def test_a_clock_of_any_rate_makes_the_exact_number_of_cycles(
     assert status.iteration == 0
     seconds = 5
     clock.tick(*(k * SECOND // rate_hz for k in range(1, seconds * rate_hz + 1)))
-    # From the first tick to the last, both included.
+    # From the first tick to the last one, both included.
     first, last = SECOND // rate_hz, seconds * SECOND
     _wait_for_exactly(client, (last - first) // 1_000_000 + 1)
 
 
-def test_a_clock_that_stands_stops_the_loop_and_nothing_else(
-    client: rtcf.Client, clock: Clock
-) -> None:
+def test_a_stopped_clock_stops_only_the_loop(client: rtcf.Client, clock: Clock) -> None:
     clock.tick(5 * SECOND, 5 * SECOND, 5 * SECOND + 10_000_000)
     _wait_for_exactly(client, 11)
     # Changes and queries do not wait for the clock.
@@ -123,12 +121,12 @@ def test_a_clock_that_stands_stops_the_loop_and_nothing_else(
     assert state(client).state == runner_pb2.RUNNER_STATE_STOPPED
 
 
-def test_a_jump_begins_anew_with_one_cycle_and_is_said(
+def test_a_jump_of_the_clock_runs_one_cycle_and_is_reported(
     client: rtcf.Client, clock: Clock, tmp_path: Path
 ) -> None:
     clock.tick(SECOND, SECOND + 5_000_000)
     _wait_for_exactly(client, 6)
-    clock.tick(0, 3_000_000)  # a bag that begins again
+    clock.tick(0, 3_000_000)  # a bag that starts again
     _wait_for_exactly(client, 10)
     clock.tick(60 * SECOND)  # further than max_clock_jump_s
     _wait_for_exactly(client, 11)
@@ -138,7 +136,7 @@ def test_a_jump_begins_anew_with_one_cycle_and_is_said(
     assert log.read_text().count("the simulated clock begins at 1.000000000 s") == 1
 
 
-def test_what_peers_are_told_has_the_simulations_time(
+def test_published_stamps_have_simulated_time(
     client: rtcf.Client, clock: Clock, simulated: Master
 ) -> None:
     listener = simulated.node("rosout", state(client).ros.node)
@@ -157,7 +155,7 @@ def test_what_peers_are_told_has_the_simulations_time(
     wait_for(lambda: "secs: 60\n" in stamp(), "diagnostics of that second")
 
 
-def test_a_loop_that_is_not_to_follow_the_clock_does_not(client: rtcf.Client) -> None:
+def test_a_loop_can_ignore_the_clock(client: rtcf.Client) -> None:
     client.set_runner(runner_pb2.RunnerSettings(sim_time=runner_pb2.SIM_TIME_NEVER))
     client.start()
     wait_for(lambda: iteration(client) > 10, "cycles in real time")
@@ -173,13 +171,13 @@ def _play(
     slower: int = 1,
     clock_peers: int = 0,
 ) -> None:
-    """Play a bag of these values, 100 a second, and a bit more, to the loop and some peers; a tick
-    comes for two values."""
+    """Play a bag of these values, 100 per second, and some more time, to the loop and some peers,
+    with a tick per two values."""
     bag_file = folder / "in.bag"
     with rosbag.Bag(str(bag_file), "w") as bag:
         for index, value in enumerate(values):
             bag.write("/in", Float64(value), rospy.Time.from_sec(1000.0 + index / 100.0))
-        # A tick is to come after the last value.
+        # A tick must follow the last value.
         bag.write("/end", Float64(), rospy.Time.from_sec(1000.2 + len(values) / 100.0))
     loop = state(client).ros.node
     with subprocess.Popen(
@@ -200,7 +198,7 @@ def _play(
                 there = loop in clock and loop in simulated.listeners(player, "/in")
                 return there and peers == clock_peers
 
-            wait_for(heard, "all who are to hear the player")
+            wait_for(heard, "all subscribers of the player")
             simulated.call(f"{player}/pause_playback", "{data: false}")
             assert playing.wait(DEADLINE_S) == 0
         finally:
@@ -208,12 +206,12 @@ def _play(
 
 
 def _player(simulated: Master) -> str:
-    """Return the node that plays a bag, once it can be told to go on; else nothing."""
+    """Return the node that plays a bag, once it can be resumed; else an empty text."""
     services = (name.rpartition("/") for name in simulated.services())
     return next((node for node, _, name in services if name == "pause_playback"), "")
 
 
-def test_a_topic_faster_than_the_loop_is_not_delayed_but_passed_over(
+def test_a_topic_faster_than_the_loop_is_decimated_not_delayed(
     client: rtcf.Client, simulated: Master, tmp_path: Path
 ) -> None:
     client.set_runner(runner_pb2.RunnerSettings(frequency_hz=10.0))
@@ -223,14 +221,14 @@ def test_a_topic_faster_than_the_loop_is_not_delayed_but_passed_over(
     _play(client, simulated, tmp_path, [float(k) for k in range(1, 201)])
     wait_for(lambda: 200.0 in out.values(), "the newest value")
     passed = out.values()
-    # One a cycle; two seconds of input and a bit without.
+    # One per cycle; two seconds of input and some time without.
     assert len(passed) <= iteration(client) < 40
     assert passed == sorted(passed)
     wait_for(lambda: state(client).ros.passed_over == 200 - len(passed), "the count of the others")
     out.end()
 
 
-def test_a_bag_that_is_played_loses_no_input_and_no_cycle(
+def test_a_played_bag_loses_no_input_and_no_cycle(
     client: rtcf.Client, simulated: Master, tmp_path: Path
 ) -> None:
     values = [float(k) for k in range(1, 101)]
@@ -247,15 +245,15 @@ def test_a_bag_that_is_played_loses_no_input_and_no_cycle(
         return [int(line) for line in heard.read_text().split("\n")[:-1] if line.isdigit()]
 
     try:
-        # So slowly that values do not come together, held up on a busy machine: of such, the newest
-        # counts.
+        # So slowly that values arrive separately. On a busy machine some may arrive together; then
+        # the newest applies.
         _play(client, simulated, tmp_path, values, slower=10, clock_peers=1)
 
         def lost() -> int:
             return int(state(client).ros.passed_over)
 
-        wait_until_it_is(len(values), lambda: lost() + len(out.values()), "the values told of")
-        # Without a queue it would be one of the two that come between ticks, each time.
+        wait_until_it_is(len(values), lambda: lost() + len(out.values()), "the number of values")
+        # Without a queue, one of the two values between ticks would be lost each time.
         assert lost() < 0.4 * len(values)
         assert is_among(out.values(), values)
         out.end()
@@ -263,7 +261,7 @@ def test_a_bag_that_is_played_loses_no_input_and_no_cycle(
         assert begin
         first = int(begin[1] + begin[2])
         assert first in shown()
-        # The clock stands: what both still have to hear comes in the end.
+        # The clock has stopped: both receive the remaining ticks eventually.
         wait_until_it_is(
             0,
             lambda: iteration(client) - (shown()[-1] - first) // 1_000_000 - 1,

@@ -1,4 +1,4 @@
-"""Snapshots: taken and restored by command, of random graphs, with the same bits afterwards."""
+"""Snapshots: taken and restored by command, of random graphs, with identical bits afterwards."""
 
 import os
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ HEADER = 24  # bytes of a file before its message
 
 
 def _snapshot(client: rtcf.Client) -> snapshot_pb2.RunnerSnapshot:
-    """Return a snapshot, without the time at which it was taken."""
+    """Return a snapshot without its time stamp."""
     message = snapshot_pb2.RunnerSnapshot()
     message.ParseFromString(client.take_snapshot().snapshot[HEADER:])
     message.taken_ns = 0
@@ -29,7 +29,7 @@ def _snapshot(client: rtcf.Client) -> snapshot_pb2.RunnerSnapshot:
 
 @st.composite
 def chaoses(draw: st.DrawFn) -> list[graph_pb2.ComponentSpec]:
-    """Draw a graph in which anything may read anything, one cycle late where it has to."""
+    """Draw a graph in which any input may read any output, one cycle late where necessary."""
     names = draw(st.lists(st.sampled_from(NAMES), min_size=1, max_size=5, unique=True))
     specs = []
     for index, full_name in enumerate(names):
@@ -43,7 +43,7 @@ def chaoses(draw: st.DrawFn) -> list[graph_pb2.ComponentSpec]:
             "frame": ["turned"],
             "list": ["listed"],
         }.items():
-            source = draw(st.integers(0, len(names)))  # the last: none
+            source = draw(st.integers(0, len(names)))  # the last one: no source
             if source == len(names):
                 remaps.append(f"{port}:=/nothing_{name}_{port}")
                 continue
@@ -67,7 +67,7 @@ def chaoses(draw: st.DrawFn) -> list[graph_pb2.ComponentSpec]:
 
 @pytest.fixture(scope="module")
 def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[rtcf.Client]:
-    """Give a client of a daemon that all examples share."""
+    """Yield a client of a daemon shared by all examples."""
     daemon = Daemon(tmp_path_factory.mktemp("daemon"), NO_ROS)
     daemon.start()
     with rtcf.Client(daemon.socket) as client:
@@ -83,14 +83,14 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[rtcf.Client]:
 @hypothesis.given(
     before=chaoses(), graph=chaoses(), warm_up=st.integers(0, 40), late=st.integers(0, 40)
 )
-def test_any_graph_goes_on_with_the_same_bits(
+def test_any_graph_continues_with_the_same_bits(
     shared: rtcf.Client,
     before: list[graph_pb2.ComponentSpec],
     graph: list[graph_pb2.ComponentSpec],
     warm_up: int,
     late: int,
 ) -> None:
-    """What inputs have of an earlier graph is part of it."""
+    """Input values from an earlier graph are part of the snapshot."""
     shared.stop()
     shared.apply([], "rt_runner")
     shared.apply(before, "rt_runner")
@@ -137,7 +137,7 @@ def test_commands_take_and_restore_in_a_running_loop(
     assert "running" in daemon.ctl("status").stdout, status
 
 
-def test_what_a_snapshot_sets_outlives_the_daemon(daemon: Daemon, client: rtcf.Client) -> None:
+def test_restored_values_outlive_the_daemon(daemon: Daemon, client: rtcf.Client) -> None:
     client.load(_chaos(3.7))
     taken = client.take_snapshot().snapshot
     client.set_parameters("chaos", [rtcf.parse_parameter("rate:=3.9")])
@@ -146,9 +146,7 @@ def test_what_a_snapshot_sets_outlives_the_daemon(daemon: Daemon, client: rtcf.C
     assert _rate(client) == 3.7
 
 
-def test_refusals_say_what_does_not_fit(
-    daemon: Daemon, client: rtcf.Client, tmp_path: Path
-) -> None:
+def test_errors_name_the_mismatch(daemon: Daemon, client: rtcf.Client, tmp_path: Path) -> None:
     file = tmp_path / "a.rtcf"
     assert "No such file" in daemon.ctl("restore", str(file)).stderr
     client.load(_chaos())

@@ -1,7 +1,7 @@
-"""Random changes of a graph while its loop runs at 2 kHz: the graph is always what a reference
-model says, and the loop does not feel them.
+"""Random changes of a graph while its loop runs at 2 kHz: the graph always matches a reference
+model, and the loop is undisturbed.
 
-The changes come from hypothesis, which makes a failure small; `RTCF_SEED` chooses others.
+hypothesis generates the changes and shrinks a failure; `RTCF_SEED` selects others.
 """
 
 import json
@@ -24,21 +24,21 @@ from realtime_thread import RealtimeThread, resident_kb
 from rtcf.v1 import control_pb2, graph_pb2
 from values import iteration, number, port_value
 
-# Without a heap in reserve, so that what leaks shows at once.
+# Without reserved heap, so that leaks show immediately.
 SETTINGS = "[runner]\nfrequency_hz = 2000.0\nheap_kb = 0\n[runner.ros]\nenabled = false\n"
-STEADY = "/steady"  # a component that nothing touches
+STEADY = "/steady"  # a component that no change touches
 CHANGES_PER_RUN = 50
 SEED = int(os.environ.get("RTCF_SEED", "2021"))
 
 NAMES = ["/a", "/b", "/c", "/n/d", "/n/e", "/f"]
-picks = st.integers(0, 15)  # which of those that there are, or that there are not
+picks = st.integers(0, 15)  # index of an existing component, or a missing one
 wires = st.sampled_from([f"/w{i}" for i in range(5)])
-levels = st.sampled_from([*["/v0", "/v1", "/v2"] * 3, "/w0"])  # of another type
+levels = st.sampled_from([*["/v0", "/v1", "/v2"] * 3, "/w0"])  # a level of another type
 inputs = st.sampled_from([*["in1", "in2", "level"] * 6, "in9"])
 
 
 def batches(min_size: int = 0) -> st.SearchStrategy[dict[str, int]]:
-    """Draw values for up to two parameters, some of which are refused."""
+    """Draw values for up to two parameters, some of them invalid."""
     return st.dictionaries(
         st.sampled_from([*["offset", "gain"] * 8, "ofset"]),
         st.sampled_from([*range(10)] * 3 + [-1, -9, 13, 101]),
@@ -49,10 +49,10 @@ def batches(min_size: int = 0) -> st.SearchStrategy[dict[str, int]]:
 
 @st.composite
 def mixers(draw: st.DrawFn) -> Mixer:
-    """Draw a component, which may be one that is refused."""
+    """Draw a component, which may be invalid."""
     name = draw(st.sampled_from(NAMES))
     chosen: dict[str, str] = {}
-    # What it writes mostly has a name of its own, as two writers of one name are refused.
+    # Outputs mostly have private names, since two writers of one name are rejected.
     own = name[-1]
     for port, pool in {
         "in1": wires | st.sampled_from(["/wa", "/wb", "/wc", "/wd"]),
@@ -77,18 +77,18 @@ def mixers(draw: st.DrawFn) -> Mixer:
 
 @dataclass
 class Soak:
-    """A daemon whose loop runs through all runs of the machine below, and what was counted."""
+    """A daemon whose loop runs through all runs of the machine below, and the counts of changes."""
 
     daemon: Daemon
     client: rtcf.Client
     changes: int = 0
     refusals: int = 0
-    accepted: Counter[str] = field(default_factory=Counter)  # of each kind
+    accepted: Counter[str] = field(default_factory=Counter)  # by kind
     resident_kb: list[int] = field(default_factory=list)  # of the executor, after each run
 
 
 class GraphMachine(stateful.RuleBasedStateMachine):
-    """The graph beside its model; `soak` is set by the test."""
+    """The graph and its model; the test sets `soak`."""
 
     soak: Soak
 
@@ -100,14 +100,14 @@ class GraphMachine(stateful.RuleBasedStateMachine):
 
     @stateful.initialize()
     def begin(self) -> None:
-        # Hypothesis runs what failed once more.
+        # Hypothesis repeats a failed run.
         self.client.stop()
         self.client.apply([], "rt_runner")
         self.client.apply([_steady()], "rt_runner")
         self._start()
 
     def _there(self, pick: int) -> str:
-        """Return the name of a component, which is there in most cases."""
+        """Return the name of a component, which exists in most cases."""
         there = sorted(self.graph)
         return there[pick % len(there)] if there and pick < 15 else NAMES[-1]
 
@@ -181,7 +181,7 @@ class GraphMachine(stateful.RuleBasedStateMachine):
         others=st.lists(mixers(), max_size=2), gone=st.sets(st.sampled_from(NAMES), max_size=2)
     )
     def apply(self, others: list[Mixer], gone: set[str]) -> None:
-        """Make the graph another one, of which a part stays as it is."""
+        """Replace the graph with another one, of which a part stays unchanged."""
         new = {mixer.name: mixer for mixer in others}
         kept = [mixer for name, mixer in self.graph.items() if name not in gone | new.keys()]
         wanted = [*kept, *others]
@@ -196,9 +196,9 @@ class GraphMachine(stateful.RuleBasedStateMachine):
     @stateful.precondition(lambda self: len(self.graph) > 2)
     @stateful.rule()
     def values(self) -> None:
-        """Stop the loop, step it and compare each value; then let it run on."""
+        """Stop the loop, step it and compare each value; then start it again."""
         self._end_of_loop()
-        self.client.step(12)  # each component has run, whatever its rate
+        self.client.step(12)  # each component has run at any rate
         values = self._values()
         for cycle in range(12, 15):
             values = model.run_cycle(self.graph, cycle, values)
@@ -240,14 +240,14 @@ class GraphMachine(stateful.RuleBasedStateMachine):
 
     def teardown(self) -> None:
         if not self.running:
-            return  # a failure has come before
+            return  # after a failure
         self._end_of_loop()
         self._saved()
         self.client.unload([*self.graph, STEADY])
         self.soak.resident_kb.append(resident_kb(self.thread.process))
 
     def _change(self, kind: str, expect: Callable[[], Graph], change: Callable[[], object]) -> None:
-        """Make a change that the model accepts; or see it refused, with nothing changed."""
+        """Make a change that the model accepts; or check that it fails without any change."""
         self.soak.changes += 1
         try:
             graph = expect()
@@ -271,18 +271,18 @@ class GraphMachine(stateful.RuleBasedStateMachine):
         self.thread = RealtimeThread(self.client)
 
     def _end_of_loop(self) -> None:
-        """Stop the loop, which has felt nothing of the changes."""
+        """Stop the loop, which the changes did not disturb."""
         self.thread.check()
         self.running = False
         self.client.stop()
         updates = port_value(self.client, STEADY, "out") - self.steady_before
-        assert updates == iteration(self.client), "one in each cycle"
+        assert updates == iteration(self.client), "one update per cycle"
 
     def _generation(self) -> int:
         return int(self.client.get_status("rt_runner").runners[0].generation)
 
     def _values(self) -> Values:
-        """Return the values of outputs, and of inputs that nobody writes."""
+        """Return the values of outputs, and of inputs without a writer."""
         found: Values = {}
         for name in self.graph:
             for port in self.client.get_component(name).ports:
@@ -291,7 +291,7 @@ class GraphMachine(stateful.RuleBasedStateMachine):
         return found
 
     def _saved(self) -> None:
-        """The state on disk is the graph, too."""
+        """Check that the state on disk is the same graph."""
         file = self.soak.daemon.socket.with_name("state") / "rt_runner.json"
         saved = {
             f"{each['ns'].rstrip('/')}/{each['name']}": each
@@ -318,7 +318,7 @@ def _steady() -> graph_pb2.ComponentSpec:
 
 @pytest.fixture
 def soak(tmp_path: Path) -> Iterator[Soak]:
-    """Give a daemon with a loop at 2 kHz."""
+    """Yield a soak with a loop at 2 kHz."""
     daemon = Daemon(tmp_path, SETTINGS)
     daemon.start()
     with rtcf.Client(daemon.socket) as client:
@@ -326,7 +326,7 @@ def soak(tmp_path: Path) -> Iterator[Soak]:
     daemon.end()
 
 
-# Hypothesis begins with some runs that are short.
+# Hypothesis starts with some short runs.
 @pytest.mark.parametrize(
     ("runs", "changes"), [(20, 200), pytest.param(230, 10_000, marks=pytest.mark.long)]
 )
@@ -343,7 +343,7 @@ def test_random_changes_leave_the_graph_of_the_model(soak: Soak, runs: int, chan
             deadline=None,
             database=None,
             suppress_health_check=list(hypothesis.HealthCheck),
-            # A failure is told as it was: a loop that has failed once is not to be shrunk.
+            # Report a failure as it occurred: a loop that has failed cannot be shrunk.
             phases=[hypothesis.Phase.generate],
             print_blob=False,
         ),
@@ -356,7 +356,7 @@ def test_random_changes_leave_the_graph_of_the_model(soak: Soak, runs: int, chan
     assert soak.changes >= changes
     assert soak.refusals > 0
     kinds = {"load", "unload", "replacement", "rewire", "breaks", "parameters", "apply"}
-    assert soak.accepted.keys() == kinds, "each kind of change was really made"
-    # All tables have grown once after some hundred changes.
+    assert soak.accepted.keys() == kinds, "each kind of change succeeded at least once"
+    # All tables reach their size within some hundred changes.
     if (warm := len(soak.resident_kb) // 2) >= 100:
         assert soak.resident_kb[-1] <= soak.resident_kb[warm]

@@ -1,4 +1,4 @@
-"""State that components declare: shown, kept over a replacement, reset."""
+"""State declared by components: shown, kept by a replacement, reset."""
 
 import json
 from typing import Any
@@ -32,7 +32,7 @@ def test_state_is_shown_kept_and_reset(daemon: Daemon, client: rtcf.Client) -> N
     assert abs(_phase(daemon) - 0.1) < 1e-6
 
 
-def test_a_replacement_says_which_state_it_does_not_keep(
+def test_a_replacement_reports_state_that_it_does_not_keep(
     daemon: Daemon, client: rtcf.Client
 ) -> None:
     client.load(_wave())
@@ -42,7 +42,7 @@ def test_a_replacement_says_which_state_it_does_not_keep(
         assert f"state {name} of /wave no longer exists" in done.stdout + done.stderr
 
 
-def test_what_declares_no_state_cannot_be_reset(daemon: Daemon, client: rtcf.Client) -> None:
+def test_a_component_without_state_cannot_be_reset(daemon: Daemon, client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_examples", "Identity", name="plain"))
     done = daemon.ctl("reset", "plain")
     assert done.returncode != 0

@@ -1,4 +1,4 @@
-"""The figures of a loop: read, begun anew, and watched, while it runs."""
+"""Statistics of a loop: queried, reset and watched while it runs."""
 
 import itertools
 import json
@@ -19,7 +19,7 @@ def _slow(name: str) -> graph_pb2.ComponentSpec:
     )
 
 
-def test_each_cycle_is_counted_once_in_all_figures(client: rtcf.Client) -> None:
+def test_each_cycle_is_counted_once_in_all_statistics(client: rtcf.Client) -> None:
     client.set_runner(runner_pb2.RunnerSettings(warmup_cycles=7))
     client.load(rtcf.component("rtcf_test", "Counter"))
     client.start()
@@ -35,7 +35,7 @@ def test_each_cycle_is_counted_once_in_all_figures(client: rtcf.Client) -> None:
     assert counter.duration.p99_ns <= counter.duration.p999_ns <= counter.duration.max_ns
 
 
-def test_a_reset_begins_anew_and_touches_no_loop(client: rtcf.Client) -> None:
+def test_a_reset_clears_the_statistics_and_affects_no_loop(client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_test", "Counter"))
     client.start()
     wait_for(lambda: client.get_statistics().iterations > 1000, "1000 cycles")
@@ -63,14 +63,14 @@ def test_the_time_with_devices_is_counted(client: rtcf.Client) -> None:
     assert (device.component, device.device_calls) == ("/Device", 3)
 
 
-def test_a_start_begins_anew(client: rtcf.Client) -> None:
+def test_a_start_clears_the_statistics(client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_test", "Counter"))
     for _ in range(2):
         client.start()
         wait_for(lambda: iteration(client) > 100, "100 cycles")
         client.stop()
         figures = client.get_statistics()
-        assert figures.iterations == iteration(client) - 10  # the warm-up's default
+        assert figures.iterations == iteration(client) - 10  # the default warm-up
 
 
 def test_overruns_are_counted_for_the_component_that_was_running(
@@ -90,7 +90,7 @@ def test_overruns_are_counted_for_the_component_that_was_running(
     assert figures.missed >= figures.overruns - 1
     status = client.get_status("rt_runner").runners[0]
     assert status.overruns >= figures.overruns
-    # There are hardly more from here on, however long the next lines take.
+    # Hardly any more from here on, however long the next lines take.
     client.set_runner(runner_pb2.RunnerSettings(frequency_hz=10.0))
     client.reset_statistics()
     assert client.get_statistics().overruns < figures.overruns
@@ -99,7 +99,7 @@ def test_overruns_are_counted_for_the_component_that_was_running(
 @pytest.mark.parametrize(
     "policy", [runner_pb2.OVERRUN_POLICY_SKIP, runner_pb2.OVERRUN_POLICY_CATCH_UP]
 )
-def test_a_reset_is_one_instant_of_all_figures_of_a_loop_that_is_always_late(
+def test_a_reset_of_a_late_loop_affects_all_statistics_at_one_instant(
     daemon: Daemon, client: rtcf.Client, policy: runner_pb2.OverrunPolicy
 ) -> None:
     client.set_runner(runner_pb2.RunnerSettings(frequency_hz=20000.0, overrun=policy))
@@ -112,15 +112,15 @@ def test_a_reset_is_one_instant_of_all_figures_of_a_loop_that_is_always_late(
         total = state(client).iteration
         assert daemon.ctl("stats", "--reset").returncode == 0
         more = state(client)
-        # Below 0 they would be large.
+        # Negative differences would wrap to large numbers.
         assert more.overruns <= more.iteration
         assert client.get_statistics().overruns <= iteration(client)
-        assert more.iteration >= total, "cycles are numbered on"
+        assert more.iteration >= total, "cycle numbers continue"
     wait_for(lambda: client.get_statistics().overruns > 20, "overruns")
     client.stop()
     status, figures = state(client), client.get_statistics()
     assert (status.overruns, status.missed) == (figures.overruns, figures.missed)
-    # Catching up drops cycles too, but only after a hundred in a row.
+    # Catching up drops cycles only after a hundred late ones in a row.
     assert figures.missed > 0 or policy == runner_pb2.OVERRUN_POLICY_CATCH_UP
     causes = (
         figures.late_wake_ups
@@ -149,13 +149,13 @@ def test_stats_status_and_list_count_from_the_same_moment(
         return json.loads(daemon.ctl(*verb, "-o", "json").stdout)
 
     def late() -> tuple[int, int]:
-        """Return the overruns and missed cycles of a loop that stands still, as all tell them."""
+        """Return the overruns and missed cycles of a stopped loop, identical in all views."""
         found = [told("stats"), *told("status")["runners"], *told("runner", "list")]
         (same,) = {(each["overruns"], each["missed"]) for each in found}
         return same
 
     def faults() -> int:
-        """Return the faults of the loop, as all tell them."""
+        """Return the faults of the loop, identical in all views."""
         (status,) = told("status")["runners"]
         by_component = [{each["component"]: each["faults"] for each in told("stats")["components"]},
                         {each["full_name"]: each["faults"] for each in told("list")}]  # fmt: skip
@@ -163,7 +163,7 @@ def test_stats_status_and_list_count_from_the_same_moment(
         return int(status["faults"])
 
     def run(client: rtcf.Client) -> int:
-        """Run the loop for a while; return how many cycles it ran."""
+        """Run the loop for a while; return the number of its cycles."""
         client.start()
         wait_for(lambda: client.get_statistics().overruns > 20, "overruns")
         assert daemon.ctl("stats", "--reset").returncode == 0
@@ -175,15 +175,15 @@ def test_stats_status_and_list_count_from_the_same_moment(
     overruns, missed = late()
     assert 20 < overruns < cycles
     assert missed > 0
-    # Faults are told since the loop began: a reset of figures makes none undone.
+    # Faults count from the start of the loop; a reset of statistics does not change them.
     assert faults() == cycles
-    # Also by an rtcfd that was not there when the figures began.
+    # The same for an rtcfd that started after the statistics.
     daemon.end(signal.SIGKILL)
     daemon.start()
     assert (late(), faults()) == ((overruns, missed), cycles)
     assert daemon.ctl("stats", "--reset").returncode == 0
     assert (late(), faults()) == ((0, 0), cycles)
-    # Another start begins all of them anew.
+    # Another start resets all of them.
     with rtcf.Client(daemon.socket) as another:
         again = run(another)
     assert late()[0] < again
@@ -205,18 +205,18 @@ def test_cycles_of_a_stopped_loop_are_the_same_in_status_and_statistics(
     assert figures.components[0].duration.count == 30
 
 
-def test_figures_are_watched_while_they_grow(daemon: Daemon, client: rtcf.Client) -> None:
+def test_statistics_can_be_watched(daemon: Daemon, client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_test", "Counter"))
     client.start()
     seen = [
         each.iterations for each in itertools.islice(client.watch_statistics(interval_s=0.1), 5)
     ]
-    assert seen == sorted(set(seen)), "each has more cycles than the one before"
-    # And people see them, too.
+    assert seen == sorted(set(seen)), "each report has more cycles than the previous one"
+    # rtcfctl shows them, too.
     assert json.loads(daemon.ctl("stats", "-o", "json").stdout)["iterations"] > 0
 
 
-def test_what_a_change_takes_of_its_cycle_is_measured(daemon: Daemon, client: rtcf.Client) -> None:
+def test_the_duration_of_a_change_is_measured(daemon: Daemon, client: rtcf.Client) -> None:
     client.start()
     assert "adoption" not in daemon.ctl("stats").stdout
     client.load(rtcf.component("rtcf_test", "Counter"))
@@ -227,7 +227,7 @@ def test_what_a_change_takes_of_its_cycle_is_measured(daemon: Daemon, client: rt
     assert "adoption of a change" in daemon.ctl("stats").stdout
 
 
-def test_a_component_that_left_leaves_the_figures(client: rtcf.Client) -> None:
+def test_an_unloaded_component_leaves_the_statistics(client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_test", "Counter", name="a", remaps=["out:=/a"]))
     client.load(rtcf.component("rtcf_test", "Counter", name="b", remaps=["out:=/b"]))
     client.start()
@@ -236,7 +236,7 @@ def test_a_component_that_left_leaves_the_figures(client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_test", "Counter", name="a", remaps=["out:=/a"]))
     first, second = client.get_statistics().components
     assert (first.component, second.component) == ("/a", "/b")
-    # The new one is not the old one, whatever its name.
+    # The new component is not the old one, despite its name.
     assert first.duration.count < second.duration.count
 
 
@@ -260,13 +260,13 @@ def test_the_overrun_policy_changes_while_the_loop_runs(
     wait_for(lambda: client.get_statistics().overruns > 50, "overruns")
     figures = client.get_statistics()
     if policy == runner_pb2.OVERRUN_POLICY_CATCH_UP:
-        # It falls behind, and drops cycles only after a hundred in a row.
+        # It falls behind, and drops cycles only after a hundred late ones in a row.
         assert figures.latency.max_ns > 100_000
     else:
         assert (figures.missed > 0) == (policy == runner_pb2.OVERRUN_POLICY_SKIP)
 
 
-def test_rates_that_do_not_go_together_are_refused_with_what_does(
+def test_incompatible_rates_are_rejected_with_a_compatible_one(
     daemon: Daemon, client: rtcf.Client
 ) -> None:
     def load(name: str, *every: str) -> str:

@@ -1,4 +1,4 @@
-"""Stepping: cycles without real time, on a simulated clock, with the same values every time."""
+"""Stepping: cycles on a simulated clock without real time, reproducible to the last bit."""
 
 import contextlib
 import itertools
@@ -42,7 +42,7 @@ def _fresh_run(folder: Path) -> dict[str, str]:
         daemon.end()
 
 
-def test_two_runs_give_the_same_bits_and_those_of_the_simulation(tmp_path: Path) -> None:
+def test_two_runs_and_the_simulation_give_the_same_bits(tmp_path: Path) -> None:
     first = _fresh_run(tmp_path / "1")
     second = _fresh_run(tmp_path / "2")
     assert first == second
@@ -51,7 +51,7 @@ def test_two_runs_give_the_same_bits_and_those_of_the_simulation(tmp_path: Path)
         assert number(first[f"/{name}.out1"]) == value
 
 
-def test_each_step_goes_on_where_the_last_one_paused(daemon: Daemon, client: rtcf.Client) -> None:
+def test_each_step_continues_after_the_previous_one(daemon: Daemon, client: rtcf.Client) -> None:
     fig_1.load(client)
     wanted = list(itertools.islice(fig_1.simulate(), 45))
     for cycle in range(40):
@@ -77,8 +77,8 @@ def test_time_advances_by_a_period_each_cycle(client: rtcf.Client) -> None:
     assert (out.count, out.age_ns) == (10, 1_000_000_000)
 
 
-def test_the_highest_frequency_is_stepped_and_runs(client: rtcf.Client) -> None:
-    """At whatever pace: late cycles are counted, and the loop goes on."""
+def test_the_highest_frequency_can_be_stepped_and_run(client: rtcf.Client) -> None:
+    """At any pace: late cycles are counted, and the loop continues."""
     client.set_runner(runner_pb2.RunnerSettings(frequency_hz=50_000.0, max_overruns=0))
     client.load(rtcf.component("rtcf_examples", "Mimo", name="source", remaps=["out1:=/x"]))
     client.load(rtcf.component("rtcf_examples", "Identity", name="sink", remaps=["in:=/x"]))
@@ -99,11 +99,11 @@ def test_the_highest_frequency_is_stepped_and_runs(client: rtcf.Client) -> None:
 
 
 @pytest.mark.parametrize("cycles", ["0", "-1", "x", str(2**64)])
-def test_what_is_no_number_of_cycles_is_bad_usage(daemon: Daemon, cycles: str) -> None:
+def test_an_invalid_number_of_cycles_is_a_usage_error(daemon: Daemon, cycles: str) -> None:
     assert daemon.ctl("step", cycles).returncode == 2
 
 
-def test_a_loop_that_runs_is_not_stepped(daemon: Daemon, client: rtcf.Client) -> None:
+def test_a_running_loop_cannot_be_stepped(daemon: Daemon, client: rtcf.Client) -> None:
     client.start()
     done = daemon.ctl("step", "1")
     assert (done.returncode, done.stdout) == (1, "")
@@ -111,7 +111,7 @@ def test_a_loop_that_runs_is_not_stepped(daemon: Daemon, client: rtcf.Client) ->
     assert client.get_status("rt_runner").runners[0].state == runner_pb2.RUNNER_STATE_RUNNING
 
 
-def test_a_long_step_says_how_far_it_is_and_can_be_stopped(client: rtcf.Client) -> None:
+def test_a_long_step_reports_its_progress_and_can_be_stopped(client: rtcf.Client) -> None:
     fig_1.load(client)
     lines: list[str] = []
 
@@ -125,7 +125,7 @@ def test_a_long_step_says_how_far_it_is_and_can_be_stopped(client: rtcf.Client) 
     assert 0 < iteration(client) < 10**9
 
 
-def test_a_step_that_was_stopped_says_how_far_it_came(daemon: Daemon, client: rtcf.Client) -> None:
+def test_a_stopped_step_reports_its_cycles(daemon: Daemon, client: rtcf.Client) -> None:
     fig_1.load(client)
     with subprocess.Popen(
         ["rtcfctl", "-v", "step", str(10**9)],
@@ -143,14 +143,14 @@ def test_a_step_that_was_stopped_says_how_far_it_came(daemon: Daemon, client: rt
 
 @contextlib.contextmanager
 def endless_step(daemon: Daemon, client: rtcf.Client) -> Iterator["subprocess.Popen[bytes]"]:
-    """Give the caller of a step that has begun, and wait for its end."""
+    """Yield the client of a running step, and wait for its end."""
     client.load(rtcf.component("rtcf_test", "Counter", name="steady"))
     with subprocess.Popen(
         [BUILD_TREE / "bin" / "rtcfctl", "step", str(10**15)],
         env=daemon.environment(),
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
-        # A shell's background job has it ignored.
+        # Ctrl-C is ignored in a shell's background job.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     ) as caller:
         wait_for(lambda: iteration(client) > 1000, "cycles")
@@ -158,12 +158,12 @@ def endless_step(daemon: Daemon, client: rtcf.Client) -> Iterator["subprocess.Po
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
-def test_a_step_whose_caller_leaves_pauses(
+def test_a_step_pauses_if_its_client_disconnects(
     daemon: Daemon, client: rtcf.Client, number: signal.Signals
 ) -> None:
     with endless_step(daemon, client) as caller:
         caller.send_signal(number)
-    # A change has its turn, and no cycle runs any more.
+    # The next change succeeds, and no cycle runs any more.
     client.load(rtcf.component("rtcf_test", "Counter", name="other"))
     before = iteration(client)
     client.unload(["other"])
@@ -173,7 +173,7 @@ def test_a_step_whose_caller_leaves_pauses(
     assert iteration(client) == before + 5
 
 
-def test_a_step_of_a_daemon_that_dies_pauses(daemon: Daemon, client: rtcf.Client) -> None:
+def test_a_step_pauses_if_the_daemon_dies(daemon: Daemon, client: rtcf.Client) -> None:
     with endless_step(daemon, client):
         daemon.end(signal.SIGKILL)
     daemon.start()

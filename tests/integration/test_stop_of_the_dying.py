@@ -1,4 +1,4 @@
-"""Stopping loops whose executors die of it, or are frozen: the answer says what has happened."""
+"""Stopping loops whose executors die of the stop, or are frozen: the answer reports the result."""
 
 import contextlib
 import re
@@ -15,12 +15,12 @@ SETTINGS = "[runner]\nstall_timeout_ms = 2000\non_crash = 'resume'\n[runner.ros]
 
 @pytest.fixture
 def settings() -> str:
-    """Let an executor whose component hangs end while somebody waits for its stop."""
+    """Return settings with a stall timeout shorter than the wait for a stop."""
     return SETTINGS
 
 
 def hang(client: rtcf.Client) -> int:
-    """Run a loop until its component hangs; return the executor."""
+    """Run a loop until its component hangs; return the executor's pid."""
     client.load(
         rtcf.component(
             "rtcf_faults", "NeverReturns", name="bad", optional=True, parameters=["after:=20"]
@@ -39,22 +39,18 @@ def ended(pid: int) -> bool:
         return True
 
 
-def test_an_update_that_hangs_ends_with_its_executor_and_that_is_a_stop(
-    daemon: Daemon, client: rtcf.Client
-) -> None:
+def test_a_hanging_update_is_stopped_with_its_executor(daemon: Daemon, client: rtcf.Client) -> None:
     executor = hang(client)
     (note,) = client.stop().notes
     assert "the loop has ended with its executor" in note
     assert "/bad.update" in note
     assert ended(executor)
     wait_for(lambda: "executor restarted in" in daemon.log(), "the recovery")
-    # Though a loop goes on by itself after a crash of an optional component.
+    # Not even a loop that would continue after a crash of an optional component.
     assert state(client).state != runner_pb2.RUNNER_STATE_RUNNING
 
 
-def test_an_update_that_hangs_is_stopped_without_rtcfd_too(
-    daemon: Daemon, client: rtcf.Client
-) -> None:
+def test_a_hanging_update_is_stopped_without_rtcfd(daemon: Daemon, client: rtcf.Client) -> None:
     executor = hang(client)
     with stopped(daemon.pid):
         (note,) = client.stop().notes
@@ -62,7 +58,9 @@ def test_an_update_that_hangs_is_stopped_without_rtcfd_too(
         assert ended(executor)
 
 
-def test_a_frozen_executor_is_named_with_what_ends_it(daemon: Daemon, client: rtcf.Client) -> None:
+def test_a_frozen_executor_is_named_with_the_command_to_end_it(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
     client.load(rtcf.component("rtcf_test", "Witness", name="steady"))
     client.start()
     wait_for(lambda: iteration(client) > 10, "cycles")
@@ -77,12 +75,12 @@ def test_a_frozen_executor_is_named_with_what_ends_it(daemon: Daemon, client: rt
         restart = daemon.ctl("runner", "restart", "rt_runner")
         assert restart.returncode == 0, restart.stderr
         assert ended(executor)
-    # In order: it woke up to end.
+    # In order: after it was resumed, it ended by itself.
     assert daemon.log().count("hook safe") == 1
     assert state(client).state == runner_pb2.RUNNER_STATE_STOPPED
 
 
-def test_a_frozen_executor_that_goes_on_stops_first(daemon: Daemon, client: rtcf.Client) -> None:
+def test_a_resumed_executor_stops_first(daemon: Daemon, client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_test", "Counter", name="steady"))
     client.start()
     wait_for(lambda: iteration(client) > 10, "cycles")

@@ -1,4 +1,4 @@
-"""Loops and their graphs survive the deaths of rtcfd and of executors, at any moment."""
+"""Loops and their graphs survive the deaths of rtcfd and of executors at any time."""
 
 import contextlib
 import functools
@@ -20,14 +20,14 @@ from rtcf.v1 import runner_pb2
 from rtcfd.executor import left_over
 from values import state
 
-# As long as the system's, other than a private daemon's own default.
+# The system's timeout, which is longer than a private daemon's.
 SETTINGS = "[runner]\norphan_timeout_s = 60\n[runner.ros]\nenabled = false\n"
 LONGEST_WAIT_S = 0.2  # before a death
 
 
 @pytest.fixture
 def settings() -> str:
-    """Let there be an rtcfd whose executors outlive it for a minute."""
+    """Return settings of an rtcfd whose executors outlive it for a minute."""
     return SETTINGS
 
 
@@ -43,7 +43,7 @@ def count(client: rtcf.Client) -> int:
     return int(ports["out"].value.removeprefix("data: "))
 
 
-def test_a_loop_runs_on_without_rtcfd_and_is_adopted_as_it_is(daemon: Daemon) -> None:
+def test_a_loop_continues_without_rtcfd_and_is_adopted_unchanged(daemon: Daemon) -> None:
     with rtcf.Client(daemon.socket) as client:
         client.load(rtcf.component("rtcf_test", "Counter", name="steady"))
         client.load(rtcf.component("rtcf_test", "Knobs", name="knobs", parameters=["rate:=2.5"]))
@@ -61,7 +61,7 @@ def test_a_loop_runs_on_without_rtcfd_and_is_adopted_as_it_is(daemon: Daemon) ->
         assert after.iteration > before.iteration
         assert after.missed == before.missed or after.overruns > before.overruns
         assert client.get_order() == ["/knobs", "/steady"]
-        # One count for each cycle: none was run without it, none twice.
+        # One count per cycle: no cycle is missing, and none ran twice.
         since = state(client).iteration
         counted = count(client)
         assert since - 1 <= counted <= state(client).iteration + 1
@@ -71,24 +71,24 @@ def test_a_loop_runs_on_without_rtcfd_and_is_adopted_as_it_is(daemon: Daemon) ->
     wait_for(lambda: is_gone(before.pid), "its end")
 
 
-def test_an_executor_that_was_held_up_is_adopted_when_it_goes_on(daemon: Daemon) -> None:
+def test_a_frozen_executor_is_adopted_when_it_resumes(daemon: Daemon) -> None:
     with rtcf.Client(daemon.socket) as client:
         client.load(rtcf.component("rtcf_test", "Counter", name="steady"))
         client.start()
         before = state(client)
     daemon.end(signal.SIGKILL)
-    # As on a machine that was suspended, or by a debugger.
+    # As on a suspended machine, or in a debugger.
     with stopped(before.pid):
         daemon.start()
         with rtcf.Client(daemon.socket) as client:
             wait_for(lambda: "its loop may be running" in state(client).status, "its silence")
     with rtcf.Client(daemon.socket) as client:
-        wait_for(lambda: state(client).pid == before.pid, "its adoption")
+        wait_for(lambda: state(client).pid == before.pid, "the adoption")
         assert state(client).state == runner_pb2.RUNNER_STATE_RUNNING
         assert client.get_order() == ["/steady"]
 
 
-def test_the_status_says_that_a_graph_is_being_restored(daemon: Daemon, tmp_path: Path) -> None:
+def test_the_status_reports_that_a_graph_is_being_restored(daemon: Daemon, tmp_path: Path) -> None:
     file = tmp_path / "plugged in"
     file.touch()
     with rtcf.Client(daemon.socket) as client:
@@ -100,7 +100,7 @@ def test_the_status_says_that_a_graph_is_being_restored(daemon: Daemon, tmp_path
         file.unlink()
         os.kill(state(client).pid, signal.SIGKILL)
         said = "its components are being restored: 1"
-        wait_for(lambda: said in state(client).status, "what it does")
+        wait_for(lambda: said in state(client).status, "the operation")
         file.touch()
         wait_for(lambda: client.get_order() == ["/slow"], "the component")
         wait_for(lambda: said not in state(client).status, "the end of it")
@@ -111,7 +111,7 @@ def folders(daemon: Daemon) -> list[Path]:
 
 
 @pytest.mark.parametrize("all_of_them", [False, True])
-def test_a_loop_whose_socket_was_removed_is_adopted_and_gets_no_twin(
+def test_a_loop_with_a_removed_socket_is_adopted_without_a_second_executor(
     daemon: Daemon, all_of_them: bool
 ) -> None:
     with rtcf.Client(daemon.socket) as client:
@@ -122,14 +122,14 @@ def test_a_loop_whose_socket_was_removed_is_adopted_and_gets_no_twin(
             for each in [folder] if all_of_them else list(folder.iterdir()):
                 shutil.rmtree(each) if each.is_dir() else each.unlink()
         if not all_of_them:
-            # It stops without rtcfd as ever.
+            # It can be stopped without rtcfd as usual.
             daemon.end(signal.SIGKILL)
             wait_for(lambda: list(folders(daemon)[1].iterdir()), "the socket for stops")
         else:
             daemon.end(signal.SIGKILL)
     daemon.start()
     with rtcf.Client(daemon.socket) as client:
-        wait_for(lambda: state(client).pid == before.pid, "its adoption")
+        wait_for(lambda: state(client).pid == before.pid, "the adoption")
         assert state(client).state == runner_pb2.RUNNER_STATE_RUNNING
     assert left_over.runners(folders(daemon)[0]) == ["rt_runner"]
     wait_for(lambda: list(folders(daemon)[1].iterdir()), "the socket for stops")
@@ -139,7 +139,7 @@ def test_a_loop_whose_socket_was_removed_is_adopted_and_gets_no_twin(
         assert state(client).state == runner_pb2.RUNNER_STATE_STOPPED
 
 
-def test_an_executor_that_neither_answers_nor_has_a_socket_keeps_its_place(daemon: Daemon) -> None:
+def test_an_unreachable_executor_is_not_replaced(daemon: Daemon) -> None:
     with rtcf.Client(daemon.socket) as client:
         client.load(rtcf.component("rtcf_test", "Counter", name="steady"))
         client.start()
@@ -155,11 +155,11 @@ def test_an_executor_that_neither_answers_nor_has_a_socket_keeps_its_place(daemo
             ):
                 client.start()
     with rtcf.Client(daemon.socket) as client:
-        wait_for(lambda: state(client).pid == before.pid, "its adoption")
+        wait_for(lambda: state(client).pid == before.pid, "the adoption")
         assert state(client).state == runner_pb2.RUNNER_STATE_RUNNING
 
 
-def test_a_change_that_waits_for_its_executor_says_so(daemon: Daemon) -> None:
+def test_a_change_waiting_for_its_executor_reports_it(daemon: Daemon) -> None:
     with rtcf.Client(daemon.socket) as client:
         client.load(rtcf.component("rtcf_test", "Knobs", name="knobs"))
         executor = state(client).pid
@@ -177,7 +177,9 @@ def test_a_change_that_waits_for_its_executor_says_so(daemon: Daemon) -> None:
     assert setting.returncode == 0, rest
 
 
-def test_the_crash_of_an_adopted_executor_is_told_by_its_flight_recorder(daemon: Daemon) -> None:
+def test_the_crash_of_an_adopted_executor_is_explained_by_its_flight_recorder(
+    daemon: Daemon,
+) -> None:
     with rtcf.Client(daemon.socket) as client:
         client.load(
             rtcf.component(
@@ -188,7 +190,7 @@ def test_the_crash_of_an_adopted_executor_is_told_by_its_flight_recorder(daemon:
     daemon.end(signal.SIGKILL)
     daemon.start()
     with rtcf.Client(daemon.socket) as client:
-        with contextlib.suppress(rtcf.RefusedError):  # its answer may come first
+        with contextlib.suppress(rtcf.RefusedError):  # the answer may arrive first
             client.set_parameters("bad", [rtcf.parse_parameter("after:=0")])
         wait_for(lambda: "executor restarted in" in daemon.log(), "the recovery")
         assert "was killed by SIGSEGV" in state(client).status
@@ -196,7 +198,7 @@ def test_the_crash_of_an_adopted_executor_is_told_by_its_flight_recorder(daemon:
         assert client.get_order() == []
 
 
-def test_a_private_rtcfd_takes_its_executors_with_it(tmp_path: Path) -> None:
+def test_a_private_rtcfd_ends_its_executors(tmp_path: Path) -> None:
     daemon = Daemon(tmp_path)
     daemon.start()
     with rtcf.Client(daemon.socket) as client:
@@ -225,8 +227,8 @@ def test_an_orphan_ends_in_order_after_its_timeout(tmp_path: Path, loop: str) ->
 
 
 class Churn:
-    """Changes a graph at random, and knows what it must be: the acknowledged
-    changes, and perhaps the one that was under way when the other side died."""
+    """Changes a graph at random. Its expected content is the set of acknowledged changes, and
+    perhaps the change in progress when the other side died."""
 
     def __init__(self, seed: int) -> None:
         self.random = random.Random(seed)
@@ -235,7 +237,7 @@ class Churn:
         self._next = 0
 
     def run(self, client: rtcf.Client, over: threading.Event) -> None:
-        """Change one thing after another until a change fails, or it is over."""
+        """Make changes until one fails, or `over` is set."""
         while not over.is_set():
             self.perhaps = dict(self.known)
             try:
@@ -267,7 +269,7 @@ class Churn:
             client.unload([name])
 
     def accept(self, found: dict[str, float]) -> None:
-        """Check what there is now."""
+        """Check the present graph."""
         assert found in (self.known, self.perhaps)
         self.known = found
 
@@ -282,7 +284,7 @@ def rates(client: rtcf.Client) -> dict[str, float]:
 
 
 def saved_rates(daemon: Daemon) -> dict[str, float]:
-    """What the state on disk says."""
+    """Return the rates in the state on disk."""
     file = daemon.socket.with_name("state") / "rt_runner.json"
     found = {}
     for each in json.loads(file.read_text())["components"]:
@@ -293,7 +295,7 @@ def saved_rates(daemon: Daemon) -> dict[str, float]:
 
 
 def churn_until(churn: Churn, client: rtcf.Client, death: Callable[[], None]) -> None:
-    """Change the graph until the death, which comes at a random moment."""
+    """Change the graph until `death`, which happens at a random time."""
     over = threading.Event()
 
     def die() -> None:
@@ -326,13 +328,13 @@ def test_no_kill_of_rtcfd_stops_a_loop_or_loses_its_graph(daemon: Daemon, times:
             assert now.iteration > iteration
             iteration = now.iteration
             churn.accept(rates(client))
-            # An answer may come before what was adopted is on disk.
+            # The answer may precede the write of the adopted state to disk.
             wait_for(lambda: saved_rates(daemon) == churn.known, "the saved graph")
     assert "is corrupt" not in daemon.log()
 
 
 def revive(client: rtcf.Client, dead: int) -> None:
-    """Wait until another executor has the graph; so many deaths may take a `start`."""
+    """Wait for another executor with the graph; after many deaths `start` is needed."""
 
     def is_up() -> bool:
         status = state(client)

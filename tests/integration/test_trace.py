@@ -1,4 +1,4 @@
-"""Traces of real loops: JSON as Perfetto and chrome://tracing take it."""
+"""Traces of real loops: JSON for Perfetto and chrome://tracing."""
 
 import json
 import os
@@ -19,7 +19,7 @@ Event = dict[str, Any]
 
 
 def read(file: Path) -> list[Event]:
-    """Return the events; each has what the format asks of its kind."""
+    """Return the events; checks that each has the fields that the format requires."""
     events: list[Event] = json.loads(file.read_text())
     for each in events:
         assert each["ph"] in "MXiC" and each["pid"] == 1
@@ -40,11 +40,11 @@ def cycles(events: list[Event]) -> list[Event]:
 
 @contextmanager
 def tracing(daemon: Daemon, file: Path, expected: int = 0) -> Iterator[None]:
-    """Trace what is done inside, until Ctrl-C."""
+    """Trace during the block, until Ctrl-C."""
     process = subprocess.Popen(
         [BUILD_TREE / "bin" / "rtcfctl", "--socket", daemon.socket, "trace", "-o", file],
         stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, env=clean_environment(),
-        # A shell's background job, or nohup, may have it ignored.
+        # Ctrl-C is ignored in a shell's background job and under nohup.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )  # fmt: skip
 
@@ -65,7 +65,9 @@ def tracing(daemon: Daemon, file: Path, expected: int = 0) -> Iterator[None]:
         process.wait()
 
 
-def test_each_cycle_is_there_and_what_components_took(running: Daemon, tmp_path: Path) -> None:
+def test_a_trace_has_each_cycle_and_the_durations_of_components(
+    running: Daemon, tmp_path: Path
+) -> None:
     file = tmp_path / "trace.json"
     done = running.ctl("trace", "-o", str(file), "--cycles", "300")
     assert done.returncode == 0, done.stderr
@@ -84,7 +86,7 @@ def test_each_cycle_is_there_and_what_components_took(running: Daemon, tmp_path:
     assert next(e for e in events if e["name"] == "process_name")["args"]["name"] == "rt_runner"
 
 
-def test_components_are_spans_inside_of_their_cycles(
+def test_components_are_spans_within_their_cycles(
     daemon: Daemon, client: rtcf.Client, tmp_path: Path
 ) -> None:
     client.load(rtcf.component("rtcf_faults", "Sleeps", name="slow", parameters=["after:=0"]))
@@ -106,21 +108,21 @@ def test_components_are_spans_inside_of_their_cycles(
         names = [each["name"] for each in components]
         assert names == [each for each in order if each != "/half" or number % 2 == 0], number
         assert {each["tid"] for each in components} == {cycle["tid"]}
-        # One after the other, and all in their cycle, to the digits that are written.
+        # One after the other, and all within their cycle, to the written precision.
         end = cycle["ts"]
         for each in components:
             assert each["ts"] >= end - 0.002
             end = each["ts"] + each["dur"]
         assert end <= cycle["ts"] + cycle["dur"] + 0.002
         took = {each["name"]: each["dur"] for each in components}
-        assert took["/slow"] >= 100  # µs that it sleeps
+        assert took["/slow"] >= 100  # µs of sleep
         assert took["/mimo"] < cycle["dur"] - 100
-    # Nobody who does not ask for them gets any.
+    # They are traced only on request.
     assert daemon.ctl("trace", "-o", str(file), "--cycles", "50", "--force").returncode == 0
     assert len(cycles(read(file))) == 50
 
 
-def test_spans_of_components_go_on_over_changes_and_end_with_the_loop(
+def test_spans_of_components_continue_over_changes_and_end_with_the_loop(
     running: Daemon, client: rtcf.Client
 ) -> None:
     with client.watch_ports((), component_times=True) as stream:
@@ -140,13 +142,13 @@ def test_spans_of_components_go_on_over_changes_and_end_with_the_loop(
             assert (ran[:, -1] <= batch.durations_ns[: len(ran)]).all()
             assert (batch.part(1).turns_ns == turns[1:]).all()
             if batch.last_of_loop:
-                assert (turns[-1] == -1).all()  # components made safe
+                assert (turns[-1] == -1).all()  # safe hooks ran
                 break
     assert seen[0] == ("/mimo", "/wave")
     assert seen[-1] == ("/more", "/wave")
 
 
-def test_times_of_components_are_not_told_of_windows(running: Daemon, client: rtcf.Client) -> None:
+def test_windows_have_no_times_of_components(running: Daemon, client: rtcf.Client) -> None:
     with pytest.raises(rtcf.RtcfError, match="of cycles, not of windows"):
         client.watch_ports((), every=10, min_max=True, component_times=True)
 
@@ -179,7 +181,7 @@ def test_changes_faults_and_log_records_are_marks(
     assert fault["s"] == "g" and "/bad" in fault["name"]
 
 
-def test_late_cycles_are_told(daemon: Daemon, client: rtcf.Client, tmp_path: Path) -> None:
+def test_late_cycles_are_listed(daemon: Daemon, client: rtcf.Client, tmp_path: Path) -> None:
     client.set_runner(runner_pb2.RunnerSettings(frequency_hz=20000.0))
     client.load(rtcf.component("rtcf_faults", "Sleeps", name="slow", parameters=["after:=0"]))
     client.start()
@@ -195,7 +197,7 @@ def test_late_cycles_are_told(daemon: Daemon, client: rtcf.Client, tmp_path: Pat
     assert all(each["args"]["late_us"] > 0 for each in marks)
 
 
-def test_a_simulated_clock_gives_records_their_cycles_time(
+def test_records_have_their_cycles_time_on_a_simulated_clock(
     daemon: Daemon, client: rtcf.Client, tmp_path: Path
 ) -> None:
     client.load(rtcf.component("rtcf_examples", "Wave", name="wave"))
@@ -218,7 +220,7 @@ def test_a_simulated_clock_gives_records_their_cycles_time(
         assert each["ts"] == pytest.approx((each["args"]["cycle"] - first) * 1000.0)
 
 
-def test_an_executor_that_dies_leaves_the_trace(
+def test_a_dead_executor_leaves_the_trace(
     running: Daemon, client: rtcf.Client, tmp_path: Path
 ) -> None:
     file = tmp_path / "trace.json"
@@ -240,7 +242,7 @@ def test_an_executor_that_dies_leaves_the_trace(
         ((), 2, "-o"),
     ],
 )
-def test_refused_in_a_line(
+def test_errors_are_one_line(
     running: Daemon, tmp_path: Path, words: tuple[str, ...], code: int, said: str
 ) -> None:
     (tmp_path / "there.json").write_text("mine")

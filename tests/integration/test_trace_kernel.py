@@ -1,4 +1,4 @@
-"""`rtcfctl trace --kernel`: the kernel's own trace of a real loop that is made late."""
+"""`rtcfctl trace --kernel`: the kernel's trace of a real loop that is delayed."""
 
 import json
 import os
@@ -14,7 +14,7 @@ from realtime_thread import RealtimeThread
 
 MOUNT = "mountpoint -q /sys/kernel/tracing || mount -t tracefs tracefs /sys/kernel/tracing"
 MOUNTED = ("unshare", "--mount", "sh", "-c", f'{{ {MOUNT}; }} && exec "$0" "$@"')
-# Takes the CPU for 5 cycles, 20 times; ends by itself.
+# Uses the CPU for 5 cycles, 20 times; ends by itself.
 HOG = """
 import time
 open("/proc/self/comm", "w").write("the hog")
@@ -27,7 +27,7 @@ for _ in range(20):
 
 
 def trace(daemon: Daemon, *words: str | Path) -> list[str]:
-    """Return a command that traces."""
+    """Return the command of a trace."""
     program = str(BUILD_TREE / "bin" / "rtcfctl")
     return [program, "--socket", str(daemon.socket), "trace", *map(str, words)]
 
@@ -38,7 +38,7 @@ IN_CONTAINER = os.stat("/proc/self/ns/pid").st_ino != 0xEFFFFFFC
 
 @pytest.fixture
 def tracefs() -> tuple[str, ...]:
-    """Give a command before which tracefs is mounted."""
+    """Return a command prefix that mounts tracefs."""
     done = subprocess.run([*MOUNTED, "true"], capture_output=True, text=True)
     if done.returncode != 0:
         pytest.skip(f"tracefs cannot be mounted here: {done.stderr.strip()}")
@@ -47,13 +47,13 @@ def tracefs() -> tuple[str, ...]:
 
 @pytest.fixture
 def mounted(tracefs: tuple[str, ...]) -> tuple[str, ...]:
-    """Give the same where processes have the kernel's numbers."""
+    """Return the same, where processes have the kernel's process ids."""
     if IN_CONTAINER:
         pytest.skip("this is a container")
     return tracefs
 
 
-def test_a_thread_above_the_loop_is_named(
+def test_a_thread_of_higher_priority_is_named(
     running: Daemon, client: rtcf.Client, tmp_path: Path, mounted: tuple[str, ...]
 ) -> None:
     RealtimeThread(client)
@@ -72,7 +72,7 @@ def test_a_thread_above_the_loop_is_named(
         parts = list(tmp_path.glob(f".{file.name}.*.part"))
         return bool(parts) and '"ph": "X"' in parts[0].read_text()
 
-    # In a virtual machine the timer of an idle CPU comes late, and is then the cause.
+    # In a virtual machine the timer of an idle CPU fires late and would be the cause.
     busy = subprocess.Popen(
         ["timeout", "120", "taskset", "--cpu-list", str(status.loop_cpu), "chrt", "--idle", "0",
          sys.executable, "-c", "while True: pass"],
@@ -108,7 +108,7 @@ def test_a_thread_above_the_loop_is_named(
 def test_nothing_is_left_in_the_kernel(
     running: Daemon, tmp_path: Path, mounted: tuple[str, ...]
 ) -> None:
-    """Also of one that was killed: the next one removes it."""
+    """The next trace removes what a killed one leaves."""
     left = "/sys/kernel/tracing/instances/rtcf-999999999"
     listed = 'mkdir "$0" && "$@" && ls /sys/kernel/tracing/instances'
     command = trace(running, "-o", tmp_path / "t.json", "--kernel", "--cycles", "100")
@@ -120,7 +120,7 @@ def test_nothing_is_left_in_the_kernel(
     assert "rtcf-" not in done.stdout.partition("t.json: ")[2].partition("\n")[2]
 
 
-def test_a_container_is_refused_in_a_line(
+def test_a_container_is_rejected_in_one_line(
     running: Daemon, tmp_path: Path, tracefs: tuple[str, ...]
 ) -> None:
     command = trace(running, "-o", tmp_path / "t.json", "--kernel", "--cycles", "100")
@@ -135,8 +135,8 @@ def test_a_container_is_refused_in_a_line(
     ]
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="is about what root lacks")
-def test_refused_in_a_line(running: Daemon, client: rtcf.Client, tmp_path: Path) -> None:
+@pytest.mark.skipif(os.geteuid() != 0, reason="requires root to drop capabilities")
+def test_errors_are_one_line(running: Daemon, client: rtcf.Client, tmp_path: Path) -> None:
     command = trace(running, "-o", tmp_path / "t.json", "--kernel")
     unmounted = ("unshare", "--mount", "sh", "-c",
                  'umount -a -t tracefs 2>/dev/null; exec "$0" "$@"')  # fmt: skip

@@ -1,4 +1,4 @@
-"""A loop on each of two machines, one ROS master, topics between them, and a cable that is cut."""
+"""A loop on each of two machines, one ROS master, topics between them, and a broken cable."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -13,15 +13,15 @@ from two_machines import Machine, two_machines
 from values import iteration, port_value, state, wait_until_after
 
 FREQUENCY_HZ = 500.0
-# So long that TCP by itself, which pauses twice as long before each attempt, needs 23 s more:
-# it tries 25 s after the cut, and then 51 s.
+# So long that TCP alone, which doubles the pause before each attempt, needs 23 s more: it
+# tries 25 s after the cut, and then after 51 s.
 CUT_S = 27.0
-# Less than that. docs/ros.md promises 5 s, of a machine that has time for it.
+# Less than that. docs/ros.md promises 5 s on a machine with spare CPU time.
 AGAIN_S = 20.0
 
 
 class Half:
-    """A machine, its daemon and its loop, whose text goes to the other."""
+    """A machine with its daemon and its loop, whose text is sent to the other."""
 
     def __init__(self, machine: Machine, folder: Path, master_uri: str, other: str) -> None:
         self.machine = machine
@@ -48,19 +48,19 @@ class Half:
         self.client.start()
 
     def age_s(self) -> float:
-        """Return how old the newest text of the other is."""
+        """Return the age of the newest text from the other machine."""
         return port_value(self.client, self.component, "age") * 1e-9
 
     def is_deaf(self) -> bool:
-        """Tell whether nothing of the other has come for long."""
+        """Return whether no text of the other machine has arrived for a long time."""
         return self.age_s() > CUT_S
 
     def hears(self) -> bool:
-        """Tell whether the other's text comes."""
+        """Return whether the other machine's text arrives."""
         return 0.0 <= self.age_s() < 0.5
 
     def is_registered(self) -> bool:
-        """Tell whether its node has its master."""
+        """Return whether its node is registered at the master."""
         return bool(state(self.client).ros.connected)
 
     def end(self) -> None:
@@ -71,7 +71,7 @@ class Half:
 
 @pytest.fixture
 def halves(tmp_path: Path) -> Iterator[tuple[Half, Half]]:
-    """Give two loops that hear each other."""
+    """Yield two loops that receive each other's text."""
     with ExitStack() as stack:
         left, right = stack.enter_context(two_machines())
         uri = left.start_master(tmp_path)
@@ -80,31 +80,31 @@ def halves(tmp_path: Path) -> Iterator[tuple[Half, Half]]:
             halves.append(Half(machine, tmp_path, uri, other))
             stack.callback(halves[-1].end)
         for half in halves:
-            wait_for(half.hears, f"{half.component} to hear the other")
+            wait_for(half.hears, f"{half.component} to receive the other's text")
         yield halves[0], halves[1]
 
 
 def _unplug(left: Machine, right: Machine, cut: bool) -> None:
-    """Leave one without a route, the other without a carrier."""
+    """Remove the route of one machine, and the carrier of the other."""
     right.set_port("down" if cut else "up")
 
 
 def _swallow(left: Machine, right: Machine, cut: bool) -> None:
-    """Lose all that is sent, which neither can see."""
+    """Drop all packets, unnoticed by both machines."""
     for machine in (left, right):
         machine.swallow(cut)
 
 
 @pytest.mark.parametrize("way", [_unplug, pytest.param(_swallow, marks=pytest.mark.long)])
-def test_loops_outlive_a_cut_cable_see_it_and_hear_each_other_again(
+def test_loops_survive_a_broken_cable_and_reconnect(
     halves: tuple[Half, Half], way: Callable[[Machine, Machine, bool], None]
 ) -> None:
     machines = halves[0].machine, halves[1].machine
     before = [iteration(half.client) for half in halves]
     way(*machines, True)
     for half in halves:
-        wait_for(half.is_deaf, f"{half.component} to see that it hears nothing")
-    # The one that has lost its master says so.
+        wait_for(half.is_deaf, f"{half.component} to notice that no message arrives")
+    # The machine without a master reports it.
     wait_for(lambda: "answer" in state(halves[1].client).ros.problem, "its status to say so")
     for half, cycle in zip(halves, before, strict=True):
         wait_until_after(half.client, cycle + int(CUT_S * FREQUENCY_HZ / 2))
@@ -112,7 +112,7 @@ def test_loops_outlive_a_cut_cable_see_it_and_hear_each_other_again(
     way(*machines, False)
     begin = time.monotonic()
     for half in halves:
-        wait_for(half.hears, f"{half.component} to hear the other again", AGAIN_S)
+        wait_for(half.hears, f"{half.component} to receive the other's text again", AGAIN_S)
         print(f"{half.component} hears the other again after {time.monotonic() - begin:.2f} s")
     for half in halves:
         wait_for(half.is_registered, "the node to be registered")

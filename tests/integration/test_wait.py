@@ -1,4 +1,4 @@
-"""`rtcfctl wait`, `get` and `hz` on a loop that runs."""
+"""`rtcfctl wait`, `get` and `hz` on a running loop."""
 
 import json
 import time
@@ -9,7 +9,7 @@ from daemon_process import DEADLINE_S, Daemon
 from rtcf.streams.condition import Condition
 
 
-def test_wait_finds_what_is_so_for_one_cycle(running: Daemon) -> None:
+def test_wait_finds_a_condition_that_holds_for_one_cycle(running: Daemon) -> None:
     # A phase of 1 Hz is that small in one of 1000 cycles.
     done = running.ctl("wait", "wave.phase", "< 0.0005", "--timeout", f"{DEADLINE_S}s")
     assert done.returncode == 0, done.stderr
@@ -19,7 +19,7 @@ def test_wait_finds_what_is_so_for_one_cycle(running: Daemon) -> None:
     assert json.loads(done.stdout).keys() == {"cycle", "stamp_ns"}
 
 
-def test_wait_gives_up(running: Daemon) -> None:
+def test_wait_times_out(running: Daemon) -> None:
     begin = time.monotonic()
     done = running.ctl("wait", "wave.phase > 2", "--timeout", "300ms")
     assert done.returncode == 1
@@ -42,13 +42,13 @@ def test_wait_gives_up(running: Daemon) -> None:
         (("hz", "nobody"), 1, "nobody matches no output of fixed size and no state"),
     ],
 )
-def test_refused_in_a_line(running: Daemon, words: tuple[str, ...], code: int, said: str) -> None:
+def test_errors_are_one_line(running: Daemon, words: tuple[str, ...], code: int, said: str) -> None:
     done = running.ctl(*words)
     assert done.returncode == code, done.stderr
     assert said in done.stderr.splitlines()[-1]
 
 
-def test_get_tells_parameters_ports_and_state(running: Daemon) -> None:
+def test_get_prints_parameters_ports_and_state(running: Daemon) -> None:
     assert running.ctl("get", "wave.rate").stdout == "1\n"
     assert json.loads(running.ctl("get", "wave.rate", "-o", "json").stdout) == 1.0
     assert 0 <= json.loads(running.ctl("get", "wave.phase", "-o", "json").stdout) <= 1
@@ -58,13 +58,13 @@ def test_get_tells_parameters_ports_and_state(running: Daemon) -> None:
     assert "shape: sine" in lines
 
 
-def test_hz_tells_how_often_signals_change(running: Daemon) -> None:
+def test_hz_prints_the_rates_of_change(running: Daemon) -> None:
     done = running.ctl("hz", "wave", "-n", "1", "-o", "json")
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
     assert told["seconds"] >= 1.0
     changes = told["changes_hz"]
-    # In each cycle, and twice in a wave; of those that were seen.
+    # In each cycle, and twice per wave, of the observed cycles.
     cycles = told["cycles_hz"]
     assert 0.9 * cycles <= changes["/wave.phase"] <= 1.1 * cycles
     assert changes["/wave.above"] <= 4
@@ -72,7 +72,7 @@ def test_hz_tells_how_often_signals_change(running: Daemon) -> None:
     assert text.startswith("cycles: ") and "/wave.phase" in text
 
 
-def test_a_condition_is_for_programs_too(running: Daemon) -> None:
+def test_a_condition_has_json_output(running: Daemon) -> None:
     condition = Condition("wave.phase > 0.25 and not wave.above")
     with (
         rtcf.Client(running.socket) as client,

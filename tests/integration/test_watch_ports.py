@@ -1,4 +1,4 @@
-"""Values of every cycle, as a client sees them."""
+"""Values of every cycle, as received by a client."""
 
 import asyncio
 from contextlib import ExitStack
@@ -19,7 +19,7 @@ def _wave(name: str = "wave") -> graph_pb2.ComponentSpec:
 
 
 def _take(stream: PortStream, cycles: int) -> list[PortBatch]:
-    """Return batches until they have so many cycles."""
+    """Return batches until they contain `cycles` cycles."""
     batches: list[PortBatch] = []
     for batch in stream:
         batches.append(batch)
@@ -38,7 +38,7 @@ def test_every_cycle_has_its_values(client: rtcf.Client) -> None:
     cycles = np.concatenate([batch.cycles for batch in batches])
     assert np.array_equal(cycles, np.arange(5000))
     phase = np.concatenate([batch["/wave.phase"] for batch in batches])
-    # 1 Hz at 1 kHz: by a thousandth a cycle.
+    # 1 Hz at 1 kHz: a thousandth per cycle.
     expected = (np.arange(1, 5001) / 1000) % 1.0
     difference = np.abs(phase - expected)
     assert np.all(np.minimum(difference, 1.0 - difference) < 1e-9)
@@ -49,7 +49,7 @@ def test_every_cycle_has_its_values(client: rtcf.Client) -> None:
     assert above.any() and not above.all()
 
 
-def test_each_nth_cycle_is_told_if_that_is_asked_for(client: rtcf.Client) -> None:
+def test_each_nth_cycle_is_sent_on_request(client: rtcf.Client) -> None:
     client.load(_wave())
     with client.watch_ports(["wave.phase"], every=10) as stream:
         assert list(stream.schema.signals) == ["/wave.phase"]
@@ -60,7 +60,7 @@ def test_each_nth_cycle_is_told_if_that_is_asked_for(client: rtcf.Client) -> Non
     )
 
 
-def test_a_graph_that_changes_is_told_and_no_cycle_is_missed(client: rtcf.Client) -> None:
+def test_graph_changes_are_sent_and_no_cycle_is_missed(client: rtcf.Client) -> None:
     client.load(_wave())
     with client.watch_ports() as stream:
         client.step(100)
@@ -97,7 +97,7 @@ def test_a_running_loop_is_watched_to_its_last_cycle(client: rtcf.Client) -> Non
     assert not any(batch.last_of_loop for batch in batches[:-1])
 
 
-def test_watchers_do_not_see_each_other(client: rtcf.Client, daemon: Daemon) -> None:
+def test_watchers_are_independent(client: rtcf.Client, daemon: Daemon) -> None:
     client.load(_wave())
     client.load(_wave("second"))
     with rtcf.Client(daemon.socket) as other, client.watch_ports(["wave.phase"]) as first:
@@ -112,10 +112,10 @@ def test_watchers_do_not_see_each_other(client: rtcf.Client, daemon: Daemon) -> 
     assert list(first.schema.signals) == ["/wave.phase"]
 
 
-def test_who_does_not_read_loses_cycles_that_are_counted(client: rtcf.Client) -> None:
+def test_cycles_dropped_for_a_slow_reader_are_counted(client: rtcf.Client) -> None:
     client.load(_wave())
     with client.watch_ports() as stream:
-        # More than executor, rtcfd and gRPC keep for somebody who does not read.
+        # More than executor, rtcfd and gRPC buffer for a client that does not read.
         cycles = 1_000_000
         client.step(cycles)
         taken = lost = 0
@@ -128,7 +128,7 @@ def test_who_does_not_read_loses_cycles_that_are_counted(client: rtcf.Client) ->
 
 
 async def _pass(executor: int, cycles: int) -> None:
-    """Ask an executor itself until its loop has gone on for so many cycles."""
+    """Query an executor directly until its loop has run for some more cycles."""
     words = Path(f"/proc/{executor}/cmdline").read_text().split("\0")
     link = await Link.connect("it", Path(words[words.index("--socket") + 1]), lambda _: None)
 
@@ -146,7 +146,7 @@ async def _pass(executor: int, cycles: int) -> None:
         await link.close()
 
 
-def test_an_executor_keeps_an_rtcfd_that_stands_still_and_loses_cycles(
+def test_an_executor_keeps_a_frozen_rtcfd_connected_and_drops_cycles(
     client: rtcf.Client, daemon: Daemon
 ) -> None:
     client.set_runner(runner_pb2.RunnerSettings(frequency_hz=2000.0))
@@ -157,7 +157,7 @@ def test_an_executor_keeps_an_rtcfd_that_stands_still_and_loses_cycles(
     with ExitStack() as stack:
         streams = [stack.enter_context(client.watch_ports()) for _ in range(40)]
         with stopped(daemon.pid):
-            # More than an executor keeps of answers for somebody who does not read.
+            # More than an executor buffers for an rtcfd that does not read.
             asyncio.run(_pass(executor, 12_000))
         for stream in streams:
             expected = None
@@ -187,14 +187,16 @@ def test_a_stream_ends_when_its_executor_does(client: rtcf.Client) -> None:
         ("", "a selection of ports is empty"),
     ],
 )
-def test_what_matches_nothing_is_refused(client: rtcf.Client, selection: str, said: str) -> None:
+def test_a_selection_without_matches_is_rejected(
+    client: rtcf.Client, selection: str, said: str
+) -> None:
     client.load(_wave())
     with pytest.raises(rtcf.RefusedError, match="") as refused:
         client.watch_ports([selection])
     assert said in str(refused.value)
 
 
-def test_of_an_empty_runner_everything_is_what_comes(client: rtcf.Client) -> None:
+def test_watching_an_empty_runner_includes_later_components(client: rtcf.Client) -> None:
     with client.watch_ports() as stream:
         assert not stream.schema.columns
         client.load(_wave())
@@ -203,17 +205,15 @@ def test_of_an_empty_runner_everything_is_what_comes(client: rtcf.Client) -> Non
     assert len(batches[-1]["/wave.phase"]) == len(batches[-1])
 
 
-def test_a_cycle_that_nobody_watches_any_more_copies_nothing(
-    client: rtcf.Client, daemon: Daemon
-) -> None:
+def test_unwatched_cycles_copy_nothing(client: rtcf.Client, daemon: Daemon) -> None:
     client.load(_wave())
     with client.watch_ports():
         pass
-    # A component may go, whose values were copied: the loop must not look for them.
+    # An unloaded component's values were copied before: the loop must not access them.
     client.start()
     for _ in range(20):
         with client.watch_ports():
             client.replace("wave", _wave())
         client.replace("wave", _wave())
     before = client.get_status().runners[0].iteration
-    wait_for(lambda: client.get_status().runners[0].iteration > before + 100, "the loop to go on")
+    wait_for(lambda: client.get_status().runners[0].iteration > before + 100, "100 cycles")

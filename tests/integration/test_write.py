@@ -1,4 +1,4 @@
-"""Inputs that nobody feeds get values by hand; the loop takes them as if they came from outside."""
+"""Values written by hand to inputs without a writer; the loop reads them as if from outside."""
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -19,13 +19,13 @@ def port(client: rtcf.Client, name: str) -> graph_pb2.PortInfo:
 
 
 def reads(client: rtcf.Client, name: str, value: str) -> None:
-    """Wait until a port has a value, which its text contains."""
+    """Wait until the text of a port's value contains a text."""
     wait_for(lambda: value in port(client, name).value, f"{value} in {name}")
 
 
 @pytest.fixture
 def passing(daemon: Daemon, client: rtcf.Client) -> Iterator[Daemon]:
-    """Give a loop that runs, of a component that passes on each new value, and others."""
+    """Yield a daemon with a running loop, whose component forwards each new value."""
     client.load(rtcf.component("rtcf_examples", "Identity", name="a"))
     remaps = ["in:=/out", "out:=/passed"]
     client.load(rtcf.component("rtcf_examples", "Identity", name="b", remaps=remaps))
@@ -37,14 +37,14 @@ def passing(daemon: Daemon, client: rtcf.Client) -> Iterator[Daemon]:
     client.stop()
 
 
-def test_a_value_is_a_new_one_in_one_cycle_and_goes_through_the_graph(
+def test_a_value_is_new_in_one_cycle_and_passes_through_the_graph(
     passing: Daemon, client: rtcf.Client
 ) -> None:
     done = passing.ctl("write", "a.in", "1.5")
     assert (done.returncode, done.stdout, done.stderr) == (0, "/a.in written\n", "")
     reads(client, "b.out", "1.5")
     assert passing.ctl("get", "b.out").stdout == "1.5\n"
-    # The same value again is another one.
+    # Writing the same value again counts as another value.
     written = port(client, "a.out").count
     client.write("a.in", 1.5)
     wait_for(lambda: port(client, "a.out").count == written + 1, "another value")
@@ -72,7 +72,7 @@ def test_numbers_texts_lists_and_messages_are_written(passing: Daemon, client: r
     reads(client, "t/text.length", str(len("5 words, of which none is a number")))
 
 
-def test_a_loop_that_does_not_run_takes_it_with_its_first_cycle(client: rtcf.Client) -> None:
+def test_a_stopped_loop_reads_the_value_in_its_first_cycle(client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_examples", "Identity", name="a"))
     client.write("a.in", 2.5)
     client.write("a.in", 3.5)
@@ -81,7 +81,7 @@ def test_a_loop_that_does_not_run_takes_it_with_its_first_cycle(client: rtcf.Cli
     assert port(client, "a.out").count == 1
 
 
-def test_what_is_not_on_ros_is_written_too_until_a_component_writes_it(
+def test_an_unmapped_input_can_be_written_until_a_component_writes_it(
     client: rtcf.Client,
 ) -> None:
     client.set_runner(
@@ -119,20 +119,20 @@ def test_what_is_not_on_ros_is_written_too_until_a_component_writes_it(
         pytest.param("a.in", "x" * 20_000, "bytes", id="too long"),
     ],
 )  # fmt: skip
-def test_refused_in_a_line(passing: Daemon, name: str, value: str, said: str) -> None:
+def test_errors_are_one_line(passing: Daemon, name: str, value: str, said: str) -> None:
     done = passing.ctl("write", name, value)
     assert (done.returncode, done.stdout) == (1, "")
     assert said in done.stderr and done.stderr.count("\n") == 1
 
 
-def test_a_name_that_is_no_ports_is_a_mistake_of_use(daemon: Daemon) -> None:
+def test_an_invalid_port_name_is_a_usage_error(daemon: Daemon) -> None:
     done = daemon.ctl("write", "pid", "1")
     assert (done.returncode, done.stderr) == (2, 'rtcfctl: "pid": a port is COMPONENT.PORT\n')
 
 
 @pytest.fixture
 def on_ros(tmp_path: Path, master: Master) -> Iterator[Daemon]:
-    """Give a daemon whose loops subscribe all inputs that no component feeds."""
+    """Yield a daemon whose loops subscribe all inputs without a writer in the loop."""
     daemon = Daemon(tmp_path, with_ros(master.uri, ".*"))
     daemon.start()
     yield daemon
@@ -144,7 +144,7 @@ def subscribed(master: Master, *topics: str) -> None:
     wait_for(lambda: set(topics) <= master.topics()[1], f"subscriptions of {topics}")
 
 
-def test_an_input_whose_topic_nobody_publishes_is_written(on_ros: Daemon, master: Master) -> None:
+def test_an_input_without_publisher_can_be_written(on_ros: Daemon, master: Master) -> None:
     with rtcf.Client(on_ros.socket) as client:
         client.load(rtcf.component("rtcf_examples", "Identity", name="a"))
         client.load(rtcf.component("rtcf_test", "Chaos", name="chaos", ns="/c"))
@@ -156,7 +156,7 @@ def test_an_input_whose_topic_nobody_publishes_is_written(on_ros: Daemon, master
         for name, value, shown in (
             ("a.in", 1.5, "1.5"),
             ("c/chaos.list", [2.5, 3.0], "2.5"),
-            # Types of C++ that go as a message.
+            # C++ types that are sent as a message.
             ("c/chaos.frame", {"position": {"x": 0.25}, "orientation": {"w": 1.0}}, "0.25"),
             ("m/mixer.in1", -7, "-7"),
             ("t/text.heard", "five words of no number", "five words"),
@@ -166,7 +166,7 @@ def test_an_input_whose_topic_nobody_publishes_is_written(on_ros: Daemon, master
         assert set(topics) <= master.topics()[1]
 
 
-def test_an_input_that_a_node_publishes_is_refused(on_ros: Daemon, master: Master) -> None:
+def test_an_input_with_a_publisher_is_rejected(on_ros: Daemon, master: Master) -> None:
     with rtcf.Client(on_ros.socket) as client:
         client.load(rtcf.component("rtcf_examples", "Identity", name="a", ns="/fed"))
         client.start()
@@ -177,7 +177,7 @@ def test_an_input_that_a_node_publishes_is_refused(on_ros: Daemon, master: Maste
         reads(client, "fed/a.out", "2.5")
         with pytest.raises(rtcf.RefusedError, match=r"^/fed/a\.in reads the ROS topic /fed/in: "):
             client.write("fed/a.in", 3.5)
-        # Peers that may only look feed nothing.
+        # Peers that may only observe feed no input.
         observe = runner_pb2.RosSettings(peers=runner_pb2.RIGHT_OBSERVE)
         client.set_runner(runner_pb2.RunnerSettings(ros=observe))
         wait_for(lambda: "/fed/in" not in master.topics()[1], "the end of the subscription")
@@ -186,7 +186,7 @@ def test_an_input_that_a_node_publishes_is_refused(on_ros: Daemon, master: Maste
         node.end()
 
 
-def test_an_input_is_free_when_its_publisher_has_left(on_ros: Daemon, master: Master) -> None:
+def test_an_input_can_be_written_after_its_publisher_left(on_ros: Daemon, master: Master) -> None:
     with rtcf.Client(on_ros.socket) as client:
         client.load(rtcf.component("rtcf_examples", "Identity", name="a"))
         client.start()

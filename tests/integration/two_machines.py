@@ -1,7 +1,7 @@
-"""Two machines of a test's own, joined by one cable: network namespaces, joined by veth.
+"""Two machines joined by a cable: network namespaces joined by veth.
 
 Each has its own host name, addresses and loopback; files, unix sockets and processes are
-those of this machine. Needs root.
+those of this machine. Requires root.
 """
 
 import os
@@ -14,11 +14,11 @@ from pathlib import Path
 from daemon_process import DEADLINE_S, clean_environment, wait_for
 from ros_processes import reserve_port
 
-_PORT = "cable"  # name of the interface, of both machines
+_PORT = "cable"  # name of the interface in both machines
 
 
 class Machine:
-    """A network and a host name; a process that sleeps keeps them."""
+    """A network and a host name, kept by a sleeping process."""
 
     def __init__(self, name: str, address: str) -> None:
         self.name = name
@@ -46,7 +46,7 @@ class Machine:
         self.run("ip", "link", "set", "lo", "up")
 
     def run(self, *command: str) -> str:
-        """Run a command there; return what it prints."""
+        """Run a command there; return its output."""
         done = subprocess.run(
             [*self.enter, *command], capture_output=True, text=True, timeout=DEADLINE_S, check=False
         )
@@ -54,7 +54,7 @@ class Machine:
         return done.stdout
 
     def start(self, folder: Path, *command: str, **environment: str) -> None:
-        """Start a command there, that ends with the machine."""
+        """Start a command there that ends with the machine."""
         with (folder / f"{self.name}.log").open("ab") as log:
             self._processes.append(
                 subprocess.Popen(
@@ -67,7 +67,7 @@ class Machine:
             )
 
     def start_master(self, folder: Path) -> str:
-        """Start a ROS master there that the other machine reaches; return its URI."""
+        """Start a ROS master there that the other machine can reach; return its URI."""
         port = reserve_port()
         uri = f"http://{self.address}:{port}"
         self.start(
@@ -85,7 +85,7 @@ class Machine:
         return uri
 
     def plug(self, other: "Machine") -> None:
-        """Lay the cable to another machine."""
+        """Connect the cable to another machine."""
         peer = (*("type", "veth", "peer", "name", _PORT), *("netns", str(other.pid)))
         self.run("ip", "link", "add", _PORT, *peer)
         for machine in (self, other):
@@ -93,16 +93,16 @@ class Machine:
             machine.run("ip", "link", "set", _PORT, "up")
 
     def set_port(self, state: str) -> None:
-        """Let this end of the cable be `up` or `down`; the other end sees no carrier."""
+        """Set this end of the cable to `up` or `down`; the other end loses the carrier."""
         self.run("ip", "link", "set", _PORT, state)
 
     def swallow(self, swallows: bool) -> None:
-        """Let what is sent into the cable vanish, which no end can see."""
+        """Drop or forward all packets on the cable, without either end noticing."""
         kind = ("replace", "dev", _PORT, "root", "blackhole")
         self.run("tc", "qdisc", *(kind if swallows else ("del", "dev", _PORT, "root")))
 
     def end(self) -> None:
-        """End all that runs there; the network goes with it."""
+        """End all processes of the machine; its network ends with them."""
         for process in reversed(self._processes):
             process.terminate()
             process.wait(DEADLINE_S)
@@ -110,7 +110,7 @@ class Machine:
 
 @contextmanager
 def two_machines() -> Iterator[tuple[Machine, Machine]]:
-    """Give two machines that reach each other."""
+    """Yield two machines that reach each other."""
     machines: list[Machine] = []
     try:
         for name, number in (("left", 1), ("right", 2)):

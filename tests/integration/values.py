@@ -1,4 +1,4 @@
-"""What a client sees at the ports of a component."""
+"""Port values of a component, as a client reads them."""
 
 import re
 from collections.abc import Iterable
@@ -9,7 +9,7 @@ from rtcf.v1 import runner_pb2
 
 
 def port_value(client: rtcf.Client, component: str, port: str, runner: str = "") -> float:
-    """Return the newest value of a port that carries one number; NaN if it never had one."""
+    """Return the newest value of a port with one number; NaN if it has none yet."""
     (found,) = (each for each in client.get_component(component, runner).ports if each.name == port)
     return number(found.value) if found.HasField("value") else float("nan")
 
@@ -22,23 +22,23 @@ def number(text: str) -> float:
 
 
 def is_among(received: Iterable[float], wanted: Iterable[float]) -> bool:
-    """Tell whether values that were received are some of those wanted, in their order."""
+    """Return whether the received values are a subsequence of the wanted ones."""
     rest = iter(wanted)
     return all(value in rest for value in received)
 
 
 def state(client: rtcf.Client, runner: str = "rt_runner") -> runner_pb2.RunnerStatus:
-    """Return what a runner is doing."""
+    """Return the status of a runner."""
     status: runner_pb2.RunnerStatus = client.get_status(runner).runners[0]
     return status
 
 
 def iteration(client: rtcf.Client, runner: str = "rt_runner") -> int:
-    """Return how many cycles the loop has run."""
+    """Return the number of cycles of the loop."""
     return int(state(client, runner).iteration)
 
 
 def wait_until_after(client: rtcf.Client, cycle: int) -> int:
-    """Wait until the loop has run more than `cycle` cycles; return how many it has run."""
+    """Wait until the loop has run more than `cycle` cycles; return the number of cycles."""
     wait_for(lambda: iteration(client) > cycle, f"cycle {cycle + 1}")
     return iteration(client)

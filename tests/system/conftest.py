@@ -1,4 +1,4 @@
-"""The booted machine of the system tests, with our packages installed."""
+"""The booted machine of the system tests, with rtcf's packages installed."""
 
 import os
 from collections.abc import Iterator
@@ -9,13 +9,13 @@ from machine import Machine
 from rtcf_service import Service
 
 DEBS = Path(os.environ.get("RTCF_DEBS", Path(__file__).parents[2] / "build" / "deb"))
-collect_ignore = ["virtual"]  # runs in another machine: see run-virtual
-# What changes the packages themselves comes last, in this order.
+collect_ignore = ["virtual"]  # run in another machine; see run-virtual
+# Tests that change the packages themselves run last, in this order.
 _LAST = ("test_upgrade", "test_purge", "test_debian_upgrade")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Refuse to run elsewhere, and order the files."""
+    """Fail if not started by tests/system/run, and order the files."""
     if "RTCF_SYSTEM_ROOT" not in os.environ:
         raise pytest.UsageError("these tests boot a Debian: run them by tests/system/run")
     order = {name: place for place, name in enumerate(_LAST, start=1)}
@@ -24,7 +24,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 @pytest.fixture(scope="session")
 def bare(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machine]:
-    """Give a booted Debian without our packages, but with what they depend on."""
+    """Yield a booted Debian without rtcf's packages, but with their dependencies."""
     folder = tmp_path_factory.mktemp("machine")
     root = Path(os.environ["RTCF_SYSTEM_ROOT"])
     machine = Machine(root, os.environ["RTCF_SYSTEM_NAME"], folder)
@@ -35,7 +35,7 @@ def bare(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machine]:
 
 @pytest.fixture(scope="session")
 def machine(bare: Machine) -> Machine:
-    """Give the Debian with our packages installed as a person would."""
+    """Yield the Debian with rtcf's packages installed as an administrator does."""
     bare.path("/debs").mkdir()
     for deb in DEBS.glob("*.deb"):
         if "-dbgsym_" not in deb.name:
@@ -50,7 +50,7 @@ def machine(bare: Machine) -> Machine:
 
 @pytest.fixture
 def service(machine: Machine) -> Iterator[Service]:
-    """Give the running service, as it is after its installation; its settings are put back."""
+    """Yield the running service in the state after its installation; restore its settings."""
     service = Service(machine)
     service.reset()
     yield service

@@ -1,4 +1,4 @@
-"""The Debian that is booted for these tests: a copy-on-write view of the cached one."""
+"""The Debian booted for these tests: a copy-on-write view of the cached one."""
 
 import contextlib
 import os
@@ -14,7 +14,7 @@ HERE = Path(__file__).parent
 DEADLINE_S = 90.0
 _POLL_S = 0.05
 _BOOTED = ("running", "degraded")
-# As of a login, and of nothing else.
+# The environment of a login, and nothing else.
 _ENVIRONMENT = ("PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin",
                 "LANG=C.UTF-8", "TERM=dumb", "DEBIAN_FRONTEND=noninteractive")  # fmt: skip
 
@@ -22,7 +22,7 @@ Done = subprocess.CompletedProcess[str]
 
 
 def wait_for(condition: Callable[[], Any], what: str, deadline_s: float = DEADLINE_S) -> Any:
-    """Return the condition's result when it is true; fail after the deadline."""
+    """Return the condition's result once it is true; fail after the deadline."""
     deadline = time.monotonic() + deadline_s
     while not (result := condition()):
         assert time.monotonic() < deadline, f"waited {deadline_s:g} s for {what}"
@@ -31,15 +31,15 @@ def wait_for(condition: Callable[[], Any], what: str, deadline_s: float = DEADLI
 
 
 class Machine:
-    """A booted Debian, driven from outside as by an administrator at its console."""
+    """A booted Debian, controlled from the host as by an administrator at its console."""
 
     def __init__(self, root: Path, name: str, folder: Path) -> None:
-        self.folder = folder / "root"  # its file system, seen from outside
+        self.folder = folder / "root"  # its file system, as the host sees it
         self._name = name
         self._console = folder / "console"
         self._process: subprocess.Popen[bytes] | None = None
         self._leader = 0
-        # Nothing of it is to reach a disk, or to outlive the test.
+        # None of its files may reach a disk or outlive the test.
         _mount("-t", "tmpfs", "rtcf-system-test", str(folder))
         for each in ("changes", "work", "root"):
             (folder / each).mkdir()
@@ -47,7 +47,7 @@ class Machine:
         _mount("-t", "overlay", "overlay", "-o", layers, str(self.folder))
 
     def boot(self) -> None:
-        """Boot it; returns when systemd says that it is up."""
+        """Boot it. Returns when systemd reports that it is up."""
         with self._console.open("ab") as console:
             self._process = subprocess.Popen(
                 [HERE / "boot", self.folder, self._name],
@@ -68,14 +68,14 @@ class Machine:
         wait_for(up, "the boot")
 
     def reboot(self) -> None:
-        """Reboot it as an administrator does; returns when it is up again."""
+        """Reboot it as an administrator does. Returns when it is up again."""
         assert self._process is not None
         self.run("systemctl", "reboot", check=False)
         self._process.wait(DEADLINE_S)
         self.boot()
 
     def stop(self) -> None:
-        """Shut it down as by its power button, by force if need be."""
+        """Shut it down as by its power button, and kill it if that fails."""
         if self._process is None:
             return
         with contextlib.suppress(ProcessLookupError):
@@ -88,11 +88,11 @@ class Machine:
         self._process = None
 
     def console(self) -> str:
-        """Return what it said on its console."""
+        """Return its console output."""
         return self._console.read_text(errors="replace").strip()
 
     def command(self, *command: str, user: str = "root") -> list[str]:
-        """Return the host's command that runs one inside."""
+        """Return the host's command that runs `command` inside."""
         as_user = ["runuser", "-u", user, "--"] if user != "root" else []
         namespaces = ("-m", "-u", "-i", "-n", "-p", "-C", "-r", "-w")
         enter = ["nsenter", "-t", str(self._leader), *namespaces]
@@ -106,7 +106,7 @@ class Machine:
         text: str | None = None,
         deadline_s: float = 300.0,
     ) -> Done:
-        """Run a command inside; what it said is in the failure if it fails."""
+        """Run a command inside. Its output is part of the error if it fails."""
         done = subprocess.run(
             self.command(*command, user=user),
             input=text,
@@ -125,11 +125,11 @@ class Machine:
     def shell(
         self, script: str, user: str = "root", check: bool = True, deadline_s: float = 300.0
     ) -> Done:
-        """Run a line of shell inside."""
+        """Run a shell command line inside."""
         return self.run("bash", "-c", script, user=user, check=check, deadline_s=deadline_s)
 
     def start(self, *command: str, user: str = "root") -> "subprocess.Popen[str]":
-        """Begin a command inside."""
+        """Start a command inside."""
         return subprocess.Popen(
             self.command(*command, user=user),
             stdin=subprocess.DEVNULL,
@@ -139,7 +139,7 @@ class Machine:
         )
 
     def path(self, path: str) -> Path:
-        """Return a file inside as seen from outside; not for what is under /run or /tmp."""
+        """Return the host's path of a file inside; not for files in /run or /tmp."""
         return self.folder / path.lstrip("/")
 
 
@@ -150,7 +150,7 @@ def _mount(*arguments: str) -> None:
 
 
 def _systemd_under(pid: int) -> int:
-    """Return the process of systemd among the descendants of a process, or 0."""
+    """Return the pid of systemd among the descendants of a process, or 0."""
     try:
         children = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
     except OSError:

@@ -1,4 +1,4 @@
-"""rtcfd.service of the booted machine, and rtcfctl beside it."""
+"""rtcfd.service and rtcfctl of the booted machine."""
 
 import json
 import time
@@ -7,12 +7,12 @@ from typing import Any
 from machine import Done, Machine, wait_for
 
 SETTINGS = "/etc/rtcfd/rtcfd.toml"
-# A container gives no CPU to real-time threads for certain, and has other limits.
+# A container does not guarantee CPU time to real-time threads, and has other limits.
 _DEGRADED = '[daemon]\nrealtime = "preferred"\n[runner.ros]\nenabled = false\n'
 
 
 class Service:
-    """What an administrator does with systemctl, journalctl and rtcfctl."""
+    """The administrator's view: systemctl, journalctl and rtcfctl."""
 
     def __init__(self, machine: Machine, settings: str = _DEGRADED) -> None:
         self.machine = machine
@@ -20,7 +20,7 @@ class Service:
         self._since = time.time()
 
     def reset(self) -> None:
-        """Start it anew with an empty state and settings that a container allows."""
+        """Restart it with an empty state and settings that work in a container."""
         self.systemctl("stop", "rtcfd.socket", "rtcfd.service")
         self.machine.shell(
             "pkill -KILL rtcf-executor; rm -rf /var/lib/rtcfd/* /etc/rtcfd/graphs.d/*; "
@@ -31,7 +31,7 @@ class Service:
         self.systemctl("start", "rtcfd.socket", "rtcfd.service")
 
     def configure(self, more: str) -> None:
-        """Write the settings; they count from the next start or reload on."""
+        """Write the settings. They apply from the next start or reload."""
         self.machine.path(SETTINGS).write_text(self._settings + more)
 
     def systemctl(self, *arguments: str, check: bool = True) -> Done:
@@ -39,7 +39,7 @@ class Service:
         return self.machine.run("systemctl", *arguments, check=check)
 
     def start_anew(self) -> None:
-        """Stop it with its loops, and start it."""
+        """Stop it with its loops, then start it."""
         self.systemctl("stop", "rtcfd.service")
         self.systemctl("start", "rtcfd.service")
 
@@ -49,7 +49,7 @@ class Service:
 
     @property
     def pid(self) -> int:
-        """Its main process, as the machine counts."""
+        """Its main process id, in the machine's PID namespace."""
         return int(self.unit_property("MainPID"))
 
     def ctl(self, *arguments: str, user: str = "root", check: bool = True) -> Done:
@@ -63,7 +63,7 @@ class Service:
         return found
 
     def iteration(self) -> int:
-        """Return how many cycles the loop has run."""
+        """Return the number of cycles of the loop."""
         return int(self.status().get("iteration", 0))
 
     def kill(self, signal: str, pid: int) -> None:
@@ -71,14 +71,14 @@ class Service:
         self.machine.run("kill", f"-{signal}", str(pid))
 
     def load_and_start(self) -> dict[str, Any]:
-        """Have a loop with one component; return its status."""
+        """Load one component and start the loop; return its status."""
         self.ctl("load", "rtcf_examples", "Mimo", "--name", "M")
         self.ctl("start")
         wait_for(lambda: self.iteration() > 10, "cycles")
         return self.status()
 
     def journal(self, *matches: str) -> list[dict[str, Any]]:
-        """Return the journal's entries of this test, as it keeps them."""
+        """Return the journal's entries of this test, as stored."""
         self.machine.run("journalctl", "--sync")
         done = self.machine.run(
             "journalctl", "--unit", "rtcfd.service", f"--since=@{self._since:.6f}",
@@ -87,7 +87,7 @@ class Service:
         return [json.loads(line) for line in done.stdout.splitlines()]
 
     def said(self, text: str) -> bool:
-        """Tell whether the journal has an entry with a text."""
+        """Return whether an entry of the journal contains a text."""
         return any(text in str(entry.get("MESSAGE", "")) for entry in self.journal())
 
     def wait_until_said(self, text: str) -> None:

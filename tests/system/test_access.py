@@ -1,4 +1,4 @@
-"""Who may do what: group rtcf, [access], trusted component folders, limits."""
+"""Access rights: group rtcf, [access], trusted component folders, limits."""
 
 import pytest
 from machine import wait_for
@@ -31,7 +31,7 @@ def levels(service: Service) -> Service:
     return service
 
 
-def test_a_user_outside_the_group_is_told_what_to_do(service: Service) -> None:
+def test_a_user_outside_the_group_gets_advice(service: Service) -> None:
     done = service.ctl("status", user="mallory", check=False)
     assert done.returncode == 3
     assert done.stderr == (
@@ -66,7 +66,7 @@ def test_an_observer_wakes_rtcfd_up_and_starts_no_loop(levels: Service) -> None:
     wait_for(lambda: levels.unit_property("ActiveState") == "active", "rtcfd to be up")
     assert levels.status()["state"] == "stopped"
     assert not levels.said("loop resumed")
-    # Who may operate starts it.
+    # A user with the right `operate` starts it.
     levels.ctl("start", user="bob")
     assert levels.status()["state"] == "running"
 
@@ -90,10 +90,10 @@ def test_rights_follow_a_reload(levels: Service) -> None:
     levels.ctl("unload", "M", user="alice")
 
 
-# Libraries to link against: in a folder that everybody can write, and in one of root's.
+# Libraries to link against: in a world-writable folder, and in one owned by root.
 _LIBRARIES = r"""
 mkdir -p /srv/open /srv/root; chmod 777 /srv/open
-# Where it is run there is no refusal but this one.
+# Its constructor ends the process, so the expected error shows that it did not run.
 cat >/srv/open/helps.c <<END
 #include <unistd.h>
 __attribute__((constructor)) static void run(void) { _exit(77); }
@@ -107,7 +107,7 @@ $empty -o /srv/root/libchain.so -Wl,-rpath,/srv/open -L/srv/open -lhelps
 
 
 def untrusted(service: Service, make: str) -> str:
-    """Load from a package folder that was made by a line of shell; return the refusal."""
+    """Load from a package folder created by a shell command; return the error."""
     make = make.replace("{ln}", "$empty -o $t")
     service.machine.shell(
         "set -e; d=$(echo /usr/lib/*-linux-gnu/rtcf); rm -rf $d/evil; mkdir $d/evil; "
@@ -146,28 +146,28 @@ def untrusted(service: Service, make: str) -> str:
         ("mkdir $t", "not a regular file"),
     ],
 )  # fmt: skip
-def test_code_that_others_can_write_is_refused(service: Service, make: str, said: str) -> None:
+def test_writable_code_is_rejected(service: Service, make: str, said: str) -> None:
     refusal = untrusted(service, make)
     assert said in refusal
     assert len(refusal.splitlines()) == 1
-    # Advice gives nobody more rights, and touches none of /tmp or a home.
+    # The advice must not widen rights, and must not touch /tmp or a home.
     assert "chmod" not in refusal and "chown" not in refusal
 
 
-def test_what_links_against_the_systems_and_trusted_folders_is_loaded(service: Service) -> None:
+def test_code_linked_to_trusted_folders_is_loaded(service: Service) -> None:
     refusal = untrusted(service, "{ln} -Wl,-rpath,/srv/root -L/srv/root -lgood -lm")
-    # It has no components, but it has been loaded.
+    # It has no components, but it was loaded.
     assert "has no components" in refusal
 
 
 @pytest.mark.parametrize("name", ["../etc", "/etc", "..", "rtcf_examples/../x", "a b", "a\n"])
-def test_names_are_no_paths(service: Service, name: str) -> None:
+def test_paths_are_rejected_as_package_names(service: Service, name: str) -> None:
     done = service.ctl("load", name, "Mimo", check=False)
     assert done.returncode != 0
     assert "is not valid" in done.stderr
 
 
-def test_a_workspace_that_is_named_is_trusted_as_its_owner_is(service: Service) -> None:
+def test_a_workspace_in_the_settings_is_trusted_for_its_owner(service: Service) -> None:
     service.machine.shell(
         "install -d -o alice -g alice /srv/ws /srv/ws/evil; "
         "install -o alice -g alice /usr/lib/*-linux-gnu/rtcf/rtcf_examples/*.so /srv/ws/evil/e.so"
@@ -183,7 +183,7 @@ def test_a_workspace_that_is_named_is_trusted_as_its_owner_is(service: Service) 
     service.machine.run("rm", "-r", "/srv/ws")
 
 
-def test_limits_are_refused_with_what_to_do(service: Service) -> None:
+def test_exceeded_limits_are_rejected_with_advice(service: Service) -> None:
     service.configure("[limits]\nrunners = 1\ncomponents = 1\nclients = 2\ntaps = 1\n")
     service.systemctl("restart", "rtcfd.service")
     service.load_and_start()
@@ -199,7 +199,7 @@ def test_limits_are_refused_with_what_to_do(service: Service) -> None:
     watching = [service.machine.start("rtcfctl", "stats", "--watch") for _ in range(2)]
     for each in watching:
         assert each.stdout is not None
-        each.stdout.readline()  # it is served
+        each.stdout.readline()  # served
     done = service.ctl("status", check=False)
     assert done.returncode == 1
     assert "rtcfd serves 2 clients already" in done.stderr
@@ -209,7 +209,7 @@ def test_limits_are_refused_with_what_to_do(service: Service) -> None:
     wait_for(lambda: service.ctl("status", check=False).returncode == 0, "room for a client")
 
 
-def test_a_reload_opens_no_folder_to_members(service: Service) -> None:
+def test_a_reload_keeps_folder_permissions(service: Service) -> None:
     folders = [f"/run/rtcfd/{each}" for each in ("executors", "stop", "cpus")]
     ask = ("stat", "-c", "%a %U:%G", *folders)
     closed = ["700 rtcf:rtcf", "750 rtcf:rtcf", "700 rtcf:rtcf"]
@@ -223,10 +223,10 @@ def test_a_reload_opens_no_folder_to_members(service: Service) -> None:
     assert modes == ["600"]
 
 
-def test_nobody_else_moves_a_loop_to_another_cpu(service: Service) -> None:
+def test_a_group_member_cannot_claim_cpus(service: Service) -> None:
     before = service.load_and_start()
     service.ctl("stop")
-    # Names that claims had once, and the files that they are: for a member, who may enter nothing.
+    # Former names of CPU claims, and their files today: a group member can create neither.
     take = (
         "import os, socket, time\n"
         "kept = []\n"

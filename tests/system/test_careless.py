@@ -1,4 +1,4 @@
-"""People who do not wait."""
+"""Users who interrupt commands or do not wait for them."""
 
 import random
 import socket
@@ -7,7 +7,7 @@ from typing import Any
 from machine import Machine, wait_for
 from rtcf_service import Service
 
-_DESK = "/var/tmp/desk"  # where what they write goes
+_DESK = "/var/tmp/desk"  # folder of the files they write
 _LOOKING = (
     "status",
     "get M.out1",
@@ -30,7 +30,7 @@ _LOOKING = (
     "run own.yaml",
     "apply own.yaml",
 )
-# These end a loop, or an executor, by what they are for.
+# Verbs whose purpose is to end a loop or an executor.
 _ENDING = ("runner add other", "runner remove other", "runner restart rt_runner")
 _SEED = 7
 
@@ -49,16 +49,16 @@ def runs_on(service: Service, before: dict[str, Any]) -> None:
     wait_for(lambda: service.iteration() > int(now["iteration"]), "cycles")
 
 
-def test_a_verb_that_is_interrupted_ends_and_leaves_nothing(service: Service) -> None:
+def test_an_interrupted_verb_ends_and_leaves_nothing(service: Service) -> None:
     machine = service.machine
     machine.shell(f"rm -rf {_DESK}; mkdir {_DESK}")
     loop = service.load_and_start()
     machine.shell(
         f"cd {_DESK} && rtcfctl save own.yaml && rtcfctl record -o whole.mcap --duration 1"
     )
-    wait_for(lambda: len(processes(machine)) == 2, "rtcfd and its executor alone")
+    wait_for(lambda: len(processes(machine)) == 2, "only rtcfd and its executor to remain")
     before, living = descriptors(service), processes(machine)
-    with socket.socket() as free:  # the machine's network is this one's
+    with socket.socket() as free:  # the machine shares this network
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     draw = random.Random(_SEED)
@@ -67,17 +67,17 @@ def test_a_verb_that_is_interrupted_ends_and_leaves_nothing(service: Service) ->
         for after_s in (draw.uniform(0.05, 0.5), draw.uniform(0.5, 1.5)):
             line = f"cd {_DESK} && timeout -s INT -k 30 {after_s:.3f} rtcfctl {verb}"
             done = machine.shell(line, check=False)
-            # timeout(1): 124 as it was interrupted; 137 if it went on for 30 s all the same.
+            # timeout(1): 124 = interrupted; 137 = still running after 30 s.
             assert done.returncode in (0, 124), f"{line}: {done.returncode}\n{done.stderr}"
             assert "Traceback" not in done.stderr, f"{line}: {done.stderr}"
 
     for verb in _LOOKING:
         interrupt(verb.format(port=port))
         runs_on(service, loop)
-        wait_for(lambda: processes(machine) == living, f"what {verb} has started to end")
+        wait_for(lambda: processes(machine) == living, f"the processes of {verb} to end")
     halves = machine.shell(f"find {_DESK} -name '*.part*' -o -name '.?*'").stdout
     assert not halves
-    # What has its name is whole, or a recording that opens.
+    # Files under their final name are complete, or are recordings that can be opened.
     machine.shell(
         f"cd {_DESK} && python3 -c 'import json, pathlib, rtcf\n"
         'rtcf.read_recording("recording.mcap").close()\n'
@@ -93,13 +93,13 @@ def test_a_verb_that_is_interrupted_ends_and_leaves_nothing(service: Service) ->
     wait_for(lambda: service.iteration() > 10, "cycles")
 
 
-def test_restarts_at_once_leave_the_loop_alone(service: Service) -> None:
+def test_repeated_restarts_keep_the_loop_running(service: Service) -> None:
     before = service.load_and_start()
     service.machine.shell("for i in 1 2 3; do systemctl restart rtcfd & done; wait")
     runs_on(service, before)
 
 
-def test_a_stop_amid_replacements_is_final(service: Service) -> None:
+def test_a_stop_during_restarts_is_final(service: Service) -> None:
     service.load_and_start()
     enough = "/var/tmp/enough"
     replacing = service.machine.start(

@@ -1,4 +1,4 @@
-"""Completion as it is installed: it offers what is there, and wakes nobody up."""
+"""Installed completion: it offers existing names and does not start rtcfd."""
 
 import shlex
 
@@ -8,12 +8,12 @@ from rtcf_service import Service
 
 
 def completed(service: Service, line: str) -> list[str]:
-    """Return what bash offers for the last word of a line."""
+    """Return bash's completions of the last word of a line."""
     words = line.split(" ")
     script = (
         "source /usr/share/bash-completion/completions/rtcfctl; "
         f"COMP_WORDS=({' '.join(map(shlex.quote, words))}); COMP_CWORD={len(words) - 1}; "
-        # It is no prompt: there are no options of a completion.
+        # Not a prompt, so a completion has no options.
         "compopt() { :; }; _rtcfctl; printf '%s\\n' \"${COMPREPLY[@]}\""
     )
     return service.machine.shell(script, user="alice").stdout.split()
@@ -29,14 +29,14 @@ def completed(service: Service, line: str) -> list[str]:
         ("rtcfctl break sum.in", ["sum.in1", "sum.in2", "sum.in3", "sum.in4"]),
     ],
 )
-def test_what_is_there_is_offered(service: Service, line: str, offered: list[str]) -> None:
+def test_existing_names_are_offered(service: Service, line: str, offered: list[str]) -> None:
     service.ctl("load", "rtcf_examples", "Wave", "--name", "wave")
     service.ctl("load", "rtcf_examples", "Mimo", "--name", "sum")
-    # What takes too long is not waited for: one presses the key again.
-    wait_for(lambda: completed(service, line) == offered, f"{offered} to be offered")
+    # Completion gives up on slow answers; the user presses the key again.
+    wait_for(lambda: completed(service, line) == offered, f"the completions {offered}")
 
 
-def test_a_service_that_was_stopped_stays_stopped(service: Service) -> None:
+def test_completion_does_not_start_a_stopped_service(service: Service) -> None:
     service.ctl("load", "rtcf_examples", "Wave", "--name", "wave")
     service.systemctl("stop", "rtcfd.service")
     assert service.unit_property("ActiveState", "rtcfd.socket") == "active"

@@ -25,14 +25,14 @@ def test_it_passes(machine: Machine, folder: str, name: str) -> None:
     machine.run(f"{folder}/{name}")
 
 
-def test_all_of_them_are_run_here() -> None:
+def test_all_autopkgtests_are_run_here() -> None:
     control = (TESTS / "control").read_text()
     names = [line.split()[1] for line in control.splitlines() if line.startswith("Tests:")]
     assert sorted(names) == ["build-component", "run-time"]
 
 
 @pytest.mark.parametrize("language", [(), ("--python",)], ids=["C++", "Python"])
-def test_a_new_package_builds_and_tests_by_the_lines_that_are_printed(
+def test_a_new_package_builds_with_the_printed_commands(
     service: Service, language: tuple[str, ...]
 ) -> None:
     machine = service.machine

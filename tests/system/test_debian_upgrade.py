@@ -1,5 +1,5 @@
 """The upgrade of a machine to the next Debian, with rtcf's next release: loops run until the
-reboot, and come back but for what has to be built anew."""
+reboot, and are restored except for components that must be rebuilt."""
 
 import hashlib
 import os
@@ -16,7 +16,7 @@ pytestmark = pytest.mark.long
 _TREE = Path(__file__).parents[2]
 _HOUR_S = 3600.0
 
-# A component package of a laboratory's own, made as debian/tests/build-component does.
+# A user's own component package, built like debian/tests/build-component.
 _BUILD = r"""
 set -e
 rm -rf /srv/build
@@ -64,14 +64,14 @@ def _output(*command: str, **environment: str) -> str:
 
 @pytest.fixture(scope="module")
 def releases() -> tuple[str, str]:
-    """The two newest Debians that rtcf is for, the older one first."""
+    """The two newest Debian releases that rtcf supports, the older one first."""
     older, newer = _output("tools/release", "list").split()[-2:]
     return older, newer
 
 
 @pytest.fixture(scope="module")
 def older(releases: tuple[str, str], tmp_path_factory: pytest.TempPathFactory) -> Iterator[Machine]:
-    """A booted machine of the older Debian with our packages for it, and one of somebody else."""
+    """A booted machine of the older Debian with rtcf's packages and a user's package."""
     debs = _output("tests/system/packages", releases[0])
     root = _output("tests/system/root", releases[0], RTCF_DEBS=debs)
     name = os.environ["RTCF_SYSTEM_NAME"] + "-older"
@@ -90,8 +90,8 @@ def older(releases: tuple[str, str], tmp_path_factory: pytest.TempPathFactory) -
 
 @pytest.fixture(scope="module")
 def newer_debs(releases: tuple[str, str]) -> Path:
-    """Packages for the newer Debian of a release for which components have to be built anew;
-    those in the folder RTCF_NEXT_DEBS if it is set, as to build them takes a while."""
+    """Packages for the newer Debian, of a release for which components must be rebuilt;
+    those in the folder RTCF_NEXT_DEBS if it is set, since building them takes a while."""
     given = os.environ.get("RTCF_NEXT_DEBS")
     return Path(given or _output("tests/system/packages", releases[1], "next"))
 
@@ -104,7 +104,7 @@ def _copy_debs(debs: Path, folder: Path) -> None:
 
 
 def _offer(machine: Machine, debs: Path, release: str) -> None:
-    """Make the machine's sources those of a release, with our packages for it."""
+    """Set the machine's sources to a release, with rtcf's packages for it."""
     folder = machine.path("/newer")
     _copy_debs(debs, folder)
     with (folder / "Packages").open("w") as index:
@@ -122,7 +122,7 @@ def _status(service: Service, runner: str) -> tuple[str, int]:
     return status["state"], int(status.get("components", 0))
 
 
-def test_loops_come_back_but_for_what_has_to_be_built_anew(
+def test_loops_are_restored_except_for_components_to_rebuild(
     older: Machine, newer_debs: Path, releases: tuple[str, str]
 ) -> None:
     service = Service(older)

@@ -1,4 +1,4 @@
-"""What is there once the packages are installed, on a machine that runs systemd."""
+"""State of a machine with systemd after the packages are installed."""
 
 import pytest
 from machine import Machine
@@ -19,13 +19,13 @@ def test_the_settings_as_shipped_are_accepted(machine: Machine) -> None:
     assert "rt_runner" in machine.run("rtcfctl", "status").stdout
 
 
-def test_user_and_group_are_made(machine: Machine) -> None:
+def test_user_and_group_are_created(machine: Machine) -> None:
     entry = machine.run("getent", "passwd", "rtcf").stdout.strip().split(":")
     assert machine.run("getent", "group", entry[3]).stdout.startswith("rtcf:")
     assert entry[6] == "/usr/sbin/nologin"
 
 
-def test_the_control_socket_is_roots_and_the_groups(machine: Machine) -> None:
+def test_the_control_socket_belongs_to_root_and_the_group(machine: Machine) -> None:
     found = machine.run("stat", "-c", "%A %U:%G", "/run/rtcfd/control.sock", "/run/rtcfd").stdout
     assert found.splitlines() == ["srw-rw---- root:rtcf", "drwxr-xr-x root:root"]
 
@@ -36,13 +36,13 @@ def test_units_are_valid(machine: Machine) -> None:
     assert "rtcf" not in done.stderr
 
 
-def test_the_service_is_little_exposed(machine: Machine) -> None:
+def test_the_service_has_a_low_exposure_score(machine: Machine) -> None:
     machine.run("systemd-analyze", "security", "--threshold=30", "rtcfd.service")
     machine.run("systemd-analyze", "security", "--threshold=20", "rtcf-scope.service")
     machine.run("systemd-analyze", "security", "--threshold=20", "rtcf-metrics.service")
 
 
-def test_metrics_are_off_until_somebody_starts_them(machine: Machine) -> None:
+def test_metrics_are_off_by_default(machine: Machine) -> None:
     state = machine.run("systemctl", "is-enabled", "rtcf-metrics.service", check=False).stdout
     assert state == "disabled\n"
     try:
@@ -57,7 +57,7 @@ def test_metrics_are_off_until_somebody_starts_them(machine: Machine) -> None:
         machine.run("systemctl", "stop", "rtcf-metrics.service")
 
 
-def test_the_scope_is_off_until_somebody_starts_it(machine: Machine) -> None:
+def test_the_scope_is_off_by_default(machine: Machine) -> None:
     state = machine.run("systemctl", "is-enabled", "rtcf-scope.service", check=False).stdout
     assert state == "disabled\n"
     try:
@@ -80,7 +80,7 @@ def test_each_program_and_file_has_a_man_page(machine: Machine, page: str) -> No
     assert machine.path(f"/usr/share/man/man{section}/{page}.gz").is_file()
 
 
-def test_component_libraries_are_roots_alone(machine: Machine) -> None:
+def test_only_root_can_write_component_libraries(machine: Machine) -> None:
     assert machine.shell("ls /usr/lib/*/rtcf/*/*.so").stdout
     assert not machine.shell("find /usr/lib/*/rtcf ! -user root -o -perm /022 ! -type l").stdout
 
@@ -102,8 +102,8 @@ def test_check_executor_is_a_sanitizer_build(machine: Machine) -> None:
     assert b"RealtimeSanitizer" in executor.read_bytes()
 
 
-def test_the_limits_of_the_unit_are_what_a_loop_needs(service: Service) -> None:
-    # As set: a container cannot raise them.
+def test_the_unit_has_the_limits_that_a_loop_needs(service: Service) -> None:
+    # As configured: a container cannot raise them.
     assert service.unit_property("LimitMEMLOCK") == "infinity"
     assert service.unit_property("LimitRTPRIO") == "99"
     assert service.unit_property("AmbientCapabilities") == "cap_ipc_lock cap_sys_nice"

@@ -1,4 +1,4 @@
-"""roslaunch with the installed packages, by a user who has no right to the system's daemon."""
+"""roslaunch with the installed packages, by a user without access to the system's daemon."""
 
 import shlex
 import signal
@@ -8,14 +8,14 @@ import pytest
 from machine import Machine, wait_for
 
 PORT = 11400
-# As a shell of that user would have it.
+# The environment of that user's shell.
 ROS = f"export ROS_MASTER_URI=http://localhost:{PORT} ROS_HOSTNAME=localhost; "
 
 
 @pytest.mark.parametrize("user", ["root", "mallory"])
 def test_the_papers_evaluation_runs_from_the_packages(machine: Machine, user: str) -> None:
     log = f"/var/tmp/launch-{user}"
-    # It gives nodes 15 s to end, of which a busy machine may need more.
+    # The default gives nodes 15 s to end, which a busy machine may exceed.
     roslaunch = f"roslaunch -p {PORT} --sigint-timeout=60 rtcf_examples paper_evaluation.launch"
     home = f"export HOME=~{user}; cd ~{user}"
     script = f"{ROS} {home}; export PYTHONUNBUFFERED=1; exec {roslaunch} >{log} 2>&1"
@@ -37,7 +37,7 @@ def test_the_papers_evaluation_runs_from_the_packages(machine: Machine, user: st
     assert "escalating" not in output.read_text()
 
 
-def test_the_launch_files_that_the_page_names_are_in_the_packages(machine: Machine) -> None:
+def test_the_launch_files_of_the_docs_are_in_the_packages(machine: Machine) -> None:
     text = (pages.TREE / "docs" / "launching.md").read_text()
     lines = (shlex.split(line, comments=True) for line in pages.shell_lines(text))
     named = [words[1:] for words in lines if words[0] == "roslaunch"]
@@ -46,7 +46,7 @@ def test_the_launch_files_that_the_page_names_are_in_the_packages(machine: Machi
         roslaunch = f"{ROS} export HOME=/root; roslaunch --files {shlex.join(words)}"
         (file,) = machine.shell(roslaunch).stdout.split()
         (package,) = machine.shell(f"dpkg-query --search {file} | cut -d: -f1").stdout.split()
-        assert package == "rtcf-components", "as the page says"
+        assert package == "rtcf-components", "the package named in the docs"
 
 
 @pytest.mark.parametrize("program", ["rt_runner", "rt_launcher", "component_list"])

@@ -1,4 +1,4 @@
-"""What README, docs and manual pages tell a reader to type, in a Debian with our packages."""
+"""The commands of README, docs and manual pages, in a Debian with rtcf's packages."""
 
 import json
 import re
@@ -8,12 +8,12 @@ from rtcf_service import Service
 
 
 def type_in(service: Service, lines: list[list[str]]) -> None:
-    """Type commands of rtcfctl as somebody does who may."""
+    """Run rtcfctl commands as a user with all rights."""
     for words in lines:
         service.ctl(*words[1:], user="alice")
 
 
-def test_the_tour_goes_as_it_is_told(service: Service) -> None:
+def test_the_tour_runs_as_documented(service: Service) -> None:
     type_in(service, pages.tour())
     assert "on_boot: start" in service.machine.shell("cat /tmp/tour.yaml").stdout
     service.ctl("stop")
@@ -31,8 +31,8 @@ def test_the_graph_of_the_example_is_applied_at_boot(service: Service) -> None:
     assert service.ctl("order").stdout.split()[-1] == "/B"
 
 
-def test_the_settings_of_the_example_are_taken(service: Service) -> None:
-    # In the place of ours, which are a container's.
+def test_the_settings_of_the_example_are_accepted(service: Service) -> None:
+    # Replaces our settings for a container.
     service.machine.path("/etc/rtcfd/rtcfd.toml").write_text(pages.example("rtcfd.toml.5"))
     service.systemctl("reload", "rtcfd")
     assert service.status()["settings"]["frequency_hz"] == 2000
@@ -45,15 +45,15 @@ def test_the_program_of_the_example_runs(service: Service) -> None:
     float(done.stdout)
 
 
-def test_a_graph_comes_with_each_boot_as_told(service: Service) -> None:
+def test_a_graph_is_loaded_at_boot_as_documented(service: Service) -> None:
     service.ctl("load", "rtcf_examples", "Mimo", "--name", "M")
     for line in pages.shell_lines((pages.TREE / "docs" / "boot.md").read_text()):
-        # Root needs no sudo, and a container may have none.
+        # Root needs no sudo, and a container may not have it.
         service.machine.shell(re.sub(r"^sudo ", "", line))
     assert service.machine.path("/etc/rtcfd/graphs.d/arm.yaml").is_file()
 
 
-def test_who_set_what_is_told_and_taken_back_as_told(service: Service) -> None:
+def test_parameter_changes_are_listed_and_undone_as_documented(service: Service) -> None:
     service.ctl("load", "rtcf_examples", "Wave", "--name", "wave", "--param", "amplitude:=1.5")
     service.ctl("set", "wave", "amplitude:=2.5", user="alice")
     for line in pages.shell_lines((pages.TREE / "docs" / "security.md").read_text()):

@@ -1,4 +1,4 @@
-"""Removal and purge; the last file, as nothing is left for others."""
+"""Removal and purge. The last file, since the packages are gone afterwards."""
 
 from machine import Machine, wait_for
 from rtcf_service import Service
@@ -7,10 +7,10 @@ PACKAGES = ("librtcf-dev", "python3-rtcf", "ros-rtcf", "rtcf-check", "rtcf-compo
             "rtcf-python", "rtcf-scope", "rtcfctl", "rtcfd")  # fmt: skip
 
 
-def test_removal_in_the_moment_after_rtcfd_died_ends_its_loops(machine: Machine) -> None:
+def test_removal_while_rtcfd_is_dead_ends_its_loops(machine: Machine) -> None:
     drop_in = machine.path("/etc/systemd/system/rtcfd.service.d/slow.conf")
     drop_in.parent.mkdir(parents=True, exist_ok=True)
-    # The moment is as long as the test needs it.
+    # Prolong the moment between the death of rtcfd and its restart.
     drop_in.write_text("[Service]\nRestartSec=infinity\n")
     service = Service(machine)
     try:
@@ -35,14 +35,14 @@ def test_an_installation_after_a_removal_starts_no_loop(machine: Machine) -> Non
     service.ctl("runner", "set", "--on-boot", "resume")
     machine.run("apt-get", "remove", "--yes", "--quiet", *PACKAGES)
     machine.shell("apt-get install --yes --quiet /debs/*.deb")
-    # Its graph is there, and was stopped in order.
+    # Its graph is restored; its loop was stopped before.
     assert service.ctl("order").stdout.split() == ["/M"]
     assert service.status()["state"] == "stopped"
     assert not service.said("loop resumed")
 
 
 def test_removal_ends_everything_and_keeps_settings_and_state(machine: Machine) -> None:
-    # Not by its fixture: afterwards there is no service to put back.
+    # Not the fixture: after this test there is no service to restore.
     service = Service(machine)
     service.reset()
     service.ctl("load", "rtcf_examples", "Mimo", "--name", "M")

@@ -1,4 +1,4 @@
-"""What a reboot of the machine makes of loops."""
+"""Loops across a reboot of the machine."""
 
 import pytest
 from machine import wait_for
@@ -7,7 +7,7 @@ from rtcf_service import Service
 
 @pytest.fixture
 def resuming(service: Service) -> Service:
-    """The service with a loop that runs, and is to be resumed at boot."""
+    """The service with a running loop that resumes at boot."""
     service.load_and_start()
     service.ctl("runner", "set", "--on-boot", "resume")
     return service

@@ -19,7 +19,7 @@ def test_a_component_is_loaded_and_runs(service: Service) -> None:
     assert "M" in service.ctl("order").stdout
 
 
-def test_the_journal_tells_what_happened_and_who_did_it(service: Service) -> None:
+def test_the_journal_records_actions_and_users(service: Service) -> None:
     service.ctl("load", "rtcf_examples", "Mimo", "--name", "M", user="alice")
     service.ctl("start", user="alice")
     wait_for(lambda: service.said("loop started"), "the start in the journal")
@@ -38,11 +38,11 @@ def test_the_first_client_starts_the_service_and_waits_for_it(service: Service) 
     service.systemctl("stop", "rtcfd.service")
     assert service.unit_property("ActiveState") == "inactive"
     assert "rt_runner" in service.ctl("status").stdout
-    # The client may have its answer before systemd has read that the service is ready.
-    wait_for(lambda: service.unit_property("ActiveState") == "active", "systemd to know of it")
+    # The client may get its answer before systemd has processed the notification.
+    wait_for(lambda: service.unit_property("ActiveState") == "active", "systemd to be notified")
 
 
-def test_a_client_that_comes_during_a_restart_waits(service: Service) -> None:
+def test_a_client_waits_during_a_restart(service: Service) -> None:
     restart = service.machine.start("systemctl", "restart", "rtcfd.service")
     while restart.poll() is None:
         service.ctl("status")
@@ -53,7 +53,7 @@ def test_a_reload_changes_settings_and_leaves_the_loop_alone(service: Service) -
     service.ctl("runner", "set", "--frequency", "50")
     before = service.load_and_start()
 
-    # What else runs on this machine may cost a cycle; a reload that always did would show.
+    # Other load of this machine may cost a cycle; a reload that always costs one fails.
     for attempt in range(10):
         missed = service.status().get("missed", 0)
         service.configure(f"[limits]\nclients = {100 + attempt}\n")
@@ -68,7 +68,7 @@ def test_a_reload_changes_settings_and_leaves_the_loop_alone(service: Service) -
     service.wait_until_said("limits changed")
 
 
-def test_a_reload_of_bad_settings_is_refused_with_the_line(service: Service) -> None:
+def test_a_reload_of_bad_settings_is_rejected_with_the_line(service: Service) -> None:
     before = service.load_and_start()
     service.machine.path(SETTINGS).write_text('[daemon]\nrealtime = "preferred"\nsokcet = "/x"\n')
     assert service.systemctl("reload", "rtcfd.service", check=False).returncode != 0
@@ -77,7 +77,7 @@ def test_a_reload_of_bad_settings_is_refused_with_the_line(service: Service) -> 
     assert service.status()["state"] == "running"
 
 
-def test_a_service_with_bad_settings_supervises_with_the_last_good_ones(service: Service) -> None:
+def test_a_service_with_bad_settings_uses_the_last_good_ones(service: Service) -> None:
     executor = service.load_and_start()["pid"]
     service.configure("[runner]\nfrequency_hz = 0\n")
     assert service.machine.run("rtcfd", "--check-config", check=False).returncode == 1
@@ -90,14 +90,14 @@ def test_a_service_with_bad_settings_supervises_with_the_last_good_ones(service:
     assert "last good" not in service.ctl("status").stdout
 
 
-def test_graphs_d_is_what_a_runner_has_at_boot(service: Service) -> None:
+def test_graphs_d_is_loaded_at_boot(service: Service) -> None:
     service.machine.path("/etc/rtcfd/graphs.d/line.yaml").write_text(GRAPH)
     service.start_anew()
     assert service.ctl("-o", "json", "order").stdout.count("/") == 2
     service.wait_until_said("runner rt_runner set up from /etc/rtcfd/graphs.d/line.yaml")
 
 
-def test_a_reload_applies_graphs_that_have_changed(service: Service) -> None:
+def test_a_reload_applies_changed_graphs(service: Service) -> None:
     before = service.load_and_start()
     service.machine.path("/etc/rtcfd/graphs.d/line.yaml").write_text(GRAPH)
     service.systemctl("reload", "rtcfd.service")

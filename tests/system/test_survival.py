@@ -1,4 +1,4 @@
-"""Loops outlive their supervisor, and the service outlives what happens to it."""
+"""Loops outlive rtcfd, and the service survives failures around it."""
 
 import json
 
@@ -12,11 +12,11 @@ def restarted(service: Service, before: int) -> bool:
     return service.pid not in (0, before) and service.unit_property("ActiveState") == "active"
 
 
-def test_a_killed_rtcfd_comes_back_to_a_loop_that_ran_on(service: Service) -> None:
+def test_a_killed_rtcfd_restarts_and_finds_its_loop_running(service: Service) -> None:
     before = service.load_and_start()
     killed = service.pid
     service.kill("KILL", killed)
-    # The client waits for the next one.
+    # The client waits for the next rtcfd.
     assert service.status()["pid"] == before["pid"]
     wait_for(lambda: restarted(service, killed), "another rtcfd")
     after = service.status()
@@ -44,10 +44,10 @@ def test_the_watchdog_replaces_an_rtcfd_that_hangs(service: Service) -> None:
         service.systemctl("daemon-reload")
 
 
-def test_a_journal_that_does_not_read_holds_up_nothing(service: Service) -> None:
+def test_a_stalled_journal_blocks_nothing(service: Service) -> None:
     before = service.load_and_start()
     journald = int(service.unit_property("MainPID", "systemd-journald.service"))
-    # More records than a socket of datagrams holds.
+    # More records than the buffer of a datagram socket.
     script = (
         "import rtcf\n"
         "with rtcf.Client() as client:\n"
@@ -68,7 +68,7 @@ def test_a_journal_that_does_not_read_holds_up_nothing(service: Service) -> None
     )
 
 
-def test_a_killed_executor_comes_back_with_its_graph(service: Service) -> None:
+def test_a_killed_executor_restarts_with_its_graph(service: Service) -> None:
     before = service.load_and_start()
     service.kill("KILL", before["pid"])
     wait_for(lambda: service.status().get("pid", 0) not in (0, before["pid"]), "another executor")
@@ -87,7 +87,7 @@ def test_reexecuting_systemd_changes_nothing(service: Service) -> None:
     assert int(after["iteration"]) > int(before["iteration"])
 
 
-def test_a_full_disk_is_told_and_survived(service: Service) -> None:
+def test_a_full_disk_is_reported_and_survived(service: Service) -> None:
     machine = service.machine
     service.systemctl("stop", "rtcfd.service")
     machine.run("mount", "-t", "tmpfs", "-o", "size=64k,mode=750,uid=rtcf,gid=rtcf", "tmpfs",
@@ -107,11 +107,11 @@ def test_a_full_disk_is_told_and_survived(service: Service) -> None:
         machine.run("umount", "/var/lib/rtcfd")
 
 
-def test_a_stop_is_final_on_a_read_only_disk_too(service: Service) -> None:
+def test_a_stop_is_final_on_a_read_only_disk(service: Service) -> None:
     machine = service.machine
 
     def anew() -> str:
-        service.systemctl("reset-failed", "rtcfd.service")  # so many starts in so short a time
+        service.systemctl("reset-failed", "rtcfd.service")  # many starts in a short time
         service.start_anew()
         return str(service.status()["state"])
 
@@ -123,12 +123,12 @@ def test_a_stop_is_final_on_a_read_only_disk_too(service: Service) -> None:
         service.systemctl("start", "rtcfd.service")
         service.load_and_start()
         machine.run("mount", "-o", "remount,ro", "/var/lib/rtcfd")
-        # As a restart leaves what runs.
+        # Running loops survive a restart.
         service.systemctl("restart", "rtcfd.service")
         assert service.status()["state"] == "running"
         assert "is not resumed" not in service.ctl("status").stdout
         assert "not saved: Read-only file system" in service.ctl("stop").stderr
-        # With what ran its executor goes, which knew of the stop.
+        # The executor, which remembered the stop, ends with the service.
         assert anew() == "stopped"
         machine.run("mount", "-o", "remount,rw", "/var/lib/rtcfd")
         assert anew() == "stopped"
@@ -153,7 +153,7 @@ def test_a_read_only_etc_is_enough(service: Service) -> None:
         machine.run("umount", "/etc")
 
 
-def test_a_corrupt_state_is_set_aside_and_told(service: Service) -> None:
+def test_a_corrupt_state_is_set_aside_and_reported(service: Service) -> None:
     service.load_and_start()
     service.systemctl("stop", "rtcfd.service")
     service.machine.shell("echo '{ \"version\": 1, ' > /var/lib/rtcfd/rt_runner.json")

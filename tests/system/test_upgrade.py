@@ -27,9 +27,9 @@ def test_a_reinstallation_leaves_the_loop_alone(service: Service) -> None:
     runs_on(service, before, daemon)
 
 
-def test_changes_go_on_while_all_packages_are_installed_anew(service: Service) -> None:
+def test_changes_continue_while_packages_are_reinstalled(service: Service) -> None:
     before, daemon = service.load_and_start(), service.pid
-    # A change after the other, by a client that has begun before.
+    # One change after the other, by a client that was started before.
     script = (
         "import pathlib, rtcf\n"
         "done = 0\n"
@@ -53,7 +53,7 @@ def test_changes_go_on_while_all_packages_are_installed_anew(service: Service) -
     runs_on(service, before, daemon)
 
 
-def test_services_beside_rtcfd_go_on_in_what_was_installed(service: Service) -> None:
+def test_metrics_and_scope_restart_after_a_reinstallation(service: Service) -> None:
     units = ("rtcf-scope.service", "rtcf-metrics.service")
 
     def processes() -> list[int]:
@@ -62,20 +62,20 @@ def test_services_beside_rtcfd_go_on_in_what_was_installed(service: Service) -> 
     packages = "/debs/rtcf-scope_*.deb /debs/rtcfctl_*.deb"
     reinstall = f"apt-get install --yes --quiet --reinstall {packages}"
     service.machine.shell(reinstall)
-    assert processes() == [0, 0], "what nobody has started stays off"
+    assert processes() == [0, 0], "services that were not started stay off"
     service.systemctl("start", *units)
     try:
         before = processes()
         service.machine.shell(reinstall)
         after = processes()
         assert all(after)
-        assert not set(before) & set(after), "the old code has gone"
+        assert not set(before) & set(after), "the old processes have ended"
     finally:
         service.systemctl("stop", *units)
 
 
 @pytest.mark.parametrize("distance", [-2, 2])
-def test_a_rtcfd_too_old_or_too_new_leaves_the_loop_running_and_says_so(
+def test_an_rtcfd_of_a_foreign_protocol_keeps_the_loop_and_reports_it(
     service: Service, distance: int
 ) -> None:
     machine, ours = service.machine, versions.protocol(service.machine)
@@ -106,10 +106,10 @@ def test_an_upgrade_leaves_the_loop_alone_until_the_restart(service: Service, hi
     service.machine.shell(f"apt-get install --yes --quiet {higher}")
     runs_on(service, before, daemon)
     assert "restart pending: rtcfd was upgraded" in service.ctl("status").stdout
-    # What is new works with what is old.
+    # New client, old executor.
     service.ctl("load", "rtcf_examples", "Identity", "--name", "new")
 
-    # The rtcfd of the next protocol works with the executor that runs on.
+    # An rtcfd with the next protocol works with the running executor.
     service.systemctl("restart", "rtcfd.service")
     assert service.pid != daemon
     runs_on(service, before, service.pid)

@@ -1,4 +1,4 @@
-"""The packages again, as if of another version; and rtcfd as if of another protocol."""
+"""Packages of another version, and an rtcfd of another protocol."""
 
 from machine import Machine
 
@@ -24,19 +24,19 @@ done
 
 
 def protocol(machine: Machine) -> int:
-    """Return the protocol of the rtcfd that is installed."""
+    """Return the protocol version of the installed rtcfd."""
     text = machine.path(f"{_PACKAGE}/executor/link.py").read_text()
     (line,) = [line for line in text.splitlines() if line.startswith("PROTOCOL = ")]
     return int(line.partition("= ")[2])
 
 
 def speak(machine: Machine, number: int) -> None:
-    """Make the rtcfd that is installed one of another protocol, from its next start on."""
+    """Set the protocol version of the installed rtcfd, from its next start on."""
     machine.shell(f"sed -i 's/^PROTOCOL = .*/PROTOCOL = {number}/' {_PACKAGE}/executor/link.py")
 
 
 def make_higher(machine: Machine, debs: str, into: str) -> str:
-    """Make packages of a higher version, whose rtcfd speaks the next protocol; return their
+    """Create packages of a higher version whose rtcfd speaks the next protocol; return their
     files."""
     values = {"debs": debs, "into": into, "package": _PACKAGE, "protocol": protocol(machine) + 1}
     machine.shell(_HIGHER.format(**values))

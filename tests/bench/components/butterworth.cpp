@@ -53,6 +53,6 @@ class Butterworth final : public rtcf::Component {
         y.write(x);
     }
 };
-RTCF_COMPONENT(Butterworth, "Lets low frequencies pass")
+RTCF_COMPONENT(Butterworth, "Low-pass filter")
 
 }  // namespace

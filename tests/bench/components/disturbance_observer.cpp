@@ -39,6 +39,6 @@ class DisturbanceObserver final : public rtcf::Component {
         contact.write(beyond >= 5);
     }
 };
-RTCF_COMPONENT(DisturbanceObserver, "Compensates for what acts on a drive beside its command")
+RTCF_COMPONENT(DisturbanceObserver, "Compensates for disturbances of a drive")
 
 }  // namespace

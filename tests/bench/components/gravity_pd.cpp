@@ -40,7 +40,7 @@ class GravityPd final : public rtcf::Component {
         }
         Eigen::Vector3d result = Eigen::Vector3d::Zero();
         for (int i = 0; i < kJoints; ++i) {
-            double before = 0.0;  // of the links from i up to k
+            double before = 0.0;  // of links i to k
             for (int k = i; k < kJoints; ++k) {
                 result[i] += kLinks[k].mass * kGravity * (kLinks[k].centre * along[k] + before);
                 before += kLinks[k].length * along[k];

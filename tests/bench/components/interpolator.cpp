@@ -14,7 +14,7 @@ class Interpolator final : public rtcf::Component {
     rtcf::Output<Vector6> position{this, "position"};
     rtcf::Output<Vector6> velocity{this, "velocity"};
     rtcf::Parameter<double> duration{this, "duration", 0.5, rtcf::Min(0.01), rtcf::Unit("s")};
-    // A column is what belongs to one power of time.
+    // Each column belongs to one power of time.
     rtcf::State<Matrix6> coefficients{this, "coefficients", Matrix6(Matrix6::Zero())};
     rtcf::State<double> passed{this, "passed", 0.0};
     rtcf::State<Vector6> q{this, "q", Vector6(Vector6::Zero())};

@@ -19,7 +19,7 @@ constexpr std::array<std::array<double, 7>, 4> kFriction{{
     {0.028, 0.033, 0.040, 0.049, 0.060, 0.073, 0.089},
 }};
 
-// The interval of a value, and how far it lies in it.
+// The interval of a value, and its position in the interval.
 template <std::size_t Size>
 std::pair<std::size_t, double> interval(const std::array<double, Size>& points, double x) {
     const auto after = std::lower_bound(points.begin(), points.end(), x) - points.begin();

@@ -4,7 +4,7 @@
 
 namespace {
 
-// Of two quaternions, w first.
+// Product of two quaternions, w first.
 Eigen::Vector4d product(const Eigen::Vector4d& p, const Eigen::Vector4d& q) {
     const Eigen::Vector3d a = p.tail<3>();
     const Eigen::Vector3d b = q.tail<3>();

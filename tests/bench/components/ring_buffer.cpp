@@ -14,7 +14,7 @@ constexpr int kTaps = 8;
 using Values = Eigen::Matrix<double, kSize, 1>;
 using Taps = Eigen::Matrix<double, kTaps, 1>;
 
-// The inner part of a Hann window, whose sum is one.
+// The inner part of a Hann window with sum one.
 Taps window() {
     Taps result;
     for (int i = 0; i < kTaps; ++i)
@@ -61,6 +61,6 @@ class RingBuffer final : public rtcf::Component {
         peak.write(largest);
     }
 };
-RTCF_COMPONENT(RingBuffer, "What a signal has been lately")
+RTCF_COMPONENT(RingBuffer, "Statistics of the latest values of a signal")
 
 }  // namespace

@@ -24,7 +24,7 @@ class SCurve final : public rtcf::Component {
 
     bool moving() const { return std::abs(v) > 1e-6 || std::abs(a) > 1e-4; }
 
-    // How fast it may be so that it can still stop there.
+    // The highest velocity from which it can still stop at the target.
     double wantedVelocity(double distance) const {
         const double ramp = max_acceleration * max_acceleration / max_jerk;
         const double speed =

@@ -1,6 +1,6 @@
 component rtcf_mimo "Sums its inputs that have new data: rtcf's Mimo in LinuxCNC HAL";
 description """
-HAL does not know whether a value is new, so that a count goes with each.
+HAL does not know whether a value is new, so each value has a count.
 """;
 pin in float in1;
 pin in u32 in1_count;
@@ -39,7 +39,7 @@ FUNCTION(_) {
         seen4 = in4_count;
         sum += in4;
     }
-    /* Sums in a loop grow without end; they begin anew before they lose precision. */
+    /* Sums in a loop grow without bound; restart before they lose precision. */
     if (sum > 1e20) sum = 1.0;
     out1 = sum;
     out1_count++;

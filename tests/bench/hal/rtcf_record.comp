@@ -1,9 +1,9 @@
-component rtcf_record "Records how long each cycle of its thread took";
+component rtcf_record "Records the duration of each cycle of its thread";
 description """
-Runs last in the thread, so that it warms no caches for the others, and takes
-what HAL has measured of the cycle before: the time of the whole thread less
-that of this function itself. Writes all
-samples, one number of ns a line, when it is unloaded.
+Runs last in the thread, so that it warms no caches for the other functions, and
+records HAL's measurement of the previous cycle: the time of the whole thread minus
+that of this function. Writes all samples, one number of ns per line, when it is
+unloaded.
 """;
 pin in s32 thread_time "the thread's time pin, ticks";
 pin in s32 own_time "time pin of this function, ticks";
@@ -16,9 +16,9 @@ include <stdio.h>;
 include <time.h>;
 ;;
 static char *file = "";
-RTAPI_MP_STRING(file, "where the samples go");
+RTAPI_MP_STRING(file, "file of the samples");
 static int skip = 2000;
-RTAPI_MP_INT(skip, "cycles left out at the beginning");
+RTAPI_MP_INT(skip, "cycles skipped at the beginning");
 
 #define LIMIT 4000000
 static int samples[LIMIT];

@@ -1,6 +1,6 @@
-// What a change costs the real-time thread at the cycle boundary, by the size of
-// the graph it is made in, with cold caches: a parameter, a component that is
-// loaded, one that is unloaded. Prints JSON.
+// Measures the time that the real-time thread spends at the cycle boundary on a change
+// of a parameter, a load and an unload, by the size of the graph, with cold caches.
+// Prints JSON.
 // Usage: adoption_cost LIBRARY [ROUNDS]
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -23,13 +23,13 @@ using rtcf::executor::HistogramSnapshot;
 constexpr std::size_t kLengths[] = {10, 1000, 4000};
 constexpr std::size_t kMoreThanCaches = std::size_t{128} << 20;  // bytes
 
-// What a cycle finds after others have used the processor.
+// The caches as a cycle finds them after other processes have used the CPU.
 void flushCaches() {
     static std::vector<unsigned char> memory(kMoreThanCaches);
     for (std::size_t at = 0; at < memory.size(); at += 64) ++memory[at];
 }
 
-// ns that the loop says an adoption took.
+// Duration of an adoption in ns, as the loop measures it.
 double adoptionOf(BenchGraph& graph, const std::function<void()>& change) {
     const HistogramSnapshot before = graph.loop().figures().adoption.snapshot();
     change();

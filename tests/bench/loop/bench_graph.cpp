@@ -48,7 +48,7 @@ BenchGraph::BenchGraph(const std::vector<Node>& nodes, const std::string& librar
     executor::Graph graph;
     for (const Node& node : nodes) {
         executor::Remaps remaps;
-        // A port without a connection gets a name of its own.
+        // A port without a connection gets a private name.
         for (const char* port : {"in1", "in2", "in3", "in4", "out1", "out2"}) {
             remaps.emplace_back(port, fmt::format("/{}/{}", node.name, port));
         }

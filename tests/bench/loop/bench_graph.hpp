@@ -1,7 +1,7 @@
 /// @file
-/// Graphs of the paper's Mimo component for the benches, made by the executor's
-/// own plugin loading, wiring and planning, and run by its own loop; without
-/// rtcfd, ROS and sockets. Owned by a bench's main().
+/// Graphs of the paper's Mimo component for the benchmarks, created by the executor's
+/// plugin loading, wiring and planning, and run by its loop, without rtcfd, ROS and
+/// sockets. Owned by a benchmark's main().
 #pragma once
 
 #include <cstddef>
@@ -18,8 +18,7 @@
 
 namespace rtcf::bench {
 
-/// One component of a graph: its name, and the mapped names of those of its ports that are
-/// connected.
+/// One component of a graph: its name, and the mapped names of its connected ports.
 struct Node {
     std::string name;
     std::vector<std::pair<std::string, std::string>> remaps;  ///< port, connection
@@ -43,14 +42,14 @@ class BenchGraph {
 
     executor::Loop& loop() noexcept { return loop_; }
     executor::Plan& plan() noexcept { return *plan_; }
-    /// A new value for each mapped input, as from a topic.
+    /// Writes a new value to each mapped input, as a topic does.
     void deliver();
-    /// A component beside the graph. @param remaps of its ports
+    /// Creates a component outside the graph. @param remaps of its ports
     std::shared_ptr<executor::Instance> make(const std::string& type, const std::string& name,
                                              executor::Remaps remaps = {}, bool first = false);
-    /// Has each cycle keep the values of all outputs and states.
+    /// Records the values of all outputs and states in each cycle.
     void keepFrames();
-    /// Makes `graph` what the loop executes.
+    /// Replaces the graph that the loop runs.
     void adopt(const executor::Graph& graph);
     /// The components in order of execution.
     const std::vector<Component*>& order() const noexcept { return order_; }

@@ -1,7 +1,7 @@
-// What the framework costs per component: chains of 1 to 1000 Mimo executed by
-// the executor's loop as fast as they go, against update() of the very same
-// components called in a plain loop, in turn with it, and against the cost of
-// one counter read in the same run. Prints JSON.
+// Measures the overhead of the framework per component: chains of 1 to 1000 Mimo, run by
+// the executor's loop without pacing, alternating with a plain loop that calls update() of
+// the same components, and compared with the duration of one counter read in the same run.
+// Prints JSON.
 // Usage: component_cost LIBRARY [ROUNDS]
 #include <fmt/format.h>
 #include <sched.h>
@@ -23,10 +23,10 @@ using rtcf::bench::BenchGraph;
 using rtcf::executor::readCycleCounter;
 
 constexpr std::size_t kLengths[] = {1, 10, 100, 1000};
-constexpr std::size_t kUpdatesPerTurn = 10000;  // short turns: most are not interrupted by anything
+constexpr std::size_t kUpdatesPerTurn = 10000;  // short turns: most are not interrupted
 constexpr double kBudgetAboveReadNs = 5.0;
 
-constexpr double kUndisturbed = 0.1;  // of all turns: nobody else has used the caches meanwhile
+constexpr double kUndisturbed = 0.1;  // share of turns in which no other process used the caches
 
 double quantile(std::vector<double> values, double share) {
     std::sort(values.begin(), values.end());
@@ -35,7 +35,7 @@ double quantile(std::vector<double> values, double share) {
 
 double median(std::vector<double> values) { return quantile(std::move(values), 0.5); }
 
-// Ticks of one counter read, back to back.
+// Ticks per counter read, back to back.
 double counterReadTicks() {
     constexpr int kReads = 4096;
     const std::int64_t begin = readCycleCounter();
@@ -44,7 +44,7 @@ double counterReadTicks() {
     return static_cast<double>(last - begin) / kReads;
 }
 
-// Ticks of one cycle of the chain, the framework's and the plain one's.
+// Ticks per cycle of the chain, in rtcf's loop and in the plain loop.
 struct Turn {
     double loop;
     double direct;
@@ -65,7 +65,7 @@ Turn turn(BenchGraph& graph, std::uint64_t cycles) {
     return {static_cast<double>(middle - begin) / count, static_cast<double>(end - middle) / count};
 }
 
-// On one CPU, so that all turns see the same caches.
+// Pins the process to one CPU, so that all turns use the same caches.
 void pin() {
     cpu_set_t cpus;
     CPU_ZERO(&cpus);
@@ -78,7 +78,7 @@ struct Row {
     double loop_ns;
     double direct_ns;
     double framework_ns;    // per cycle: median of the differences of neighbouring turns
-    double undisturbed_ns;  // and the same of the best turns
+    double undisturbed_ns;  // the same for the best turns
 };
 
 }  // namespace
@@ -124,8 +124,8 @@ int main(int argc, char** argv) try {
     fmt::print(R"({{"counter_read_ns": {:.2f}, "budget_ns": {:.2f}, "rounds": {}, "chains": [)",
                read_ns, budget_ns, rounds);
     for (const Row& row : rows) {
-        // A cycle costs something by itself, which the chain of one shows; what each further
-        // component costs is the slope from there.
+        // A cycle has a fixed duration, which the chain of one shows. The slope from there is the
+        // duration per added component.
         const auto further = [&](double present, double first) {
             return row.length == 1 ? present
                                    : (present - first) / static_cast<double>(row.length - 1);

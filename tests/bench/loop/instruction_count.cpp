@@ -1,9 +1,8 @@
-// Counts the instructions of a cycle: the executor's loop runs a graph in a
-// child process, single-stepped, and every read of its time stamp counter gets
-// the number of instructions so far. What the loop then says of itself, its
-// calculation duration and that of each component, is in instructions, and
-// repeats to the instruction; `whole` is what a step takes, the cycle's record
-// and the pacing included. Prints JSON. x86-64 only.
+// Counts the instructions of a cycle. The executor's loop runs a graph in a child process,
+// single-stepped, and each read of the time stamp counter returns the number of
+// instructions so far. The loop's statistics, its calculation duration and that of each
+// component, are then instruction counts, exact and reproducible. `whole` is a full step,
+// including the cycle record and the pacing. Prints JSON. x86-64 only.
 // Usage: instruction_count LIBRARY fig1|frames|mapped|CHAIN [CYCLES]
 #include <fmt/format.h>
 #include <sys/ptrace.h>
@@ -26,7 +25,7 @@ namespace {
 constexpr const char* kTopics = ".*R3_G2H1|.*R1_H1R2|.*G2_R2";
 constexpr std::uint64_t kWarmUp = 10;  // cycles
 
-// The child: stops itself before and after what is to be counted.
+// The child: stops itself before and after the counted part.
 int runCounted(const std::string& library, const std::string& which, std::uint64_t cycles) {
     using namespace rtcf;
     const bool paper = which == "fig1" || which == "frames" || which == "mapped";
@@ -39,7 +38,7 @@ int runCounted(const std::string& library, const std::string& which, std::uint64
     graph.loop().step(kWarmUp);
     ptrace(PTRACE_TRACEME, 0, nullptr, nullptr);
     raise(SIGSTOP);
-    // What a cycle takes after its last look at the counter is seen from here alone.
+    // The end of a cycle, after its last counter read, is visible from here only.
     const auto taken = [&](std::uint64_t steps) {
         const std::int64_t begin = executor::readCycleCounter();
         graph.loop().step(steps);
@@ -51,7 +50,7 @@ int runCounted(const std::string& library, const std::string& which, std::uint64
         whole += taken(1) - taken(0);
     }
     raise(SIGSTOP);
-    // The mean and the maximum are exact, the histogram's quantiles are not.
+    // Mean and maximum are exact, the histogram's quantiles are not.
     const executor::DistributionSummary cycle =
         summarize(graph.loop().figures().duration.snapshot(), 1.0);
     fmt::print(
@@ -82,7 +81,7 @@ bool readsCounter(pid_t child, const user_regs_struct& registers) {
     return errno == 0 && (word & 0xffff) == kOpcode;
 }
 
-// Steps the child from its first SIGSTOP to its second.
+// Single-steps the child from its first SIGSTOP to its second.
 bool count(pid_t child) {
     if (!waitForStop(child)) return false;
     for (std::uint64_t instructions = 0;; ++instructions) {

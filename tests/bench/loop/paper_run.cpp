@@ -1,6 +1,6 @@
-// Runs Fig. 1 of the paper with the executor's own real-time loop and writes
-// every cycle's calculation duration and wake-up latency: one line
-// "duration_ns latency_ns" per cycle. ROS mappings are off.
+// Runs Fig. 1 of the paper in the executor's real-time loop and writes the calculation
+// duration and wake-up latency of each cycle, one line "duration_ns latency_ns" per cycle.
+// ROS mappings are off.
 // Usage: paper_run LIBRARY FREQUENCY_HZ SECONDS PRIORITY CPU SPIN_US FILE
 #include <fmt/format.h>
 

@@ -1,6 +1,6 @@
-// What update() takes of components of one name in two libraries, in turn, on the same inputs,
-// which are new in each cycle. Compares what both write before it measures. Prints JSON. Usage:
-// update_cost LIBRARY REFERENCE TYPE...
+// Measures update() of components of the same name in two libraries, alternating, on the same
+// inputs, which are new in each cycle. Compares the outputs of both first. Prints JSON.
+// Usage: update_cost LIBRARY REFERENCE TYPE...
 #include <dlfcn.h>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -25,11 +25,11 @@
 namespace {
 
 constexpr int kRounds = 201;
-constexpr int kUpdates = 1000;       // a round's
+constexpr int kUpdates = 1000;       // per round
 constexpr int kCompared = 5000;      // updates
-constexpr double kTolerance = 1e-6;  // of values that went through thousands of updates
+constexpr double kTolerance = 1e-6;  // after thousands of updates
 
-// An input: a slow wave with noise, or, if it is written every few cycles, steps.
+// An input signal: a slow wave with noise, or steps if it is written every few cycles.
 struct Signal {
     double mean = 0.0;
     double amplitude = 1.0;
@@ -58,7 +58,7 @@ Signal signalOf(const std::string& type, const std::string& input) {
     return found != signals.end() ? found->second : Signal{};
 }
 
-// A component by itself, with inputs that are written before each update.
+// A component alone, whose inputs are written before each update.
 class Contender {
    public:
     Contender(const char* library, const std::string& type) : name_(library + (": " + type)) {
@@ -71,7 +71,7 @@ class Contender {
         if (!component_->prepare(rtcf::Values{}) || !component_->configure()) fail();
         for (rtcf::DerivedBase* derived : component_->derived())
             if (derived->staged()) derived->commit();
-        // By name: the two may declare their ports in another order.
+        // By name: the two may declare their ports in different orders.
         std::vector<rtcf::InputBase*> inputs = component_->inputs();
         std::sort(inputs.begin(), inputs.end(),
                   [](const auto* a, const auto* b) { return a->name() < b->name(); });
@@ -83,7 +83,7 @@ class Contender {
         if (!component_->start()) fail();
     }
 
-    // @return ns of writing the inputs of one update, and of that and the update itself
+    // @return ns of writing the inputs of one update, and of writing plus the update
     std::pair<double, double> round() {
         const auto begin = std::chrono::steady_clock::now();
         for (int i = 0; i < kUpdates; ++i) write();
@@ -103,7 +103,7 @@ class Contender {
         component_->update();
     }
 
-    // @throws what differs between the outputs of two contenders, beyond rounding
+    // @throws std::runtime_error if the outputs of two contenders differ beyond rounding
     void compare(const Contender& other, int cycle) const {
         if (outputs_.size() != other.outputs_.size())
             throw std::runtime_error(name_ + ": other outputs than the reference");
@@ -132,7 +132,7 @@ class Contender {
                (header + info.alignment - 1) / info.alignment * info.alignment;
     }
 
-    // Of doubles alone.
+    // For inputs of doubles only.
     void feed(rtcf::InputBase& input, const Signal& signal, std::mt19937& draw) {
         const rtcf::TypeInfo& info = input.type();
         slots_.push_back(info.make_slot(nullptr));
@@ -147,7 +147,7 @@ class Contender {
         found.place = valueOf(*found.slot, info);
         for (int i = 0; i < kUpdates; ++i) {
             for (std::size_t k = 0; k < elements; ++k) {
-                // Whole waves in a round, which begins anew at its end.
+                // Whole waves per round, since it restarts at its end.
                 const double turns = static_cast<double>(k % 3 + 1) * i / kUpdates;
                 const double wave = std::sin(2.0 * M_PI * turns + phases[k]);
                 found.values.push_back(signal.mean + signal.amplitude * wave +
@@ -229,7 +229,7 @@ double median(std::vector<double> values) {
     return values[values.size() / 2];
 }
 
-// The medians of one contender's rounds.
+// Medians over the rounds of one contender.
 class Times {
    public:
     void add(std::pair<double, double> round) {

@@ -1,12 +1,12 @@
 #!/bin/bash
-# In the virtual machine: Fig. 1 by rtcf and by HAL, and cyclictest, at 2 kHz,
-# idle and under load. Leaves samples in $OUT.
+# In the virtual machine: Fig. 1 in rtcf and in HAL, and cyclictest, at 2 kHz,
+# idle and under load. Writes the samples to $OUT.
 set -eu
 cycles=${CYCLES:-20000}
 seconds=$((cycles / 2000))
 tar -C / -xf files.tar --skip-old-files
 ldconfig
-# The first seconds after booting have outliers of their own.
+# The first seconds after booting have outliers.
 udevadm settle
 sleep 5
 
@@ -19,8 +19,8 @@ rtcf() { # KIND SPIN_US FILE
   ./bench_paper_run ./rtcf_examples.so 2000 "$seconds" 80 0 "$2" "$OUT/$3.$1" >"$OUT/$3.$1.json"
 }
 
-# Started ahead of the load, which otherwise halcmd's many short processes wait for. Their priority
-# is not that of HAL's real-time thread.
+# Started with a high priority, since halcmd's many short processes would wait for the load
+# otherwise. HAL's real-time thread has its own priority.
 hal() { # KIND COMPONENT COUNTS FILE
   export RTAPI_UID=65534 RTAPI_FIFO_PATH=/tmp/rtapi_fifo
   mkdir -p /tmp/hal

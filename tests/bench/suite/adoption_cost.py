@@ -1,4 +1,4 @@
-"""What a change costs the cycle that adopts it, by the size of the graph."""
+"""Time of the cycle that adopts a change, by the size of the graph."""
 
 import json
 
@@ -12,7 +12,7 @@ def run(setting: Setting) -> Result:
     found = json.loads(output_of([setting.program("adoption_cost"), str(setting.library)]))
     result = Result(
         "adoption_cost",
-        "what a change takes of the cycle that adopts it, caches cold",
+        "time to adopt a change, within the cycle, cold caches",
         ["components", "set ns", "load ns", "unload ns"],
     )
     for graph in found["graphs"]:

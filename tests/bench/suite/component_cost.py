@@ -1,4 +1,4 @@
-"""What the framework costs per component, against the same update() called directly."""
+"""Overhead of the framework per component, against direct calls of the same update()."""
 
 import json
 
@@ -8,12 +8,12 @@ from setting import Setting
 
 
 def run(setting: Setting) -> Result:
-    """Measure chains of 1 to 1000 components, as fast as they go."""
+    """Measure chains of 1 to 1000 components, without pacing."""
     found = json.loads(output_of([setting.program("component_cost"), str(setting.library)]))
     result = Result(
         "component_cost",
-        "cost per component: the loop against a plain loop over the same update(), warm",
-        ["chain", "loop ns", "direct ns", "framework ns", "per further component", "undisturbed"],
+        "time per component: rtcf's loop against a plain loop over the same update(), warm",
+        ["chain", "loop ns", "direct ns", "framework ns", "per added component", "undisturbed"],
     )
     for chain in found["chains"]:
         result.rows.append(
@@ -29,7 +29,7 @@ def run(setting: Setting) -> Result:
         if chain["length"] > 1:
             result.budgets.append(
                 Budget(
-                    f"chain of {chain['length']}, a counter read + 5 ns",
+                    f"chain of {chain['length']}, limit: a counter read + 5 ns",
                     chain["undisturbed_ns"],
                     found["budget_ns"],
                     "ns",
@@ -37,10 +37,10 @@ def run(setting: Setting) -> Result:
             )
     result.notes.append(
         f"one counter read takes {found['counter_read_ns']:.1f} ns; medians of "
-        f"{found['rounds']} interleaved rounds; the chain of 1 shows what a cycle costs by itself"
+        f"{found['rounds']} interleaved rounds; the chain of 1 shows the fixed time of a cycle"
     )
     result.notes.append(
-        "undisturbed: of the best tenth of the rounds, which is what the budgets are held "
+        "undisturbed: the best tenth of the rounds, to which the budgets apply: other "
         "against: where others use the core in between, its caches are not warm"
     )
     return result

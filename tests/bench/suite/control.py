@@ -1,4 +1,4 @@
-"""How long control takes: calls, loading, whole graphs; and the memory it all takes."""
+"""Duration of control calls, loads and whole graphs; memory of rtcfd and executor."""
 
 import functools
 import time
@@ -23,8 +23,8 @@ _REFERENCE = ("/usr/bin/python3", "-I", "-c", "import grpc")
 
 
 def run(setting: Setting) -> Result:
-    """Measure against a loop that runs at 2 kHz, then against one that stands still."""
-    result = Result("control", "control: medians", ["what", "ms", "ms of CPU"])
+    """Measure with a loop running at 2 kHz, then with a stopped one."""
+    result = Result("control", "control: medians", ["action", "ms", "ms of CPU"])
     with Daemon(setting) as daemon:
         client = daemon.client
         client.set_runner(settings=runner_pb2.RunnerSettings(frequency_hz=FREQUENCY_HZ))
@@ -55,7 +55,7 @@ def run(setting: Setting) -> Result:
         [what, cost.clock, cost.cpu]
         for what, cost in (
             ("rtcfctl status, cold", cold),
-            ("in turn with it: Python loading gRPC", median_cost(references)),
+            ("alternating with it: Python importing gRPC", median_cost(references)),
             (f"load one component into Fig. 1 at {FREQUENCY_HZ} Hz, rtcfctl", by_rtcfctl),
             (f"load one component into Fig. 1 at {FREQUENCY_HZ} Hz, Python client", by_client),
             (f"load {_LONG_CHAIN} components one by one, Python client", long_chain),
@@ -69,15 +69,15 @@ def run(setting: Setting) -> Result:
         Budget("one more component into it", one_more.clock, 20.0, "ms"),
     ]
     result.notes.append(
-        f"others: in {busy_with_others():.0%} of the last minute something waited for a CPU; what "
-        "the clock shows above the CPU time is mostly that"
+        f"load: in {busy_with_others():.0%} of the last minute tasks waited for a CPU; most of the "
+        "elapsed time above the CPU time is such waits"
     )
     return result
 
 
 def run_memory(setting: Setting) -> Result:
-    """Measure what rtcfd and an executor with its ROS node take, with Fig. 1 running."""
-    result = Result("memory", "memory, Fig. 1 running, with ROS", ["process", "what", "MB"])
+    """Measure the memory of rtcfd and of an executor with ROS node while Fig. 1 runs."""
+    result = Result("memory", "memory, Fig. 1 running, with ROS", ["process", "measure", "MB"])
     with Daemon(setting, ros=True) as daemon:
         for component in paper():
             daemon.client.load(component)
@@ -94,7 +94,7 @@ def run_memory(setting: Setting) -> Result:
     ]
     result.budgets = [
         Budget("rtcfd", rtcfd, 80.0, "MB"),
-        # Locked pages are resident; VmLck counts reserved addresses besides.
+        # Locked pages are resident; VmLck also counts reserved addresses.
         Budget("executor with ROS", resident, 64.0, "MB locked"),
     ]
     return result

@@ -1,4 +1,4 @@
-"""rtcfd of the build tree, started for one bench in a folder of its own."""
+"""rtcfd of the build tree, started for one benchmark in its own folder."""
 
 import os
 import subprocess
@@ -15,7 +15,7 @@ _DEADLINE_S = 60.0
 
 
 class Daemon:
-    """A running rtcfd, ended with the block it is used in."""
+    """A running rtcfd, stopped at the end of the `with` block."""
 
     def __init__(self, setting: Setting, ros: bool = False) -> None:
         self._setting = setting
@@ -26,7 +26,7 @@ class Daemon:
         folder = Path(self._folder.name)
         self.socket = folder / "s"
         config = folder / "rtcfd.toml"
-        # A port that nobody listens at: the node waits for a master all the time.
+        # No process listens at this port, so the node waits for a master all the time.
         ros = "master_uri = 'http://localhost:1'" if self._ros else "enabled = false"
         config.write_text(f"[runner.ros]\n{ros}\n")
         self._log = (folder / "log").open("w")
@@ -64,7 +64,7 @@ class Daemon:
         self._folder.cleanup()
 
     def program(self, name: str) -> str:
-        """Return the path of one of rtcf's programs."""
+        """Return the path of a program of rtcf."""
         return str(self._setting.build / "bin" / name)
 
     def call(self, *arguments: str) -> None:

@@ -1,4 +1,4 @@
-"""Graphs of Mimo components, as rtcf.Client takes them."""
+"""Graphs of Mimo components, for rtcf.Client."""
 
 import rtcf
 from rtcf.v1 import graph_pb2
@@ -7,13 +7,13 @@ _PORTS = ("in1", "in2", "in3", "in4", "out1", "out2")
 
 
 def mimo(name: str, connections: dict[str, str], first: bool = False) -> graph_pb2.ComponentSpec:
-    """Return a Mimo whose ports have these connections, and private names otherwise."""
+    """Return a Mimo with these connections; all other ports get private names."""
     remaps = [f"{port}:={connections.get(port, f'~{port}')}" for port in _PORTS]
     return rtcf.component("rtcf_examples", "Mimo", name=name, remaps=remaps, first=first)
 
 
 def chain(length: int, first: int = 0) -> list[graph_pb2.ComponentSpec]:
-    """Return components first, first+1, … that each read from the one before."""
+    """Return components first, first+1, …, each reading from its predecessor."""
     return [
         mimo(f"C{i:04}", {"out1": f"/c{i:04}"} | ({"in1": f"/c{i - 1:04}"} if i > 0 else {}))
         for i in range(first, first + length)

@@ -1,4 +1,4 @@
-"""Changes of a running graph at 2 kHz: what they cost the loop."""
+"""Changes of a running graph at 2 kHz and their cost in the loop."""
 
 import time
 from pathlib import Path
@@ -12,13 +12,13 @@ from setting import FREQUENCY_HZ, Setting
 from daemon import Daemon
 
 _CHANGES = 1000
-_WARM_UP = 52  # as _CHANGES, a multiple of 4: it leaves the graph as it was
+_WARM_UP = 52  # like _CHANGES, a multiple of 4, which restores the graph
 
 
 def run(setting: Setting) -> Result:
-    """Load, rewire and unload 1000 times, and look at cycles, page faults and memory."""
+    """Load, rewire and unload 1000 times; report cycles, page faults and memory."""
     result = Result(
-        "hot_swap", f"{_CHANGES} changes of Fig. 1 running at {FREQUENCY_HZ} Hz", ["what", "value"]
+        "hot_swap", f"{_CHANGES} changes of Fig. 1 running at {FREQUENCY_HZ} Hz", ["", "value"]
     )
     with Daemon(setting) as daemon:
         client = daemon.client
@@ -38,7 +38,7 @@ def run(setting: Setting) -> Result:
         memory = _resident_kb(daemon) - memory
         client.stop()
     period_ns = 1e9 / FREQUENCY_HZ
-    # A cycle missed although its own calculation was short was taken from us by the machine.
+    # If the calculation is short, the machine's other load caused the missed cycle.
     own = found.missed if found.duration.max_ns > period_ns else 0
     result.rows = [
         ["changes per second", _CHANGES / elapsed],

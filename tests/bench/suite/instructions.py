@@ -1,4 +1,4 @@
-"""How many instructions a cycle takes: exact, whatever the machine is doing."""
+"""Number of instructions per cycle: exact, independent of the machine's load."""
 
 import json
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ from processes import output_of
 from result import Budget, Result
 from setting import Setting
 
-FIG_1_INSTRUCTIONS = 225.0  # LinuxCNC HAL takes 240 for plain sums, 348 for what Mimo does
+FIG_1_INSTRUCTIONS = 225.0  # LinuxCNC HAL: 240 for plain sums, 348 for the same as Mimo
 _MAPPED_PORTS = 3
 _TITLES = {
     "1": "chain of 1",
@@ -21,7 +21,7 @@ _TITLES = {
 
 @dataclass(frozen=True)
 class Counts:
-    """Instructions of a cycle of one graph."""
+    """Instructions per cycle of one graph."""
 
     calculation: float  # from the end of the wait to just before the cycle is recorded
     largest: int
@@ -36,7 +36,7 @@ def count(setting: Setting, graph: str) -> Counts:
 
 
 def budgets(counts: dict[str, Counts]) -> list[Budget]:
-    """Return the figures that are held against a budget, as docs/performance.md names them."""
+    """Compute the results that have a budget, named as in docs/performance.md."""
     fig_1 = counts["fig1"]
     ports = (counts["mapped"].whole - fig_1.whole) / _MAPPED_PORTS
     chain = (counts["10"].calculation - counts["2"].calculation) / 8
@@ -52,7 +52,7 @@ def run(setting: Setting) -> Result:
     """Count by single-stepping the executor's loop."""
     result = Result(
         "instructions",
-        "instructions of a cycle: from the end of the wait to before the cycle record, and whole",
+        "instructions per cycle: from the end of the wait to before the cycle record, and whole",
         ["graph", "instructions", "max", "whole"],
     )
     counts = {graph: count(setting, graph) for graph in _TITLES}

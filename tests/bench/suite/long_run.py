@@ -12,7 +12,7 @@ _SHORT_S = 20.0
 
 
 def run(setting: Setting) -> Result:
-    """Run for HOURS, or for some seconds, under stress-ng; draw how the figures are distributed."""
+    """Run for HOURS, or some seconds, under stress-ng; plot the distributions."""
     seconds = setting.hours * 3600 or _SHORT_S
     result = Result(
         "long_run",
@@ -39,8 +39,8 @@ def run(setting: Setting) -> Result:
 
 
 def draw(found: PaperRun, file: Path) -> None:
-    """Draw both distributions, counts on a logarithmic scale as in the paper."""
-    import matplotlib  # it takes a second, which only this bench has to spend
+    """Plot both distributions, counts on a logarithmic scale as in the paper."""
+    import matplotlib  # takes a second and is needed here only
 
     matplotlib.use("Agg")
     from matplotlib import pyplot

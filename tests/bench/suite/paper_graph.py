@@ -1,4 +1,4 @@
-"""Runs of Fig. 1 of the paper in real time: by rtcf's loop, and by LinuxCNC HAL."""
+"""Runs of Fig. 1 of the paper in real time: in rtcf's loop and in LinuxCNC HAL."""
 
 import contextlib
 import json
@@ -17,10 +17,10 @@ from setting import FREQUENCY_HZ, PRIORITY, Setting
 
 _HAL = Path(__file__).resolve().parent.parent / "hal"
 _MODULES = Path("/usr/lib/linuxcnc/modules")
-HAL_MIMO = "rtcf_mimo"  # takes new values only, as rtcf's does
-HAL_SUM = "rtcf_sum"  # takes all
+HAL_MIMO = "rtcf_mimo"  # sums only new values, as rtcf's Mimo
+HAL_SUM = "rtcf_sum"  # sums all values
 HAL_COMPONENTS = (HAL_MIMO, HAL_SUM, "rtcf_record")
-_SKIP = 3000  # cycles, in which the threads get their priority
+_SKIP = 3000  # cycles during which the threads get their priority
 _NOBODY = 65534
 
 
@@ -40,7 +40,7 @@ def run_rtcf(
     spin_us: int = 0,
     samples: Path | None = None,
 ) -> PaperRun:
-    """Run Fig. 1 by rtcf; `samples` is where to keep the cycles' figures."""
+    """Run Fig. 1 in rtcf. `samples` is the file for durations and latencies."""
     file = samples or setting.output / "rtcf.samples"
     command = [
         *(setting.program("paper_run"), str(setting.library), str(frequency_hz), str(seconds)),
@@ -53,7 +53,7 @@ def run_rtcf(
 
 @contextlib.contextmanager
 def hal_components(setting: Setting) -> Iterator[None]:
-    """Build HAL's Mimo and lend it to the HAL of this machine, which has one folder for all."""
+    """Build HAL's Mimo and link it into the machine's only HAL folder for the block."""
     folder = setting.output / "hal"
     folder.mkdir(parents=True, exist_ok=True)
     for name in HAL_COMPONENTS:
@@ -77,10 +77,10 @@ def hal_components(setting: Setting) -> Iterator[None]:
 
 
 def run_hal(seconds: float, component: str = HAL_MIMO) -> Samples:
-    """Run Fig. 1 by HAL, with hal_components(); return the cycles' durations in ns."""
+    """Run Fig. 1 in HAL, within hal_components(); return the cycles' durations in ns."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        folder.chmod(0o777)  # HAL gives up its rights before it writes
+        folder.chmod(0o777)  # HAL drops its privileges before it writes
         text = (_HAL / "fig1.hal.in").read_text()
         for key, value in {
             "COMPONENT": component,
@@ -120,10 +120,10 @@ def run_hal(seconds: float, component: str = HAL_MIMO) -> Samples:
 
 
 def _make_realtime(process: "subprocess.Popen[bytes]", deadline_s: float) -> None:
-    """Give HAL's threads the priority that rtcf's has, where HAL does not do it by itself.
+    """Return HAL's threads rtcf's priority where HAL itself does not.
 
-    HAL asks for I/O privileges first, which many virtual machines refuse, and goes on without
-    real time then.
+    HAL first requests I/O privileges, which many virtual machines refuse; it then continues
+    without real time.
     """
     deadline = time.monotonic() + deadline_s
     while time.monotonic() < deadline and process.poll() is None:
@@ -135,7 +135,7 @@ def _make_realtime(process: "subprocess.Popen[bytes]", deadline_s: float) -> Non
 
 
 def _other_threads(program: str) -> list[int]:
-    """Return all threads but the first one of each process that runs this program."""
+    """Return all threads but the first of each process that runs this program."""
     found = []
     for folder in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):

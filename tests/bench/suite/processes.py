@@ -1,4 +1,4 @@
-"""Programs that a bench runs, each with an end in sight."""
+"""Programs that a benchmark runs, each with a timeout."""
 
 import contextlib
 import os
@@ -11,13 +11,13 @@ _MARGIN_S = 60.0
 
 
 class Failed(Exception):
-    """A program that a bench needs failed; the text says which and why."""
+    """A program that a benchmark needs failed. The text gives its name and the reason."""
 
 
 def output_of(
     command: Sequence[str], seconds: float = 0.0, environment: Mapping[str, str] | None = None
 ) -> str:
-    """Return what a program prints that is to take about so long."""
+    """Return the output of a program that should take `seconds`."""
     try:
         done = subprocess.run(
             command,
@@ -28,7 +28,7 @@ def output_of(
             check=False,
         )
     except FileNotFoundError:
-        raise Failed(f"there is no {command[0]}") from None
+        raise Failed(f"{command[0]} is not installed") from None
     except subprocess.TimeoutExpired:
         raise Failed(f"{command[0]} does not end") from None
     if done.returncode != 0:
@@ -38,14 +38,14 @@ def output_of(
 
 
 def missing(*programs: str) -> str:
-    """Return what has to be installed; empty if all programs are there."""
+    """Return a text with the programs to install; empty if none is missing."""
     absent = [program for program in programs if shutil.which(program) is None]
     return f"not installed: {', '.join(absent)}" if absent else ""
 
 
 @contextlib.contextmanager
 def load(kind: str) -> Iterator[None]:
-    """Load the machine as the paper did, if `kind` is "stress-ng", until the end of the block."""
+    """Load the machine as in the paper until the end of the block, if `kind` is "stress-ng"."""
     if kind != "stress-ng":
         yield
         return

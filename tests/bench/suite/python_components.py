@@ -1,4 +1,4 @@
-"""What update() takes of the example controllers in Python, against the same in C++ with Eigen."""
+"""Duration of update() of example controllers: compiled Python against C++ with Eigen."""
 
 import json
 from pathlib import Path
@@ -8,7 +8,7 @@ from result import Budget, Result
 from setting import Setting
 
 EXAMPLES = Path(__file__).parents[3] / "components" / "rtcf_examples" / "python"
-# By their files' names: types, and how many times as long as in C++ one may take.
+# By file name: type, and limit of the duration as a multiple of C++'s.
 CONTROLLERS = {
     "butterworth": ("Butterworth", 2.0),
     "disturbance_observer": ("DisturbanceObserver", 2.0),
@@ -26,7 +26,7 @@ CONTROLLERS = {
 
 
 def run(setting: Setting) -> Result:
-    """Compile them, and measure both in turn."""
+    """Compile the controllers in Python and measure both, alternating."""
     library = setting.output / "controllers.so"
     sources = [str(EXAMPLES / f"{name}.py") for name in CONTROLLERS]
     output_of([str(setting.build / "bin/rtcf-compile"), *sources, "-o", str(library)], 60.0)
@@ -37,7 +37,7 @@ def run(setting: Setting) -> Result:
     )
     result = Result(
         "python_components",
-        "update() of controllers in Python, compiled, against the same in C++ with Eigen, -O2",
+        "update() of controllers: compiled Python against C++ with Eigen, -O2",
         ["controller", "Python ns", "C++ ns", "ratio"],
     )
     at_most = dict(CONTROLLERS.values())
@@ -48,9 +48,9 @@ def run(setting: Setting) -> Result:
             Budget(f"{name} in Python, against C++", ratio, at_most[name], "times")
         )
     result.notes.append(
-        f"medians of {found['rounds']} rounds of {found['updates']} updates, in turn, on the same "
-        f"inputs, which are new before each; without the time of writing these. The outputs of "
+        f"medians of {found['rounds']} rounds of {found['updates']} updates, alternating, on the "
+        f"same inputs, new for each update; writing the inputs excluded. The outputs of "
         f"{found['compared']} updates were the same within {found['tolerance']:g}. Indices are "
-        "checked in Python alone"
+        "checked in Python only"
     )
     return result

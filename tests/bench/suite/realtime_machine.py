@@ -16,13 +16,13 @@ from setting import Setting
 _RT = Path(__file__).resolve().parent.parent / "rt"
 _HAL = Path(__file__).resolve().parent.parent / "hal"
 _HAL_PROGRAMS = ("/usr/bin/halrun", "/usr/bin/halcmd", "/usr/bin/rtapi_app")
-_BOOT_S = 3000.0  # of a host that is busy
+_BOOT_S = 3000.0  # on a busy host
 _INSTRUCTION_NS = 2.0
 _KINDS = ("idle", "stress-ng")
 
 
 def run(setting: Setting, boots: int) -> Result:
-    """Boot so many times; return the medians of each boot's figures."""
+    """Boot `boots` times; return the medians over the boots."""
     if absent := missing("qemu-system-x86_64", "mmdebstrap", "mke2fs", "debugfs"):
         raise Failed(absent)
     cache = setting.build / "rtvm"
@@ -37,7 +37,7 @@ def run(setting: Setting, boots: int) -> Result:
             command = [str(_RT / "rtvm"), "run", str(cache), str(payload), str(folder)]
             done = subprocess.run(command, timeout=_BOOT_S, check=False)
             if done.returncode != 0:
-                raise Failed(f"the machine's run failed; see {folder}/log")
+                raise Failed(f"the virtual machine failed; see {folder}/log")
             for key, samples in _read(folder, with_hal).items():
                 found.setdefault(key, []).append(summary(samples, 1e-3))
     return _report({key: median_of(runs) for key, runs in found.items()}, boots, with_hal)
@@ -74,16 +74,16 @@ def _report(found: dict[str, list[float]], boots: int, with_hal: bool) -> Result
         if with_hal:
             limit = found[f"hal.duration.{kind}"][2]
             result.budgets.append(
-                Budget(f"Fig. 1, calculation p99.9, {kind}, HAL's", duration[2], limit, "µs")
+                Budget(f"Fig. 1, calculation p99.9, {kind}, limit: HAL's", duration[2], limit, "µs")
             )
         result.budgets += [
-            Budget(f"wake-up p99.9, {kind}, cyclictest's + 2 µs", ours[2], theirs[2] + 2, "µs"),
-            Budget(f"wake-up maximum, {kind}, cyclictest's + 3 µs", ours[3], theirs[3] + 3, "µs"),
+            Budget(f"wake-up p99.9, {kind}, cyclictest + 2 µs", ours[2], theirs[2] + 2, "µs"),
+            Budget(f"wake-up maximum, {kind}, cyclictest + 3 µs", ours[3], theirs[3] + 3, "µs"),
             Budget(
                 f"wake-up p99 with spin, {kind}", found[f"rtcf-spin.latency.{kind}"][1], 0.2, "µs"
             ),
         ]
-    result.notes.append("rtcf and HAL take new values only; plain sums take all, and cannot tell")
+    result.notes.append("rtcf and HAL sum only new values; plain sums add all values")
     return result
 
 
@@ -92,7 +92,7 @@ def _cells(values: list[float] | None) -> list[Cell]:
 
 
 def _read(folder: Path, with_hal: bool) -> dict[str, Samples]:
-    """Return all samples of a boot in ns, by what they are and the load."""
+    """Return all samples of a boot in ns, by quantity and load."""
     found = {}
     for kind in _KINDS:
         for name in ("rtcf", "rtcf-spin"):
@@ -111,7 +111,7 @@ def _read(folder: Path, with_hal: bool) -> dict[str, Samples]:
 
 
 def _fill(payload: Path, setting: Setting) -> bool:
-    """Put into the folder what the machine is to run. @return whether HAL is among it."""
+    """Copy all files for the machine into the folder. @return whether HAL is included"""
     shutil.copy(_RT / "run.sh", payload)
     shutil.copy(setting.program("paper_run"), payload)
     shutil.copy(setting.library, payload)
@@ -131,7 +131,7 @@ def _fill(payload: Path, setting: Setting) -> bool:
         for line in output_of(["ldd", binary]).splitlines():
             files |= {word for word in line.split() if word.startswith("/")}
     command = ["tar", "-cf", str(payload / "files.tar"), "--dereference", "-C", "/"]
-    # Where /lib is a link, files have their place in /usr/lib.
+    # Where /lib is a link, the files are in /usr/lib.
     names = sorted({f"usr{file}" if file.startswith("/lib") else file[1:] for file in files})
     output_of([*command, *names])
     if with_hal:

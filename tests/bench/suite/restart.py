@@ -1,4 +1,4 @@
-"""How long a runner is down when its executor dies."""
+"""Downtime of a runner whose executor dies."""
 
 import os
 import signal
@@ -11,13 +11,13 @@ from setting import Setting
 
 from daemon import Daemon
 
-_ROUNDS = 3  # more within a minute would make rtcfd hold the runner
+_ROUNDS = 3  # after more crashes within a minute rtcfd holds the runner
 _DEADLINE_S = 30.0
 
 
 def run(setting: Setting) -> Result:
-    """Kill the executor and wait for the next one with the same graph."""
-    result = Result("restart", "executor killed, to a new one with its graph", ["run", "s"])
+    """Kill the executor and wait for its successor with the same graph."""
+    result = Result("restart", "from the killed executor to a new one with its graph", ["run", "s"])
     with Daemon(setting) as daemon:
         for component in paper():
             daemon.client.load(component)
@@ -29,7 +29,7 @@ def run(setting: Setting) -> Result:
             os.kill(before, signal.SIGKILL)
             while not _restored(daemon, before):
                 if time.monotonic() - begin > _DEADLINE_S:
-                    result.skipped = "the graph does not come back"
+                    result.skipped = "the graph is not restored"
                     return result
                 time.sleep(0.005)
             times.append(time.monotonic() - begin)

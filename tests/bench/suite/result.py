@@ -1,4 +1,4 @@
-"""What a bench found: figures as a table, and the budgets they are held against."""
+"""Result of a benchmark: a table, and its budgets."""
 
 from dataclasses import asdict, dataclass, field
 from typing import Any
@@ -8,7 +8,7 @@ Cell = str | float | int | None
 
 @dataclass
 class Budget:
-    """One limit and what was measured; a bench reports, it does not assert."""
+    """A measurement and its limit. A benchmark reports it and asserts nothing."""
 
     text: str
     measured: float
@@ -17,13 +17,13 @@ class Budget:
 
     @property
     def kept(self) -> bool:
-        """Tell whether the figure is within the limit."""
+        """Return whether the measurement is within the limit."""
         return self.measured <= self.limit
 
 
 @dataclass
 class Result:
-    """The outcome of one bench."""
+    """The result of one benchmark."""
 
     name: str
     title: str
@@ -31,17 +31,17 @@ class Result:
     rows: list[list[Cell]] = field(default_factory=list)
     budgets: list[Budget] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
-    skipped: str = ""  # why it did not run; empty = it ran
+    skipped: str = ""  # reason for not running; empty = it ran
 
     def as_json(self) -> dict[str, Any]:
-        """Return it for the file of results."""
+        """Return the content for results.json."""
         content = asdict(self)
         for budget, written in zip(self.budgets, content["budgets"], strict=True):
             written["kept"] = budget.kept
         return content
 
     def as_text(self) -> str:
-        """Return it for a person."""
+        """Return the text for the terminal."""
         lines = ["", f"== {self.title}"]
         if self.skipped:
             lines.append(f"not run: {self.skipped}")
@@ -55,7 +55,7 @@ class Result:
                 )
                 lines.append("  ".join([first, *others]).rstrip())
         for budget in self.budgets:
-            verdict = "kept" if budget.kept else "NOT KEPT"
+            verdict = "met" if budget.kept else "EXCEEDED"
             lines.append(
                 f"budget {verdict}: {budget.text}: {_text(budget.measured)} of "
                 f"{_text(budget.limit)} {budget.unit}"

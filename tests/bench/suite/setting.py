@@ -1,6 +1,6 @@
-"""What all benches of one run share: where things are, and how long to measure.
+"""Folders and durations that all benchmarks of one run share.
 
-Made once by `run`; benches only read it.
+Created once by `run`, read-only for the benchmarks.
 """
 
 import os
@@ -13,7 +13,7 @@ PRIORITY = 80
 
 @dataclass(frozen=True)
 class Setting:
-    """The build tree under test and the time there is."""
+    """The build tree under test and the duration of the long run."""
 
     build: Path
     output: Path  # folder of results, samples and plots
@@ -21,11 +21,11 @@ class Setting:
 
     @property
     def library(self) -> Path:
-        """Return the library that Mimo is in."""
+        """Return the library of Mimo."""
         return self.build / "lib/rtcf/rtcf_examples/rtcf_examples.so"
 
     def program(self, name: str) -> str:
-        """Return the path of one of the benches' programs."""
+        """Return the path of a benchmark program."""
         return str(self.build / "bench/bin" / f"bench_{name}")
 
     @property

@@ -12,7 +12,7 @@ _SECONDS = 5.0
 
 
 def cyclictest(setting: Setting, seconds: float) -> Samples:
-    """Return the latencies in ns of cyclictest at rtcf's frequency, priority and CPU."""
+    """Return cyclictest's latencies in ns at rtcf's frequency, priority and CPU."""
     cycles = int(seconds * FREQUENCY_HZ)
     command = [
         *("cyclictest", "--mlockall", "--threads=1", f"--affinity={setting.cpu}"),
@@ -30,10 +30,10 @@ def cyclictest(setting: Setting, seconds: float) -> Samples:
 
 
 def run(setting: Setting) -> Result:
-    """Compare in interleaved runs. Budgets on it are `make bench-rt`'s."""
+    """Compare in alternating runs. `make bench-rt` has the budgets."""
     result = Result(
         "wake_up",
-        f"wake-up latency at {FREQUENCY_HZ} Hz, SCHED_FIFO {PRIORITY}: rtcf and cyclictest in turn",
+        f"wake-up latency at {FREQUENCY_HZ} Hz, SCHED_FIFO {PRIORITY}: rtcf and cyclictest",
         ["µs", "p50", "p99", "p99.9", "max", "missed"],
     )
     result.skipped = missing("cyclictest", "stress-ng")

@@ -1,4 +1,4 @@
-// Components that end their process, each in another way.
+// Components that end their process, each in a different way.
 #include <time.h>
 
 #include <array>
@@ -10,8 +10,8 @@
 
 namespace {
 
-// Through volatile: otherwise the compiler sees what is coming and makes
-// something else of it.
+// Through volatile, since the compiler would otherwise foresee the fault and generate
+// different code.
 volatile int zero = 0;  // NOLINT(cppcoreguidelines-avoid-non-const-global-variables)
 
 class NullDereference final : public Faulty {
@@ -39,7 +39,7 @@ class StackOverflow final : public Faulty {
 
 class HeapCorruption final : public Faulty {
     void fault() override {
-        // Over what the allocator notes before and behind a block, on which it then stumbles.
+        // Overwrites the allocator's data around a block, so that freeing it fails.
         auto* block = static_cast<volatile char*>(std::malloc(24));
         for (int i = -8; i < 64; ++i) block[i] = 0x5a;
         std::free(const_cast<char*>(block));  // NOLINT(cppcoreguidelines-pro-type-const-cast)
@@ -51,7 +51,7 @@ class CallsAbort final : public Faulty {
 };
 
 class CallsExit final : public Faulty {
-    // NOLINTNEXTLINE(concurrency-mt-unsafe): that is what is wrong with it
+    // NOLINTNEXTLINE(concurrency-mt-unsafe): this is the fault under test
     void fault() override { std::exit(3); }
 };
 
@@ -95,7 +95,7 @@ class HangsInWait final : public rtcf::Source {
     int updates_ = 0;
 };
 
-// Never sleeps, as drivers that poll do not.
+// Never sleeps, like polling drivers.
 class PollsSilence final : public rtcf::Source {
     void update() override {}
     bool wait(std::int64_t deadline_ns) noexcept override {
@@ -148,12 +148,12 @@ class CrashingStop final : public rtcf::Component {
 
 RTCF_COMPONENT(NullDereference, "Writes through a null pointer")
 RTCF_COMPONENT(DivisionByZero, "Divides an integer by zero")
-RTCF_COMPONENT(StackOverflow, "Calls itself without end")
+RTCF_COMPONENT(StackOverflow, "Recurses endlessly")
 RTCF_COMPONENT(HeapCorruption, "Writes behind a block of the heap")
 RTCF_COMPONENT(CallsAbort, "Calls abort()")
 RTCF_COMPONENT(CallsExit, "Calls exit(3)")
 RTCF_COMPONENT(NeverReturns, "Does not return from update()")
-RTCF_COMPONENT(ThrowsThroughNoexcept, "Throws where nothing may be thrown")
+RTCF_COMPONENT(ThrowsThroughNoexcept, "Throws in a noexcept function")
 RTCF_COMPONENT(HangsInSafe, "Does not return from safe()")
 RTCF_COMPONENT(HangsInTakeOver, "Does not return from takeOver()")
 RTCF_COMPONENT(HangsInWait, "Does not return from wait()")

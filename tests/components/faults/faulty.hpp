@@ -1,5 +1,5 @@
-// What the faulty components share: they behave for some updates first, so
-// that a loop is seen running before its fault.
+// Base of the faulty components: they behave for some updates first, so that their loop
+// is running before the fault.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// Components that do in the loop what must not be done there, but leave their
-// process alive.
+// Components that do forbidden things in the loop, but leave their process
+// alive.
 #include <sys/mman.h>
 
 #include <chrono>
@@ -34,7 +34,7 @@ class Sleeps final : public Faulty {
     void fault() override { std::this_thread::sleep_for(std::chrono::microseconds(100)); }
 };
 
-// Not so long that it would be a fault.
+// Too short for a fault.
 class Lingers final : public Faulty {
     void fault() override {
         const auto until = std::chrono::steady_clock::now() + std::chrono::milliseconds(150);
@@ -59,14 +59,14 @@ class NotFiniteStops final : public Faulty {
     rtcf::Output<double> value_{this, "value", "", rtcf::Finite(rtcf::OnNonFinite::Stop)};
 };
 
-// Is late once for each new value of `turn`, in the way that the other parameters choose.
+// Is late once for each new value of `turn`, in the way selected by the other parameters.
 class Stumbles final : public rtcf::Component {
    public:
     ~Stumbles() override {
         if (memory_ != nullptr) ::munmap(memory_, kSize);
     }
 
-    // Takes the pages out of memory, as far as they are to be faulted in.
+    // Evicts the pages from memory that are to be faulted in.
     bool prepare(const rtcf::Values& proposed) override {
         if (memory_ == nullptr && !map()) return fail("no memory to stumble over");
         if (proposed[pages_] > 0) {
@@ -113,7 +113,7 @@ class Stumbles final : public rtcf::Component {
 RTCF_COMPONENT(Stumbles, "Is late once for each new value of a parameter")
 RTCF_COMPONENT(Throws, "Throws an exception")
 RTCF_COMPONENT(Allocates, "Allocates 10 MB in each update")
-RTCF_COMPONENT(Hoards, "Takes 1 MB more in each update, until there is no memory left")
+RTCF_COMPONENT(Hoards, "Allocates 1 MB more in each update, until memory is exhausted")
 RTCF_COMPONENT(Sleeps, "Sleeps in each update")
 RTCF_COMPONENT(Lingers, "Takes 150 ms in each update")
 RTCF_COMPONENT(NotFinite, "Writes NaN to an output that is declared finite")

@@ -1,4 +1,4 @@
-"""Components in Python for the tests: what they do, and each way to fail."""
+"""Python components for the tests: their functions, and each kind of failure."""
 
 import enum
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ MOTOR = Plant(gain=0.5, offset=0.0)
 
 
 class Mode(enum.IntEnum):
-    """What a controller is doing."""
+    """Activity of a controller."""
 
     IDLE = 0
     RUN = 1
@@ -102,7 +102,7 @@ class Observer(Component):
 
 
 class Seldom(Component):
-    """Counts cycles, and writes a few of them."""
+    """Counts cycles, and writes some of the counts."""
 
     count: Output[int]
     every: Parameter[int] = Parameter(1, min=1)
@@ -116,7 +116,7 @@ class Seldom(Component):
 
 
 class Watcher(Component):
-    """Notes all that an input tells."""
+    """Records all properties of an input."""
 
     count: Input[int]
     last: State[int]
@@ -126,7 +126,7 @@ class Watcher(Component):
     connected: State[bool]
 
     def update(self):
-        """Note it."""
+        """Record them."""
         self.last = self.count.value
         if self.count.new:
             self.fresh += 1
@@ -136,7 +136,7 @@ class Watcher(Component):
 
 
 class Gatherer(Component):
-    """Takes each message of a ramp, though it may not run every cycle."""
+    """Reads each message of a ramp, even if it does not run in every cycle."""
 
     count: Queue[int] = Queue(size=8)
     pair: Queue[np.float64, 2] = Queue(size=8)
@@ -147,7 +147,7 @@ class Gatherer(Component):
     oldest: State[int] = State(0, doc="ns; of a message that it took")
 
     def update(self):
-        """Take all that is there."""
+        """Read all queued messages."""
         while self.count.size > 0:
             self.in_order = self.in_order and self.count.front == self.last + 1
             self.last = self.count.front
@@ -202,7 +202,7 @@ def quotient(a, b):
 
 
 class Failing(Component):
-    """Fails in the way that its parameter says."""
+    """Fails in the way selected by its parameter."""
 
     out: Output[float]
     way: Parameter[int] = Parameter(0, min=0, max=9)
@@ -213,12 +213,12 @@ class Failing(Component):
     updates: State[int]
 
     def start(self):
-        """Refuse one way at once."""
+        """Fail at the start if selected."""
         if self.way == 9:
             raise ValueError("does not want to start")
 
     def update(self):
-        """Write, and fail in the end."""
+        """Write, and fail eventually."""
         self.out.write(1.0)
         self.updates += 1
         if self.updates < self.after:

@@ -1,4 +1,4 @@
-"""Components of a size that people write, compared with the interpreter and with C++."""
+"""Components of realistic size, compared with the interpreter and with C++."""
 
 import enum
 
@@ -61,7 +61,7 @@ class Kalman(Component):
 
 
 class Phase(enum.IntEnum):
-    """Of a machine."""
+    """Phases of a machine."""
 
     IDLE = 0
     ACCELERATE = 1
@@ -70,7 +70,7 @@ class Phase(enum.IntEnum):
 
 
 class Machine(Component):
-    """Goes through phases by what it is told, and logs each change."""
+    """Goes through phases as commanded, and logs each change."""
 
     wanted: Input[float]
     enable: Input[bool]
@@ -106,14 +106,14 @@ class Machine(Component):
 
 
 class Raiser(Component):
-    """Raises in a cycle that its input decides."""
+    """Raises in a cycle determined by its input."""
 
     value: Input[float]
     out: Output[float]
     total: State[float]
 
     def update(self):
-        """Sum up, until there is a reason not to."""
+        """Sum up until an exception is due."""
         value = self.value.value
         if np.isnan(value):
             raise ValueError("not a number")
@@ -124,7 +124,7 @@ class Raiser(Component):
 
 
 class Solver(Component):
-    """What np.linalg has, on small matrices."""
+    """Uses np.linalg on small matrices."""
 
     a: Input[np.float64, 4, 4]
     b: Input[np.float64, 4]
@@ -144,7 +144,7 @@ class Solver(Component):
 
 
 class Chooser(Component):
-    """What np.where has: numbers, vectors and matrices, of floats, ints and bools."""
+    """Uses np.where with numbers, vectors and matrices, of floats, ints and bools."""
 
     a: Input[np.float64, 4]
     m: Input[np.float64, 2, 3]
@@ -159,7 +159,7 @@ class Chooser(Component):
     flags: Output[bool, 4]
 
     def update(self):
-        """Choose by element, and by one condition for all."""
+        """Select by element, and by one condition for all."""
         a, m, n, f = self.a.value, self.m.value, self.n.value, self.f.value
         self.vector.write(np.where(a > 0.0, a, -a))
         self.matrix.write(np.where(m > 1.0, m, 1))
@@ -170,7 +170,7 @@ class Chooser(Component):
 
 
 class Trajectory(Component):
-    """Follows waypoints (place, speed, duration) one after the other by cubic polynomials."""
+    """Follows waypoints (position, speed, duration) one after the other by cubic polynomials."""
 
     waypoints: Queue[np.float64, 3] = Queue(size=4)
     hold: Input[bool]
@@ -183,7 +183,7 @@ class Trajectory(Component):
     skipped: State[int]
 
     def update(self):
-        """Go on, and take the next waypoint when the present one is reached."""
+        """Continue, and start the next segment when the present waypoint is reached."""
         if self.hold.value:
             while self.waypoints.size > 2:
                 self.waypoints.pop()
@@ -203,13 +203,13 @@ class Trajectory(Component):
             self.warn("{} waypoints lost", self.waypoints.dropped)
 
     def at(self, time):
-        """Return place and speed at a time of the present polynomial."""
+        """Return position and speed at a time of the present polynomial."""
         a, b = self.coefficients[0], self.coefficients[1]
         c, d = self.coefficients[2], self.coefficients[3]
         return a + time * (b + time * (c + time * d)), b + time * (2.0 * c + time * 3.0 * d)
 
     def take(self, begin, velocity, waypoint):
-        """Begin the polynomial to a waypoint."""
+        """Start the polynomial to a waypoint."""
         goal, speed = waypoint[0], waypoint[1]
         self.duration = min(max(waypoint[2], 0.002), 2.0)
         if not (np.isfinite(goal) and np.isfinite(speed) and np.isfinite(self.duration)):

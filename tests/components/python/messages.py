@@ -1,4 +1,4 @@
-"""Components on ROS messages: of fixed size, and of a size that the port declares."""
+"""Components with ROS messages of fixed size, and of a size declared by the port."""
 
 import math
 
@@ -28,7 +28,7 @@ class Arm(Component):
     incomplete: State[int]
 
     def update(self):
-        """Command joint speeds, and tell where the tip is."""
+        """Command joint speeds, and publish the position of the tip."""
         self.total.write(self.sum_of(self.torques.value.data))
         position = self.joints.value.position
         if not self.joints.new or len(position) < JOINTS:
@@ -70,7 +70,7 @@ class Arm(Component):
 
 
 class Joints(Component):
-    """Stands for an arm."""
+    """Simulates an arm."""
 
     joints: Output[JointState, JOINTS] = Output(texts={"name": ["a", "b", "c"]})
     wanted: Output[TwistStamped] = Output(texts={"header.frame_id": "tip"})
@@ -91,18 +91,18 @@ class Joints(Component):
 
 
 class Crowd(Component):
-    """Has more joints than an arm takes."""
+    """Has more joints than an arm accepts."""
 
     joints: Output[JointState, JOINTS + 2]
 
     def update(self):
-        """Say so."""
+        """Publish them."""
         self.joints.value.position[:] = 1.0
         self.joints.publish()
 
 
 class Relay(Component):
-    """Copies messages, and gives them names."""
+    """Copies messages and sets their names."""
 
     wanted: Input[TwistStamped]
     twist: Output[Twist]

@@ -1,4 +1,4 @@
-"""Components as engineers write them: lists, functions of NumPy, bases, properties, None."""
+"""Components in the style of engineers: lists, NumPy functions, bases, properties, None."""
 
 import enum
 import math
@@ -20,12 +20,12 @@ class Mode(enum.IntEnum):
 
 
 def over(values, limit):
-    """Return how many values exceed a limit, and the largest."""
+    """Return the number of values above a limit, and the largest value."""
     return np.count_nonzero(values > limit), values.max() if len(values) else 0.0
 
 
 class Bounded:
-    """A mixin: no component by itself."""
+    """A mixin, not a component itself."""
 
     bound: Parameter[float] = Parameter(2.0, min=0.0, max=9.0)
     hits: State[int]
@@ -106,7 +106,7 @@ class InheritedAgain(Inherited):
 
 
 class Selecting(Component):
-    """Masks and arrays as indices."""
+    """Uses masks and arrays as indices."""
 
     u: Input[np.float64, 6]
     m: Input[np.float64, (3, 3)]
@@ -134,7 +134,7 @@ class Selecting(Component):
 
 
 class Sampling(Component):
-    """Functions of NumPy and math that the random programs do not have."""
+    """Uses functions of NumPy and math that the random programs lack."""
 
     u: Input[np.float64, 20]
     v: Input[float]
@@ -175,7 +175,7 @@ class Sampling(Component):
 
 
 class Unknown(Component):
-    """States that are None at first."""
+    """Has states that are None at first."""
 
     u: Input[float]
     vector: Input[np.float64, 3]

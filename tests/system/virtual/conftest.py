@@ -1,4 +1,4 @@
-"""rtcfd of this machine as it was installed: real time is required, and given."""
+"""rtcfd of this machine as installed: real time is required and available."""
 
 from collections.abc import Iterator
 
@@ -6,13 +6,13 @@ import pytest
 from local_machine import LocalMachine
 from loop_2khz import Loop
 
-# Without a master, as there is none; all else is as shipped.
+# No ROS master exists here; all other settings are the defaults.
 _SETTINGS = "[runner.ros]\nenabled = false\n"
 
 
 @pytest.fixture
 def loop() -> Iterator[Loop]:
-    """Give the service with a loop that runs at 2 kHz."""
+    """Yield the service with a loop running at 2 kHz."""
     loop = Loop(LocalMachine(), _SETTINGS)
     loop.reset()
     loop.begin()

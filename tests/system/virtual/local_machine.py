@@ -6,11 +6,11 @@ from machine import Machine
 
 
 class LocalMachine(Machine):
-    """What tests of a container do from outside, done on the spot."""
+    """A Machine whose commands run in the same machine as the tests."""
 
     def __init__(self) -> None:
         self.folder = Path("/")
 
     def command(self, *command: str, user: str = "root") -> list[str]:
-        """Return the command itself."""
+        """Return the command unchanged."""
         return [*(["runuser", "-u", user, "--"] if user != "root" else []), *command]

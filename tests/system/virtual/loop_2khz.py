@@ -1,4 +1,4 @@
-"""A loop at 2 kHz in the service of this machine, and whether it went on."""
+"""A loop at 2 kHz in the service of this machine, with a check that it ran without a break."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ DROP_IN = "/etc/systemd/system/rtcfd.service.d/test.conf"
 
 @dataclass(frozen=True)
 class Mark:
-    """What a loop that goes on undisturbed does not change, and its cycles."""
+    """Identity and cycles of a loop; only the cycles change while it runs undisturbed."""
 
     executor: int
     thread: int
@@ -23,10 +23,10 @@ class Mark:
 
 
 class Loop(Service):
-    """The service, asked by the client library: each rtcfctl takes long on an emulated CPU."""
+    """The service, queried by the client library: rtcfctl is slow on an emulated CPU."""
 
     def begin(self) -> None:
-        """Have a loop with one component."""
+        """Start a loop with one component."""
         with rtcf.Client() as client:
             client.set_runner(runner_pb2.RunnerSettings(frequency_hz=FREQUENCY_HZ))
             client.load(rtcf.component("rtcf_examples", "Mimo", name="M"))
@@ -34,26 +34,26 @@ class Loop(Service):
         wait_for(lambda: self.now().iteration > FREQUENCY_HZ, "a second of cycles")
 
     def told(self) -> runner_pb2.RunnerStatus:
-        """Return its status."""
+        """Return the status of its runner."""
         with rtcf.Client() as client:
             (told,) = client.get_status("rt_runner").runners
         return told  # type: ignore[no-any-return]
 
     def now(self) -> Mark:
-        """Return where it is."""
+        """Return its present mark."""
         told = self.told()
         assert told.state == runner_pb2.RUNNER_STATE_RUNNING, told
         return Mark(told.pid, told.realtime_tid, told.missed, told.overruns, told.iteration)
 
     def must_have_gone_on(self, since: Mark, seconds: float = 0.0) -> None:
-        """Fail if it has missed a cycle, or is another; wait until it is so far on."""
+        """Fail if the loop missed a cycle or was replaced; wait for `seconds` of cycles."""
         enough = since.iteration + FREQUENCY_HZ * max(seconds, 0.5)
         now = wait_for(lambda: m if (m := self.now()).iteration > enough else None, "its cycles")
         assert now == Mark(since.executor, since.thread, since.missed, since.overruns,
                            now.iteration)  # fmt: skip
 
     def drop_in(self, text: str) -> None:
-        """Give the unit a drop-in that counts from now on; empty takes it away."""
+        """Write a drop-in of the unit and apply it; an empty text removes it."""
         file = self.machine.path(DROP_IN)
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(f"[Service]\n{text}\n")

@@ -1,5 +1,5 @@
 #!/bin/bash
-# In the virtual machine: installs the packages and runs the tests beside it.
+# In the virtual machine: installs the packages and runs the tests of this folder.
 set -euo pipefail
 export PATH=/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin
 export DEBIAN_FRONTEND=noninteractive PYTHONDONTWRITEBYTECODE=1

@@ -1,4 +1,4 @@
-"""`rtcfctl trace --kernel` beside culprits of random kind and name, on PREEMPT_RT."""
+"""`rtcfctl trace --kernel` with causes of random kind and name, on PREEMPT_RT."""
 
 import json
 import os
@@ -19,10 +19,10 @@ from machine import wait_for
 
 SEED = 25
 TRIALS = 100
-DOUBT = "though the loop is more urgent"  # of several causes that cannot be told apart
+DOUBT = "though the loop is more urgent"  # the trace cannot distinguish several causes
 TRACEFS = Path("/sys/kernel/tracing")
 RT_LIMIT = Path("/proc/sys/kernel/sched_rt_runtime_us")
-# Takes the CPU once, and ends. Its arguments: priority, time (s), name.
+# Uses the CPU once, and ends. Arguments: priority, time (s), name.
 HOG = """
 import os, sys, time
 priority, seconds, name = int(sys.argv[1]), float(sys.argv[2]), sys.argv[3]
@@ -32,7 +32,7 @@ until = time.monotonic() + seconds
 while time.monotonic() < until:
     pass
 """
-# One interrupt of the timer wakes so many threads below the loop. Its argument: how many.
+# One timer interrupt wakes COUNT threads below the loop. Argument: COUNT.
 SLEEPERS = """
 import ctypes, os, sys, time
 count = int(sys.argv[1])
@@ -52,16 +52,16 @@ for _ in range(count):
 
 @dataclass(frozen=True)
 class Culprit:
-    """One cause of a late cycle, and the words by which a trace names it."""
+    """One cause of a late cycle, and a part of its name in a trace."""
 
     kind: str
-    named: str  # a part of the words
+    named: str  # part of the trace's text
     act: Callable[[], None]
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A culprit, and the cycles between which it acted."""
+    """A cause, and the range of cycles in which it acted."""
 
     culprit: Culprit
     first: int
@@ -69,13 +69,13 @@ class Trial:
 
 
 class Culprits:
-    """Culprits drawn at random."""
+    """Causes of late cycles, drawn at random."""
 
     def __init__(self, client: rtcf.Client, draw: random.Random) -> None:
         self._client, self._draw, self._turn = client, draw, 0
 
     def next(self) -> Culprit:
-        """Return one of a random kind."""
+        """Return a cause of a random kind."""
         kinds = (
             self._thread, self._interrupts, self._throttled, self._faults, self._sleep, self._gap
         )  # fmt: skip
@@ -109,7 +109,7 @@ class Culprits:
         )
 
     def _gap(self) -> Culprit:
-        """Return a time that the kernel does not see: an SMI looks like a slow component."""
+        """Return a cause that the kernel does not see: an SMI looks like a slow component."""
         return self._stumble("unknown", "unknown", spin_us=self._draw.randint(1000, 10_000))
 
     def _stumble(self, kind: str, named: str, **values: int) -> Culprit:
@@ -124,13 +124,13 @@ class Culprits:
 
 
 def run(program: str, *arguments: object) -> None:
-    """Run a program in Python to its end."""
+    """Run a Python program to its end."""
     subprocess.run([sys.executable, "-I", "-S", "-c", program, *map(str, arguments)], check=True)
 
 
 @contextmanager
 def traced(folder: Path) -> Iterator[list[dict[str, object]]]:
-    """Give the late cycles of a trace, when it has ended."""
+    """Yield a list that contains the late cycles of the trace after the block."""
     if not os.path.ismount(TRACEFS):
         subprocess.run(["mount", "-t", "tracefs", "tracefs", str(TRACEFS)], check=True)
     file = folder / "trace.json"
@@ -155,14 +155,14 @@ def traced(folder: Path) -> Iterator[list[dict[str, object]]]:
 
 @pytest.fixture
 def limited() -> Iterator[None]:
-    """Limit the time of real-time threads, as kernels do unless told otherwise."""
+    """Limit the time of real-time threads, as kernels do by default."""
     before = RT_LIMIT.read_text()
     RT_LIMIT.write_text("950000")
     yield
     RT_LIMIT.write_text(before)
 
 
-def test_culprits_are_named_right_in_95_of_100(loop: Loop, tmp_path: Path, limited: None) -> None:
+def test_95_of_100_causes_are_named_correctly(loop: Loop, tmp_path: Path, limited: None) -> None:
     draw = random.Random(SEED)
     trials = []
     with rtcf.Client() as client:
@@ -194,6 +194,6 @@ def test_culprits_are_named_right_in_95_of_100(loop: Loop, tmp_path: Path, limit
         print(verdict, trial.culprit.kind, repr(trial.culprit.named), sorted(set(words)))
     print(verdicts)
     late = sum(verdicts.values()) - verdicts["on time"]
-    assert late >= 0.8 * TRIALS, "culprits that make cycles late"
+    assert late >= 0.8 * TRIALS, "share of causes that delay a cycle"
     assert verdicts["right"] >= 0.95 * late
     assert verdicts["wrong"] <= 0.02 * late

@@ -1,4 +1,4 @@
-"""What the unit gives and takes: rights, memory, devices."""
+"""Limits of the unit: rights, memory, devices."""
 
 import os
 import re
@@ -21,11 +21,11 @@ def status_of(pid: int, field: str) -> str:
     return found.group(1)
 
 
-def test_a_loop_has_what_real_time_takes_and_no_more(loop: Loop) -> None:
+def test_a_loop_has_only_the_rights_for_real_time(loop: Loop) -> None:
     told = loop.told()
     assert list(told.degraded) == []
     assert os.sched_getscheduler(told.realtime_tid) == os.SCHED_FIFO
-    assert os.sched_getparam(told.realtime_tid).sched_priority == 82  # by its frequency
+    assert os.sched_getparam(told.realtime_tid).sched_priority == 82  # derived from its frequency
     assert os.sched_getscheduler(told.pid) == os.SCHED_OTHER
     assert limits(told.pid)["Max locked memory"] == "unlimited"
     assert limits(told.pid)["Max realtime priority"] == "99"
@@ -37,7 +37,7 @@ def test_a_loop_has_what_real_time_takes_and_no_more(loop: Loop) -> None:
     assert status_of(loop.pid, "VmLck") == "0 kB"
 
 
-def test_the_loop_keeps_the_cpu_awake_and_others_may_not(loop: Loop) -> None:
+def test_only_the_loop_may_keep_the_cpu_awake(loop: Loop) -> None:
     device = "/dev/cpu_dma_latency"
     held = [os.readlink(each) for each in Path(f"/proc/{loop.told().pid}/fd").iterdir()]
     assert device in held
@@ -46,7 +46,7 @@ def test_the_loop_keeps_the_cpu_awake_and_others_may_not(loop: Loop) -> None:
 
 
 def opens(loop: Loop, device: str) -> bool:
-    """Tell whether root may open a device among the unit's processes."""
+    """Return whether root can open a device in a process of the unit."""
     group = loop.unit_property("ControlGroup")
     script = f"echo $$ >/sys/fs/cgroup{group}/cgroup.procs; exec 3<>{device}"
     return loop.machine.shell(script, check=False).returncode == 0
@@ -70,7 +70,7 @@ def test_devices_are_closed_until_a_drop_in_opens_them(loop: Loop) -> None:
         loop.drop_in("")
 
 
-def test_memory_that_runs_out_costs_one_executor_and_its_graph_comes_back(loop: Loop) -> None:
+def test_exhausted_memory_ends_one_executor_and_its_graph_is_restored(loop: Loop) -> None:
     daemon, other = loop.pid, loop.now()
     loop.systemctl("set-property", "--runtime", "rtcfd.service", "MemoryMax=400M")
     try:
@@ -91,7 +91,7 @@ def test_memory_that_runs_out_costs_one_executor_and_its_graph_comes_back(loop: 
         assert int(events["oom_kill"]) == 1
         assert loop.pid == daemon
         assert loop.unit_property("ActiveState") == "active"
-        # Reclaiming memory may cost the other one a cycle, and not more than that.
+        # Reclaiming memory may cost the other loop one cycle at most.
         now = loop.now()
         assert (now.executor, now.thread) == (other.executor, other.thread)
         assert now.iteration > other.iteration + FREQUENCY_HZ

@@ -1,4 +1,4 @@
-"""What is done to rtcfd and around it while a loop runs at 2 kHz: no cycle is missed."""
+"""Actions on rtcfd and its surroundings while a loop runs at 2 kHz: no cycle is missed."""
 
 import datetime
 import threading
@@ -21,7 +21,7 @@ def set_clock(loop: Loop, by: datetime.timedelta) -> None:
 
 
 class Lease:
-    """A component that is held for as long as this object likes."""
+    """A component leased until the end of this object."""
 
     def __init__(self) -> None:
         self.ended: list[Any] = []
@@ -52,7 +52,7 @@ class Lease:
         self._client.close()
 
 
-def test_a_clock_that_is_set_back_a_year_and_forth_again(loop: Loop) -> None:
+def test_a_wall_clock_set_back_and_forward_by_a_year(loop: Loop) -> None:
     loop.drop_in(f"WatchdogSec={WATCHDOG_S}")
     held = None
     try:
@@ -60,7 +60,7 @@ def test_a_clock_that_is_set_back_a_year_and_forth_again(loop: Loop) -> None:
         daemon = loop.pid
         held = Lease()
         with rtcf.Client() as client:
-            # Timeouts that a clock that jumps would let run out at once, or never.
+            # Timeouts that would expire at once, or never, if they followed the wall clock.
             client.set_runner(
                 runner_pb2.RunnerSettings(orphan_timeout_s=5.0, stall_timeout_ms=1000)
             )
@@ -69,7 +69,7 @@ def test_a_clock_that_is_set_back_a_year_and_forth_again(loop: Loop) -> None:
             year = datetime.datetime.now(tz=datetime.UTC).year
             set_clock(loop, jump)
             assert abs(datetime.datetime.now(tz=datetime.UTC).year - year) == 1
-            # The watchdog is due some times, and the timeouts.
+            # Both the watchdog and the timeouts expire several times.
             loop.must_have_gone_on(before, seconds=4 * WATCHDOG_S)
             before = loop.now()
             assert loop.pid == daemon
@@ -79,20 +79,20 @@ def test_a_clock_that_is_set_back_a_year_and_forth_again(loop: Loop) -> None:
                 assert client.get_component("held").holder == "the test"
                 state = client.get_component("held").state
                 assert state == graph_pb2.COMPONENT_STATE_RUNNING
-                # Figures are of durations, whatever the clock says.
+                # Statistics count durations, independent of the wall clock.
                 figures = client.get_statistics()
                 assert 0 < figures.duration.max_ns < 1e9
                 assert figures.latency.max_ns < 1e9
                 assert client.get_status().uptime_ns < 3600e9
         held.end()
         assert [each.why for each in held.ended] == [control_pb2.LeaseEnded.WHY_ASKED]
-        # A watchdog that is not fed bites in time all the same.
+        # The watchdog still expires in time.
         set_clock(loop, -YEAR)
         loop.kill("STOP", daemon)
         wait_for(lambda: loop.pid not in (0, daemon), "another rtcfd", 10 * WATCHDOG_S)
         wait_for(lambda: loop.unit_property("ActiveState") == "active", "its start")
         loop.must_have_gone_on(before)
-        # And so does the timeout of a loop without rtcfd.
+        # The timeout of a loop without rtcfd still expires in time, too.
         loop.drop_in("Restart=no")
         executor = before.executor
         loop.kill("KILL", loop.pid)
@@ -107,7 +107,7 @@ def test_a_clock_that_is_set_back_a_year_and_forth_again(loop: Loop) -> None:
         loop.drop_in("")
 
 
-def test_a_restart_and_the_death_of_rtcfd(loop: Loop) -> None:
+def test_a_restart_and_a_kill_of_rtcfd(loop: Loop) -> None:
     before, daemon = loop.now(), loop.pid
     loop.systemctl("restart", "rtcfd")
     assert loop.pid != daemon
@@ -118,7 +118,7 @@ def test_a_restart_and_the_death_of_rtcfd(loop: Loop) -> None:
     loop.must_have_gone_on(before)
 
 
-def test_a_reload_and_what_systemd_does_to_itself(loop: Loop) -> None:
+def test_a_reload_and_a_reexecution_of_systemd(loop: Loop) -> None:
     before = loop.now()
     loop.configure("[limits]\nclients = 99\n")
     loop.systemctl("reload", "rtcfd")
@@ -127,7 +127,7 @@ def test_a_reload_and_what_systemd_does_to_itself(loop: Loop) -> None:
     loop.must_have_gone_on(before)
 
 
-def test_clients_in_numbers(loop: Loop) -> None:
+def test_many_clients(loop: Loop) -> None:
     before = loop.now()
     clients = [rtcf.Client() for _ in range(100)]
     answers = [client.get_status().version for client in clients]
@@ -137,7 +137,7 @@ def test_clients_in_numbers(loop: Loop) -> None:
     loop.must_have_gone_on(before)
 
 
-def test_a_graph_that_is_changed_all_the_time(loop: Loop) -> None:
+def test_continuous_graph_changes(loop: Loop) -> None:
     before = loop.now()
     with rtcf.Client() as client:
         for _ in range(20):
@@ -147,7 +147,7 @@ def test_a_graph_that_is_changed_all_the_time(loop: Loop) -> None:
 
 
 def test_an_upgrade_and_rtcfd_of_the_next_protocol(loop: Loop) -> None:
-    """The last one: packages of a higher version stay."""
+    """The last test: packages of a higher version remain installed."""
     machine = loop.machine
     files = versions.make_higher(machine, "/payload/debs", "/upgrade")
     before, daemon = loop.now(), loop.pid

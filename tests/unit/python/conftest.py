@@ -1,4 +1,4 @@
-"""A rtcfd for a test that asks for one."""
+"""Fixtures: a rtcfd, as a process or within the test's process."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -12,7 +12,7 @@ from rtcfd_in_process import Machine, Rtcfd
 
 @pytest.fixture
 def stopped_daemon(tmp_path: Path) -> Iterator[DaemonUnderTest]:
-    """One that a test starts itself."""
+    """Yield a rtcfd that the test starts itself."""
     daemon = DaemonUnderTest(tmp_path)
     daemon.package(
         "demo",
@@ -30,7 +30,7 @@ def stopped_daemon(tmp_path: Path) -> Iterator[DaemonUnderTest]:
         try:
             daemon.end()
         finally:
-            daemon.process.kill()  # one that hangs
+            daemon.process.kill()  # a hanging process
 
 
 @pytest.fixture
@@ -46,7 +46,7 @@ def client(daemon: DaemonUnderTest) -> Iterator[rtcf.Client]:
 
 @pytest.fixture
 def machine(monkeypatch: pytest.MonkeyPatch) -> Machine:
-    """The executors of a rtcfd in the process of the test."""
+    """Yield the executors of a rtcfd within the test's process."""
     machine = Machine()
     machine.install(monkeypatch)
     return machine
@@ -54,7 +54,7 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> Machine:
 
 @pytest.fixture
 def rtcfd(tmp_path: Path, machine: Machine) -> Callable[[], Rtcfd]:
-    """Makes a rtcfd in the process of the test: each is the next life of one."""
+    """Return a function that creates a rtcfd within the test's process, the next life of one."""
     library = tmp_path / "lib" / "demo" / "main.so"
     library.parent.mkdir(parents=True)
     library.write_text(json.dumps({"types": {"Fine": "fine"}}))

@@ -1,4 +1,4 @@
-"""A rtcfd of the build tree in a folder of its own, with the peer executor."""
+"""A rtcfd of the build tree in its own folder, with the peer executor."""
 
 import json
 import os
@@ -14,14 +14,14 @@ import rtcf
 
 BUILD_TREE = Path(str(rtcf.__file__)).parents[2]
 DEADLINE_S = 60.0
-# Before a command that is to mind Ctrl-C: one that was started by nohup or in the background has
-# inherited to ignore it.
+# Prefix of a command that must react to Ctrl-C: under nohup or in the background it inherits an
+# ignored SIGINT.
 MINDS_CTRL_C = ("env", "--default-signal=INT")
 _POLL_S = 0.01
 
 
 def wait_for(condition: Callable[[], Any], what: str) -> Any:
-    """Return the condition's result when it is true; fail after the deadline."""
+    """Return the condition's result once it is true; fail after the deadline."""
     deadline = time.monotonic() + DEADLINE_S
     while not (result := condition()):
         assert time.monotonic() < deadline, f"waited {DEADLINE_S:g} s for {what}"
@@ -30,7 +30,7 @@ def wait_for(condition: Callable[[], Any], what: str) -> Any:
 
 
 def is_alive(pid: int) -> bool:
-    """Tell whether a process runs; one that has ended does not, though nobody has reaped it."""
+    """Return whether a process runs; a zombie does not."""
     try:
         state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
     except (FileNotFoundError, ProcessLookupError):
@@ -39,7 +39,7 @@ def is_alive(pid: int) -> bool:
 
 
 class DaemonUnderTest:
-    """rtcfd as a process, its folders and its log."""
+    """rtcfd as a process, with its folders and its log."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -56,14 +56,14 @@ class DaemonUnderTest:
         self.executor.write_text(
             "#!/bin/sh\n"
             f'[ "$1" = --check-settings ] && exec {BUILD_TREE}/bin/rtcf-executor "$@"\n'
-            # The build tree's own libraries are none of its: two dozen times Python for nothing.
+            # Skip the build tree's own libraries: each would start Python for nothing.
             f'case "$*" in *--describe\\ {BUILD_TREE}/*) exit 1 ;; esac\n'
             f'PYTHONPATH={BUILD_TREE}/python exec {sys.executable} {peer} "$@"\n'
         )
         self.executor.chmod(0o755)
 
     def package(self, name: str, library: str = "main", **contents: Any) -> Path:
-        """Write a library of a package; returns its path."""
+        """Write a library of a package; return its path."""
         file = self.packages / name / f"{library}.so"
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(json.dumps(contents))
@@ -117,7 +117,7 @@ class DaemonUnderTest:
         )
 
     def ctl_process(self, *arguments: str) -> subprocess.Popen[str]:
-        """Begin a call of rtcfctl."""
+        """Start a call of rtcfctl."""
         return subprocess.Popen(
             [*MINDS_CTRL_C, str(BUILD_TREE / "bin" / "rtcfctl"), *arguments],
             env={**os.environ, "RTCF_SOCKET": str(self.socket)},

@@ -12,39 +12,39 @@ from rtcfd.common import regular_files
 from rtcfd.state import store
 
 MODES = ("well", "hangs", "full", "read-only")
-_LONGEST_S = 60.0  # of a hang, in a test
+_LONGEST_S = 60.0  # longest hang in a test
 
 
 class Killed(BaseException):
-    """Of a thread of an rtcfd that is no more: it does nothing else."""
+    """Ends a thread of a dead rtcfd."""
 
 
 class FailingDisk:
-    """What rtcfd's threads write goes through it; reading, and other folders, do not."""
+    """Passes on the writes of rtcfd's threads to the state folder; reads bypass it."""
 
     def __init__(self) -> None:
         self.ever_bad = False
         self._folder = Path("/nowhere")
         self._mode = "well"
-        self._life = 0  # of rtcfd: what an earlier one has not written is never written
+        self._life = 0  # of rtcfd: pending writes of an earlier life are lost
         self._changed = threading.Condition()
 
     def begin(self, folder: Path) -> None:
-        """Stand below another folder, and work."""
+        """Move to another folder, and work normally."""
         self.next_life()
         self._folder = folder
         self.become("well")
         self.ever_bad = False
 
     def become(self, mode: str) -> None:
-        """From here on, behave so, one of MODES; or "dead": nothing is written in this life."""
+        """Set one of MODES; "dead": no write succeeds in this life."""
         with self._changed:
             self._mode = mode
             self.ever_bad |= mode != "well"
             self._changed.notify_all()
 
     def next_life(self) -> None:
-        """The rtcfd of now is no more; the next one begins with a disk that answers."""
+        """End the present rtcfd; its successor starts with a disk that answers."""
         with self._changed:
             self._life += 1
             if self._mode in ("hangs", "dead"):
@@ -52,7 +52,7 @@ class FailingDisk:
             self._changed.notify_all()
 
     def install(self, monkeypatch: Any) -> None:
-        """Stand between the store and its folder."""
+        """Install it between the store and its folder."""
         monkeypatch.setattr(store, "durable", self)
         monkeypatch.setattr(store, "regular_files", self)
         unmark, remove = store._unmark, store.Store.remove
@@ -63,7 +63,7 @@ class FailingDisk:
 
         monkeypatch.setattr(store.Store, "remove", remove_all)
 
-    # As durable and regular_files, of which the store uses no more.
+    # The functions of durable and regular_files that the store uses.
 
     def replace(self, file: Path, data: bytes, *, sync: bool = True) -> None:
         self._do(file, lambda: durable.replace(file, data, sync=sync), room=True)

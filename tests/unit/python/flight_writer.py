@@ -10,7 +10,7 @@ HEADER = 64
 
 
 class FlightWriter:
-    """A recorder as the executor makes it (layout in executor.proto)."""
+    """A recorder in the executor's layout (see executor.proto)."""
 
     def __init__(self) -> None:
         size = HEADER + SLOTS * NAME_BYTES

@@ -1,7 +1,7 @@
-"""Mistakes that engineers who know Python and NumPy make in a component: their code, and words
-of the compiler's message.
+"""Mistakes of engineers who know Python and NumPy in a component: their code, and words of the
+compiler's message.
 
-`# here` marks the line that the message names, where it is not the only one.
+`# here` marks the line that the message must name, unless it is the only one.
 """
 
 MODULE = """\

@@ -1,4 +1,4 @@
-"""What may be in the place of a file, for tests; and a deadline for who waits for such a thing."""
+"""Replacements for a file in tests: pipe, folder, socket, …; and a deadline for opening them."""
 
 import contextlib
 import os
@@ -24,7 +24,7 @@ def dangling(place: Path) -> None:
 
 
 def plug(place: Path) -> None:
-    # By a short path: a unix socket's has 107 characters at most.
+    # A short path: a unix socket's path has at most 107 characters.
     descriptor = os.open(place.parent, os.O_RDONLY | os.O_DIRECTORY)
     with socket.socket(socket.AF_UNIX) as end:
         end.bind(f"/proc/self/fd/{descriptor}/{place.name}")
@@ -36,13 +36,13 @@ def device(place: Path) -> None:
 
 
 def unreadable(place: Path) -> None:
-    """A regular file whose read fails, also for root: EIO at address 0."""
+    """A regular file whose read fails, even for root: EIO at address 0."""
     place.symlink_to("/proc/self/mem")
 
 
 @contextlib.contextmanager
 def deadline() -> Iterator[None]:
-    """Let a call that waits for ever fail."""
+    """Fail if the block takes too long."""
 
     def late(_: int, __: FrameType | None) -> None:
         raise AssertionError(f"it hangs: {DEADLINE_S:g} s")

@@ -1,21 +1,21 @@
-"""The other side of the executor protocol, for tests of rtcfd without real-time parts.
+"""An executor's side of its protocol, for tests of rtcfd without real-time parts.
 
-Speaks the real frames over a real unix socket and keeps a list of components.
+Uses the real message framing over a real unix socket and keeps a list of components.
 A "library" here is a JSON file: {"types": {"Name": "behaviour"}, "problem":
 "...", "crash": "SIGSEGV"}; behaviours of a type at its load: "fine",
 "refused", "crashes", "slow" (until the file named by its parameter `until`
 exists), "logs", "chatters".
 
-PEER_PROTOCOL is what it speaks, PEER_LATER_PROTOCOL what it turns out to speak
-with the next rtcfd.
+PEER_PROTOCOL is its protocol version, PEER_LATER_PROTOCOL the version that it
+reports to the next rtcfd.
 
 A file named <kind of request> in the folder PEER_HELD delays the answers to requests of
-that kind until it is gone; `serve` delays the executor's start, `gone` its end. With `brief`
-there, a loop ends by a fault right after the answer to its start.
+that kind until it is removed; `serve` delays the executor's start, `gone` its end. If
+`brief` exists, a loop ends by a fault right after the answer to its start.
 
 PEER_PORT is the name of each component's input.
 
-A parameter `die` that is set lets it die as if in the component's update:
+Setting a parameter `die` makes it die as if in the component's update:
 "SIGSEGV" and so on with a note in the flight recorder, "stall" likewise,
 "exit" and "SIGKILL" without.  The loop counts its cycles by the wall clock.
 """
@@ -38,7 +38,7 @@ from rtcfd.executor import frames
 from rtcfd.executor.link import ACCESS_PROTOCOL, LIMITS_PROTOCOL, PORTS_PROTOCOL, PROTOCOL
 
 POLL_S = 0.005
-CHATTER = 100  # records at once
+CHATTER = 100  # records per burst
 GRAPH_SLOT, UPDATE_SLOT = 1, 2
 
 
@@ -60,7 +60,7 @@ def describe(library: Path, package: str) -> int:
 
 
 def declared() -> graph_pb2.ComponentInfo:
-    """Return what each component here has."""
+    """Return the description that every component here has."""
     info = graph_pb2.ComponentInfo()
     json_format.Parse(
         """{"state": "COMPONENT_STATE_CONFIGURED", "ports": [
@@ -93,7 +93,7 @@ class Refused(Exception):
 
 
 class Peer:
-    # Of a component: as many cycles as a day has at 10 kHz, the longest of a tenth of a second.
+    # Of a component: as many cycles as in a day at 10 kHz, the longest takes a tenth of a second.
     SLOW = runner_pb2.Distribution(
         count=864_000_000, min_ns=123_456.0, mean_ns=1_234_567.0, p50_ns=1_234_567.0,
         p99_ns=9_999_999.0, p999_ns=12_345_678.0, max_ns=123_456_789.0,
@@ -165,7 +165,7 @@ class Peer:
 
     async def limits(self, _: wire.Limits, __: int) -> wire.Response:
         if self.protocol < LIMITS_PROTOCOL:
-            os._exit(9)  # whoever does not know of them must not be asked
+            os._exit(9)  # an executor that does not know them must not be asked
         return wire.Response(done=wire.Done())
 
     async def access(self, _: wire.AccessRules, __: int) -> wire.Response:
@@ -327,7 +327,7 @@ class Peer:
 
     async def list_components(self, _: wire.ListComponents, __: int) -> wire.Response:
         infos = [self.info(name, at) for at, name in enumerate(sorted(self.components))]
-        infos.reverse()  # rtcfd is to sort by position
+        infos.reverse()  # rtcfd must sort by position
         return wire.Response(components=wire.ListComponentsResult(components=infos))
 
     async def get_component(

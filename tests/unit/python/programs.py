@@ -1,6 +1,6 @@
-"""Random programs for a component in Python: assignments, slices, views, broadcasting, functions of
-NumPy, lists, products of matrices, match and control flow on a state of two vectors, two matrices,
-numbers, of which one may be None, a bool, an enum, and vectors of float32 and of small ints.
+"""Random programs for Python components: assignments, slices, views, broadcasting, NumPy functions,
+lists, products of matrices, match and control flow on a state of two vectors, two matrices,
+numbers (one of them optional), a bool, an enum, and vectors of float32 and of small ints.
 """
 
 import random
@@ -77,18 +77,18 @@ _LONG, _SIDE = 6, 3
 
 @dataclass
 class _Scope:
-    """Names that a place in a program may use."""
+    """Names that a statement may use."""
 
-    views: dict[str, int]  # variables that are vectors, and their sizes
-    indices: dict[str, int]  # variables of loops, and the first number that they never are
+    views: dict[str, int]  # vector variables and their sizes
+    indices: dict[str, int]  # loop variables and their exclusive upper bounds
     numbers: list[str]
 
 
 class Program:
-    """One program, drawn by a generator of random numbers."""
+    """One program, drawn by a random number generator."""
 
     def __init__(self, draw: random.Random) -> None:
-        """Draw it."""
+        """Draw the program."""
         self._draw = draw
         self._names = 0
         self.lines = self._block(_Scope({}, {}, []), draw.randint(1, 5), 0)
@@ -150,7 +150,7 @@ class Program:
         return [f"{target} {change}= {self._float(scope, 2)}"]
 
     def _set_selected(self, scope: _Scope) -> list[str]:
-        """Set what a mask or an array of indices selects."""
+        """Set the elements selected by a mask or an array of indices."""
         change = self._draw.choice(["", "", "+", "*"])
         if self._draw.random() < 0.3:
             mask = f"{self._matrix(scope, 0)} > {self._float(scope, 0)}"
@@ -181,7 +181,7 @@ class Program:
         return [*lines, f"{target} {change}= {value}"]
 
     def _set_any(self, scope: _Scope) -> list[str]:
-        """Set by an index whose type is not seen."""
+        """Set with an index whose type is not obvious."""
         index = self._name()
         lines = [f"{index} = {self._int(scope, 1)}"]
         if self._draw.random() < 0.5:
@@ -192,7 +192,7 @@ class Program:
         return [*lines, f"{target} {self._draw.choice(['', '+', '*'])}= {value}"]
 
     def _set_several(self, scope: _Scope) -> list[str]:
-        """Set several targets at once, from several values or from the elements of a vector."""
+        """Set several targets at once, from several values or the elements of a vector."""
         draw = self._draw.random()
         numbers = ["self.x", "self.y", *scope.numbers]
         numbers += [f"{each}[{self._index(scope, _LONG)}]" for each in _VECTORS]
@@ -446,7 +446,7 @@ class Program:
         return f"blend({self._vector(scope, size, 0)}, {self._vector(scope, size, 0)}, 0.25)"
 
     def _vector_of(self, scope: _Scope, size: int, depth: int) -> str:
-        """Return a vector that a function of NumPy makes."""
+        """Return a vector created by a NumPy function."""
         first = self._draw.randint(0, size)
         parts = [self._vector(scope, each, 0) for each in (first, size - first, size)]
         numbers = [self._float(scope, 0) for _ in range(size)]
@@ -471,7 +471,7 @@ class Program:
         return self._draw.choice(ways)
 
     def _matrix_of(self, scope: _Scope, depth: int) -> str:
-        """Return a matrix that a function of NumPy makes."""
+        """Return a matrix created by a NumPy function."""
         rows = [self._vector(scope, _SIDE, 0) for _ in range(_SIDE)]
         numbers = [[self._float(scope, 0) for _ in range(_SIDE)] for _ in range(_SIDE)]
         listed = ", ".join(f"[{', '.join(row)}]" for row in numbers)
@@ -490,7 +490,7 @@ class Program:
         )
 
     def _number_of(self, scope: _Scope, depth: int) -> str:
-        """Return a number that a function makes of an array, or of numbers."""
+        """Return a number computed by a function of an array or of numbers."""
         size = self._draw.randint(1, 5)
         vector, one = self._vector(scope, size, depth - 1), self._float(scope, depth - 1)
         other, matrix = self._float(scope, 0), self._matrix(scope, 0)
@@ -611,7 +611,7 @@ class Program:
     def _bool(self, scope: _Scope, depth: int) -> str:
         draw = self._draw.random()
         if depth == 0 or draw < 0.3:
-            # Of two constants numba makes an int.
+            # numba infers an int for two constants.
             name = self._draw.choice(["self.x", "self.y", *scope.numbers])
             compared = f"{name} {self._draw.choice(['<', '>', '<=', '=='])} {self._float(scope, 0)}"
             how = self._draw.choice(["==", "is", "!=", "is not"])
@@ -637,7 +637,7 @@ class Program:
 
 
 def module(programs: dict[int, Program]) -> str:
-    """Return a module with one component, which runs one of these programs in each cycle."""
+    """Return a module with one component that runs one of these programs in each cycle."""
     lines = HEAD.format(count=max(programs) + 1).splitlines()
     for number in programs:
         lines += [f"        if which == {number}:", f"            self.program_{number}()"]

@@ -1,8 +1,8 @@
-"""rtcfd's service in the process of a test, with peer executors beside it.
+"""rtcfd's service within the test's process, with peer executors.
 
-The service, the runners, their operations, the state on disk, and the frames to
-executors over unix sockets are the real ones; only processes and gRPC are left
-out, so that thousands of sequences take minutes.
+The service, the runners, their operations, the state on disk, and the messages to
+executors over unix sockets are real; only processes and gRPC are left out, so that
+thousands of sequences take minutes.
 """
 
 import asyncio
@@ -42,15 +42,15 @@ from rtcfd.state.store import Store
 
 
 class Machine:
-    """The executors that run, by socket; and how slow they are."""
+    """The running executors by socket, and their delay."""
 
     def __init__(self) -> None:
         self.peers: dict[str, PeerProcess] = {}
-        self.adopted: PeerProcess | None = None  # whose socket was connected to last
-        self.delay = 0  # steps of the event loop before an executor does what it is asked
+        self.adopted: PeerProcess | None = None  # the executor whose socket was connected last
+        self.delay = 0  # steps of the event loop before an executor handles a request
 
     def install(self, monkeypatch: Any) -> None:
-        """Let rtcfd start executors here."""
+        """Make rtcfd start its executors here."""
         monkeypatch.setattr("rtcfd.executor.executor.subprocess.Popen", self.popen)
         monkeypatch.setattr(executor, "Child", lambda process: process)
         monkeypatch.setattr(executor, "Process", lambda _: self.adopted)
@@ -65,7 +65,7 @@ class Machine:
         monkeypatch.setattr(Link, "connect", classmethod(remember))
 
     async def kill_all(self) -> None:
-        """End all executors at once."""
+        """Kill all executors at once."""
         processes = list(self.peers.values())
         for each in processes:
             each.signal(signal.SIGKILL)
@@ -77,7 +77,7 @@ class Machine:
 
 
 class SlowPeer(Peer):
-    """A peer that takes its time, and makes changes one at a time as an executor does."""
+    """A delayed peer, which makes changes one at a time as an executor does."""
 
     def __init__(self, runner: str, machine: Machine) -> None:
         super().__init__(runner)
@@ -94,7 +94,7 @@ class SlowPeer(Peer):
 
 
 class PeerProcess:
-    """A peer executor in the place of its process."""
+    """A peer executor in place of a process."""
 
     _last_pid = 100_000
 
@@ -116,14 +116,14 @@ class PeerProcess:
         self.peer.end.set()
 
     def release(self) -> None:
-        """Watch it no more."""
+        """Stop watching it."""
 
     async def _run(self) -> None:
         server = await asyncio.start_unix_server(self.peer.serve, self._socket)
         self._machine.peers[self._socket] = self
         try:
             await self.peer.end.wait()
-        finally:  # also when the event loop ends, which waits for who waits for this
+        finally:  # also at the end of the event loop, whose tasks wait for this
             server.close()
             if self.peer.connections:
                 self.peer.writer.close()
@@ -136,11 +136,11 @@ class PeerProcess:
 
 
 class Refused(Exception):
-    """A call was refused."""
+    """A call failed."""
 
 
 class Context:
-    """Of one call."""
+    """The gRPC context of one call."""
 
     async def abort(self, code: grpc.StatusCode, text: str, _: Any) -> None:
         raise Refused(code, text)
@@ -187,7 +187,7 @@ class Rtcfd:
         return []
 
     async def start(self) -> None:
-        """Come up as main.py does."""
+        """Start as main.py does."""
         states = self.store.load()
         assert not self.store.problems
         if "rt_runner" not in [state.runner for state in states]:
@@ -198,7 +198,7 @@ class Rtcfd:
             await_holder(self.runners, runner)
 
     async def call(self, method: str, request: Any) -> Any:
-        """Make a call and return its last answer; cancelled as gRPC does when its caller leaves."""
+        """Make a call; return its last answer. Cancelled like a gRPC call whose client leaves."""
         answers = getattr(self.control, method)(request, Context())
         if not hasattr(answers, "__aiter__"):
             return await answers
@@ -209,7 +209,7 @@ class Rtcfd:
         return last
 
     async def hold(self, method: str, opening: Any, opened: asyncio.Event) -> None:
-        """Make a call that lasts; `opened` is set when what it asks for is there."""
+        """Make a call that lasts; `opened` is set once its lease or stream exists."""
 
         async def requests() -> AsyncIterator[Any]:
             yield opening
@@ -230,7 +230,7 @@ class Rtcfd:
         return document
 
     def peer(self, runner: str) -> Peer | None:
-        """Return the executor that runs for a runner."""
+        """Return the running executor of a runner."""
         found = self.machine.peers.get(str(self.folder / "executors" / f"{runner}.sock"))
         return found.peer if found else None
 
@@ -251,7 +251,7 @@ class _Descriptions(Describer):
 
 
 async def until(condition: Callable[[], Any], what: str) -> Any:
-    """Return the condition's result when it is true; fail after the deadline."""
+    """Return the condition's result once it is true; fail after the deadline."""
     loop = asyncio.get_running_loop()
     deadline = loop.time() + DEADLINE_S
     while not (result := condition()):
@@ -261,7 +261,7 @@ async def until(condition: Callable[[], Any], what: str) -> Any:
 
 
 async def called_by(user: str, work: Coroutine[Any, Any, Any]) -> None:
-    """Make a call in the name of a user."""
+    """Make a call as a user."""
 
     async def call() -> None:
         caller.enter(caller.Caller(Who(1, 1000, user, frozenset()), Level.ADMIN))
@@ -275,7 +275,7 @@ def spec(name: str) -> graph_pb2.ComponentSpec:
 
 
 def quiet() -> None:
-    """Log nothing: thousands of sequences say a lot."""
+    """Disable logging: thousands of sequences log a lot."""
     logging.disable(logging.CRITICAL)
 
 

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from daemon_under_test import BUILD_TREE, DaemonUnderTest
 
-STRANGER = 54321  # a uid that no user has
-root_only = pytest.mark.skipif(os.geteuid() != 0, reason="takes on another user")
+STRANGER = 54321  # an unused uid
+root_only = pytest.mark.skipif(os.geteuid() != 0, reason="requires root to act as another user")
 
 
 @contextmanager

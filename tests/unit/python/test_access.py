@@ -1,4 +1,4 @@
-"""Who may call what: rules, and what a refusal says."""
+"""Access rights of calls: rules, and the texts of errors."""
 
 import os
 
@@ -12,7 +12,7 @@ from rtcfd.common.refusals import PermissionDenied
 
 
 def named(name: str, groups: set[str], uid: int = 4711, known: bool = True) -> Peer:
-    """Return a peer of a name and groups that need not be in this machine's database."""
+    """Return a peer with a name and groups, which need not exist on this machine."""
     return Peer(1, uid, name, frozenset(groups), known)
 
 
@@ -32,7 +32,7 @@ RULES = rights.rules(
         ("bob", {"lab"}, Level.ADMIN),
     ],
 )
-def test_a_users_own_rule_goes_before_the_highest_of_the_groups(
+def test_a_users_own_rule_precedes_rules_of_groups(
     name: str, groups: set[str], level: Level
 ) -> None:
     assert RULES.level(named(name, groups)) == level
@@ -43,7 +43,7 @@ def test_root_and_our_own_user_may_do_everything() -> None:
         assert RULES.level(named("x", set(), uid)) == Level.ADMIN
 
 
-def test_who_is_in_the_group_may_do_everything_unless_told_otherwise() -> None:
+def test_group_members_may_do_everything_by_default() -> None:
     assert Access().level(named("x", set())) == Level.ADMIN
 
 
@@ -52,16 +52,16 @@ def test_only_administrators_load_code() -> None:
         assert rights.needed(method) == Level.ADMIN
 
 
-def test_a_method_that_is_not_known_takes_an_administrator() -> None:
+def test_an_unknown_method_requires_an_administrator() -> None:
     assert rights.needed("SomethingNew") == Level.ADMIN
 
 
-def test_every_call_is_in_the_table_and_nothing_else() -> None:
+def test_the_table_has_exactly_the_calls() -> None:
     service = control_pb2.DESCRIPTOR.services_by_name["Control"]
     assert sorted(calls.CALLS) == sorted(method.name for method in service.methods)
 
 
-def test_what_is_named_like_a_query_is_open_to_observers_alone() -> None:
+def test_exactly_the_queries_are_open_to_observers() -> None:
     for name, call in calls.CALLS.items():
         asks = name.startswith(("Get", "List", "Read", "Watch"))
         assert (call.right == Level.OBSERVE) == asks, name
@@ -71,7 +71,7 @@ def test_the_levels_are_the_rights_of_the_protocol() -> None:
     assert {level.word: level.value for level in Level} == choices(runner_pb2.Right.DESCRIPTOR)
 
 
-def test_who_cannot_be_found_out_has_no_right_where_names_have() -> None:
+def test_an_unidentified_user_has_no_rights_if_rules_name_users() -> None:
     unknown = named("#4711", set(), known=False)
     assert RULES.level(unknown) == Level.NONE
     assert Access().level(unknown) == Level.ADMIN
@@ -79,7 +79,7 @@ def test_who_cannot_be_found_out_has_no_right_where_names_have() -> None:
         RULES.check(unknown, "GetStatus")
 
 
-def test_a_refusal_says_how_the_right_is_granted() -> None:
+def test_an_error_explains_how_the_right_is_granted() -> None:
     with pytest.raises(PermissionDenied) as refused:
         RULES.check(named("ann", set()), "Load")
     assert "user ann has only the right to observe" in str(refused.value)

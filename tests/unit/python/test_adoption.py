@@ -1,4 +1,4 @@
-"""Executors outlive rtcfd: a new one adopts them."""
+"""Executors outlive rtcfd; its successor adopts them."""
 
 import asyncio
 import json
@@ -27,7 +27,7 @@ LONG = runner_pb2.RunnerSettings(orphan_timeout_s=60.0)
 
 @pytest.fixture
 def left(daemon: DaemonUnderTest, client: rtcf.Client) -> int:
-    """A loop that runs with two components, its rtcfd killed; returns the executor's pid."""
+    """Run a loop with two components, and kill its rtcfd; return the executor's pid."""
     client.set_runner(LONG)
     client.load(rtcf.component("demo", "Fine", name="a", parameters=["kp:=2.0"]))
     client.load(rtcf.component("demo", "Fine", name="b"))
@@ -37,7 +37,9 @@ def left(daemon: DaemonUnderTest, client: rtcf.Client) -> int:
     return pid
 
 
-def test_a_loop_runs_on_when_rtcfd_dies_and_is_adopted(daemon: DaemonUnderTest, left: int) -> None:
+def test_a_loop_continues_when_rtcfd_dies_and_is_adopted(
+    daemon: DaemonUnderTest, left: int
+) -> None:
     assert is_alive(left)
     daemon.start()
     assert daemon.executor_pid() == left
@@ -49,11 +51,11 @@ def test_a_loop_runs_on_when_rtcfd_dies_and_is_adopted(daemon: DaemonUnderTest, 
         assert client.get_order() == ["/a", "/b"]
         client.load(rtcf.component("demo", "Fine", name="c"))
     assert daemon.end() == 0
-    # Not our child: whose it is now reaps it when it likes.
+    # Not our child: its parent reaps it at any time.
     wait_for(lambda: not is_alive(left), "its end")
 
 
-def test_what_an_executor_has_is_true(daemon: DaemonUnderTest, left: int) -> None:
+def test_the_executors_graph_replaces_the_saved_one(daemon: DaemonUnderTest, left: int) -> None:
     saved = daemon.saved()
     saved["components"] = [each for each in saved["components"] if each["name"] == "a"]
     saved["components"][0]["parameters"] = []
@@ -72,7 +74,7 @@ def test_what_an_executor_has_is_true(daemon: DaemonUnderTest, left: int) -> Non
     assert after["running"] is True
 
 
-def test_what_was_left_out_of_a_running_loop_stays_out_of_it_and_in_the_state(
+def test_left_out_components_stay_out_of_the_loop_but_in_the_state(
     daemon: DaemonUnderTest, left: int
 ) -> None:
     saved = daemon.saved()
@@ -91,9 +93,7 @@ def test_what_was_left_out_of_a_running_loop_stays_out_of_it_and_in_the_state(
             client.release(["x"])
 
 
-def test_a_graph_that_was_being_restored_is_completed(
-    daemon: DaemonUnderTest, client: rtcf.Client
-) -> None:
+def test_an_interrupted_restore_is_completed(daemon: DaemonUnderTest, client: rtcf.Client) -> None:
     client.set_runner(LONG)
     client.load(rtcf.component("demo", "Fine", name="a"))
     daemon.end(signal.SIGKILL)
@@ -105,7 +105,7 @@ def test_a_graph_that_was_being_restored_is_completed(
         assert again.get_order() == ["/a", "/x"]
 
 
-def test_a_runner_that_is_not_in_the_state_is_adopted(
+def test_a_runner_missing_in_the_state_is_adopted(
     daemon: DaemonUnderTest, client: rtcf.Client
 ) -> None:
     client.add_runner("arm", LONG)
@@ -132,7 +132,7 @@ def test_the_death_of_an_adopted_executor_is_noticed(daemon: DaemonUnderTest, le
 
 def test_a_dead_socket_is_removed(daemon: DaemonUnderTest, left: int) -> None:
     os.kill(left, signal.SIGKILL)
-    wait_for(lambda: not is_alive(left), "its death")
+    wait_for(lambda: not is_alive(left), "its end")
     stale = Path(f"{daemon.socket}.d/executors/old.sock")
     with socket.socket(socket.AF_UNIX) as listening:
         listening.bind(str(stale))
@@ -144,7 +144,7 @@ def test_a_dead_socket_is_removed(daemon: DaemonUnderTest, left: int) -> None:
 
 
 @pytest.mark.parametrize("distance", [-1, 1])
-def test_an_executor_of_a_neighbouring_protocol_is_as_good_as_ours(
+def test_an_executor_of_a_neighbouring_protocol_is_adopted(
     stopped_daemon: DaemonUnderTest, distance: int
 ) -> None:
     stopped_daemon.environment = {
@@ -164,7 +164,7 @@ def test_an_executor_of_a_neighbouring_protocol_is_as_good_as_ours(
         assert client.get_order() == ["/a", "/b"]
 
 
-def test_an_executor_that_knows_of_no_values_is_asked_for_none(
+def test_an_executor_without_value_streams_is_not_asked_for_values(
     stopped_daemon: DaemonUnderTest,
 ) -> None:
     stopped_daemon.environment = {
@@ -213,7 +213,7 @@ def test_an_executor_of_a_foreign_protocol_is_left_running_and_can_be_replaced(
 
 
 def loop_left_behind(daemon: DaemonUnderTest) -> int:
-    """Leave a loop with one component by a rtcfd that was killed; return its executor's pid."""
+    """Leave a loop with one component behind by killing its rtcfd; return its executor's pid."""
     daemon.start()
     with daemon.client() as client:
         client.set_runner(LONG)
@@ -224,16 +224,14 @@ def loop_left_behind(daemon: DaemonUnderTest) -> int:
     return pid
 
 
-def test_a_private_rtcfd_takes_its_executors_with_it(
-    daemon: DaemonUnderTest, client: rtcf.Client
-) -> None:
+def test_a_private_rtcfd_ends_its_executors(daemon: DaemonUnderTest, client: rtcf.Client) -> None:
     status = client.get_status().runners[0]
     assert status.settings.orphan_timeout_s == 2.0
     daemon.end(signal.SIGKILL)
     wait_for(lambda: not is_alive(status.pid), "its end")
 
 
-def test_settings_follow_as_far_as_they_differ() -> None:
+def test_only_differing_settings_are_sent() -> None:
     known = defaults(runner_pb2.REALTIME_PREFERRED)
     desired = Desired("r")
     desired.choose(runner_pb2.RunnerSettings(priority=50))
@@ -268,7 +266,7 @@ def test_an_equal_graph_is_not_reported() -> None:
     assert follow_components(desired, [info], restored=True) == ([], {})
 
 
-def test_an_unload_whose_save_was_lost_is_followed() -> None:
+def test_an_unload_whose_save_was_lost_is_kept() -> None:
     desired = Desired("r")
     for name in ("gone", "absent"):
         desired.put(f"/{name}", rtcf.component("p", "T", name=name))
@@ -279,7 +277,7 @@ def test_an_unload_whose_save_was_lost_is_followed() -> None:
     assert list(desired.components) == ["/absent"]
 
 
-def test_what_a_restore_did_not_get_to_stays_desired() -> None:
+def test_components_not_yet_restored_stay_desired() -> None:
     desired = Desired("r")
     desired.put("/a", rtcf.component("p", "T", name="a"))
     lines, left_out = follow_components(desired, [], restored=False)
@@ -287,7 +285,7 @@ def test_what_a_restore_did_not_get_to_stays_desired() -> None:
     assert left_out == {"/a": "its executor does not have it"}
 
 
-def test_a_stop_that_comes_while_a_loop_is_adopted_is_kept(
+def test_a_stop_during_an_adoption_is_kept(
     rtcfd: Callable[[], Rtcfd], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def play() -> None:
@@ -300,7 +298,7 @@ def test_a_stop_that_comes_while_a_loop_is_adopted_is_kept(
 
         async def answer(peer: SlowPeer, request: wire.Request) -> None:
             kind = request.WhichOneof("kind")
-            if kind == "stop":  # it takes until a boundary
+            if kind == "stop":  # it waits for a cycle boundary
                 await adopted.wait()
             elif kind == "get_status" and not calls:
                 stop = second.call("Stop", control_pb2.StopRequest())
@@ -313,7 +311,7 @@ def test_a_stop_that_comes_while_a_loop_is_adopted_is_kept(
         await second.start()
         adopted.set()
         await asyncio.gather(*calls)
-        await second.call("SetRunner", control_pb2.SetRunnerRequest())  # it saves
+        await second.call("SetRunner", control_pb2.SetRunnerRequest())  # this saves the state
         saved = second.saved("rt_runner")
         assert saved is not None and saved["running"] is False
         assert not second.runners.get("rt_runner").loop.wanted
@@ -322,7 +320,7 @@ def test_a_stop_that_comes_while_a_loop_is_adopted_is_kept(
     asyncio.run(play())
 
 
-def test_a_loop_that_was_started_after_a_stop_at_its_executor_is_wanted(
+def test_a_loop_started_after_a_direct_stop_stays_desired(
     rtcfd: Callable[[], Rtcfd], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     stop = wire.DirectStop(count=1, at_ns=time.monotonic_ns(), uid=0, pid=1)

@@ -1,4 +1,4 @@
-"""What is advised gives nobody more rights than what is wrong needs."""
+"""Advice in messages and pages grants no more rights than necessary."""
 
 import re
 from pathlib import Path
@@ -7,7 +7,7 @@ import pytest
 from pages import TREE
 
 FOLDERS = ("client", "components", "daemon", "docs", "shared", "systemd")
-# As somebody would type them: a call in a program has a bracket.
+# As a user types them; a call in a program has a bracket.
 WIDENS = re.compile(r"\b(chmod|chown|chgrp|setcap|usermod|setfacl) +[-+0-9a-zA-Z:/{%]")
 
 
@@ -18,7 +18,7 @@ def _files() -> list[Path]:
     return [file for file in files if "__pycache__" not in file.parts]
 
 
-def test_nothing_advises_to_widen_rights() -> None:
+def test_no_text_advises_to_widen_rights() -> None:
     files = _files()
     assert len(files) > 300
     advice = [
@@ -32,10 +32,10 @@ def test_nothing_advises_to_widen_rights() -> None:
 @pytest.mark.parametrize(
     "text", ["mend it: sudo chown root /home/alice", "`chmod o-w /tmp`", "setcap cap_sys_nice+ep x"]
 )
-def test_advice_that_does_is_found(text: str) -> None:
+def test_advice_that_widens_rights_is_found(text: str) -> None:
     assert WIDENS.search(text)
 
 
 @pytest.mark.parametrize("text", ["::chmod(path, mode)", "os.chown (fd)", "chown: not here"])
-def test_what_is_none_is_not(text: str) -> None:
+def test_other_texts_are_accepted(text: str) -> None:
     assert not WIDENS.search(text)

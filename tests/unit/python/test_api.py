@@ -1,4 +1,4 @@
-"""rtcf.v1 as a protocol that is kept: what its files must be like."""
+"""Conventions of the protocol rtcf.v1."""
 
 import keyword
 import re
@@ -19,12 +19,12 @@ NUMBERS = (
     FieldDescriptor.CPPTYPE_DOUBLE, FieldDescriptor.CPPTYPE_FLOAT, FieldDescriptor.CPPTYPE_INT32,
     FieldDescriptor.CPPTYPE_INT64, FieldDescriptor.CPPTYPE_UINT32, FieldDescriptor.CPPTYPE_UINT64,
 )  # fmt: skip
-# Words of time, frequency and size, which have units.
+# Words of time, frequency and size, which need units.
 DIMENSIONS = re.compile(
     r"(^|_)(time|timeout|interval|age|period|duration|frequency|spin|heap|stack)($|_)"
 )
 UNITS = ("_ns", "_us", "_ms", "_s", "_hz", "_kb")
-# Answers of calls that tell nothing but that it is done.
+# Responses of calls that report only completion.
 STREAMED = {"Add", "Set", "Remove", "Restart", "Start", "Stop", "Step", "Load", "Unload", "Replace",
             "Restore", "Apply", "Release", "Undo", "Reload", "Replay", "Hold", "Lease",
             "Read", "Watch", "Write"}  # fmt: skip
@@ -72,15 +72,15 @@ def test_a_number_with_a_unit_names_it(message: Descriptor) -> None:
 
 
 @pytest.mark.parametrize("method", SERVICE.methods, ids=lambda method: str(method.name))
-def test_a_call_has_messages_of_its_own(method: object) -> None:
+def test_each_call_has_its_own_messages(method: object) -> None:
     name: str = method.name  # type: ignore[attr-defined]
     asked: str = method.input_type.name  # type: ignore[attr-defined]
     answered: str = method.output_type.name  # type: ignore[attr-defined]
     assert asked == f"{name}Request"
-    assert answered.endswith("Response")  # a resource stands in it, never bare
+    assert answered.endswith("Response")  # a resource is a field of it, never the response itself
 
 
-def test_changes_and_what_lasts_are_streams() -> None:
+def test_changes_and_lasting_calls_are_streams() -> None:
     text = (TREE / "proto/rtcf/v1/control.proto").read_text(encoding="utf-8")
     for name, streamed in re.findall(r"rpc (\w+)\([^)]*\) returns \((stream )?", text):
         verb = re.match(r"[A-Z][a-z]+", name)
@@ -98,7 +98,7 @@ def test_lists_come_in_pages(method: object) -> None:
         assert "next_page_token" in answer
 
 
-def test_the_page_says_what_the_comments_say() -> None:
+def test_the_docs_match_the_comments() -> None:
     done = subprocess.run(
         [TREE / "tools" / "api-docs", "--check"], capture_output=True, check=False
     )

@@ -1,4 +1,4 @@
-"""A holder that comes back while what it held is being ended is refused: it does not have it."""
+"""A holder that returns while its lease is being ended gets an error."""
 
 import asyncio
 import contextlib
@@ -14,7 +14,7 @@ HOLD = control_pb2.OpenHold(runner="rt_runner", token="token", holder="a launch"
 
 
 async def lost(daemon: Rtcfd, method: str, opening: Any) -> asyncio.Event:
-    """Let the holder of a loop that runs die; return what lets the stop of the loop go on."""
+    """Kill the holder of a running loop; return the event that lets the loop's stop continue."""
     opened = asyncio.Event()
     holder = asyncio.create_task(daemon.hold(method, opening, opened))
     await opened.wait()
@@ -42,7 +42,7 @@ def request_of(method: str, opening: Any) -> Any:
     return kind(open=opening)
 
 
-def test_a_component_that_is_being_ended_is_not_given_back(rtcfd: Callable[[], Rtcfd]) -> None:
+def test_a_lease_of_a_component_being_unloaded_is_not_renewed(rtcfd: Callable[[], Rtcfd]) -> None:
     async def play() -> None:
         daemon = rtcfd()
         await daemon.start()
@@ -59,7 +59,7 @@ def test_a_component_that_is_being_ended_is_not_given_back(rtcfd: Callable[[], R
     asyncio.run(play())
 
 
-def test_a_runner_that_is_being_given_back_is_not_taken_again(rtcfd: Callable[[], Rtcfd]) -> None:
+def test_a_lease_of_a_runner_being_released_is_not_renewed(rtcfd: Callable[[], Rtcfd]) -> None:
     async def play() -> None:
         daemon = rtcfd()
         await daemon.start()
@@ -72,7 +72,7 @@ def test_a_runner_that_is_being_given_back_is_not_taken_again(rtcfd: Callable[[]
         runner = daemon.runners.get("rt_runner")
         await until(lambda: runner.desired.hold is None and not runner.releasing, "its end")
         assert runner.hold_outbox is None
-        # And another has it now.
+        # Another holder has the lease now.
         opened = asyncio.Event()
         other = asyncio.create_task(
             daemon.hold("HoldRunner", request_of("HoldRunner", HOLD), opened)

@@ -1,4 +1,4 @@
-"""Columns of NumPy as serialised ROS messages, and back, against ROS's own serialisation."""
+"""NumPy columns as serialised ROS messages, and back, against ROS's own serialisation."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_a_wrapped_number_is_the_column_itself() -> None:
     assert [_read(Bool, each).data for each in pack(_text(Bool), {"": values > 0})] == [1, 0, 1]
 
 
-def test_fields_go_by_their_path_and_others_are_zero() -> None:
+def test_fields_are_set_by_path_and_others_are_zero() -> None:
     data = pack(_text(Twist), {"linear.x": np.arange(3.0), "angular.z": np.full(3, 7)})
     for row, each in enumerate(data):
         message = _read(Twist, each)
@@ -60,7 +60,7 @@ def test_an_array_is_as_long_as_its_column_is_wide() -> None:
     assert unpack(_text(JointState), joints)["position"].shape == (2, 6)
 
 
-def test_what_ros_wrote_is_read() -> None:
+def test_messages_written_by_ros_are_read() -> None:
     messages = [Twist() for _ in range(2)]
     messages[1].angular.y = 0.5
     assert unpack(_text(Twist), [_serialised(each) for each in messages])["angular.y"][1] == 0.5
@@ -77,14 +77,14 @@ def test_what_ros_wrote_is_read() -> None:
         (Int32, {"": np.array([np.nan, 1.0])}, "some values do not fit int32"),
     ],
 )
-def test_what_does_not_fit_is_refused(kind: Any, columns: dict[str, Any], said: str) -> None:
+def test_unsuitable_columns_are_rejected(kind: Any, columns: dict[str, Any], said: str) -> None:
     with pytest.raises(ValueError, match=".") as refusal:
         pack(_text(kind), columns)
     assert said in str(refusal.value)
     assert "\n" not in str(refusal.value)
 
 
-def test_messages_that_differ_in_length_are_no_columns() -> None:
+def test_messages_of_different_lengths_are_rejected() -> None:
     two = [_serialised(JointState(position=[0.0] * n)) for n in (1, 2)]
     with pytest.raises(ValueError, match="messages differ in length"):
         unpack(_text(JointState), two)

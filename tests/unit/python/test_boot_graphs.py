@@ -1,4 +1,4 @@
-"""The files of graphs.d: which of them count, and when they count as changed."""
+"""The files of graphs.d: which of them apply, and when they count as changed."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -8,7 +8,7 @@ import pytest
 from rtcfd.state.boot_graphs import BootGraphs
 
 
-def test_a_graph_counts_when_the_file_that_was_in_its_way_is_gone(tmp_path: Path) -> None:
+def test_a_graph_applies_once_the_conflicting_file_is_removed(tmp_path: Path) -> None:
     first, second = tmp_path / "a.yaml", tmp_path / "b.yaml"
     first.write_text("runner: arm\ncomponents: []\n")
     second.write_text("runner: arm\nsettings: {priority: 70}\ncomponents: []\n")
@@ -27,7 +27,7 @@ def test_a_graph_counts_when_the_file_that_was_in_its_way_is_gone(tmp_path: Path
 
 
 @pytest.mark.parametrize("odd", odd_files.ODD)
-def test_what_is_no_file_is_one_line_and_the_others_count(
+def test_an_unreadable_entry_is_one_line_and_the_others_apply(
     tmp_path: Path, odd: Callable[[Path], None]
 ) -> None:
     odd(tmp_path / "a.yaml")
@@ -39,7 +39,7 @@ def test_what_is_no_file_is_one_line_and_the_others_count(
     assert "[Errno" not in problem and "\n" not in problem
 
 
-def test_a_link_to_a_folder_that_is_not_there_is_a_problem(tmp_path: Path) -> None:
+def test_a_link_to_a_missing_folder_is_an_error(tmp_path: Path) -> None:
     link = tmp_path / "graphs.d"
     assert BootGraphs(link, {}).read() == ([], [])
     odd_files.dangling(link)

@@ -1,4 +1,4 @@
-"""What clients may take of rtcfd: lengths, connections, calls, time; and what hangs elsewhere."""
+"""Limits of clients: lengths, connections, calls, time; and hanging services."""
 
 import asyncio
 import logging
@@ -23,19 +23,19 @@ from strangers import STRANGER, open_to_strangers, root_only, stranger
 
 
 def memory_kb(daemon: DaemonUnderTest) -> int:
-    """Return the most memory that rtcfd has had."""
+    """Return rtcfd's peak memory."""
     assert daemon.process is not None
     lines = Path(f"/proc/{daemon.process.pid}/status").read_text().splitlines()
     return next(int(line.split()[1]) for line in lines if line.startswith("VmHWM"))
 
 
 def descriptors(daemon: DaemonUnderTest) -> int:
-    """Return how many rtcfd has open."""
+    """Return the number of rtcfd's open descriptors."""
     assert daemon.process is not None
     return len(list(Path(f"/proc/{daemon.process.pid}/fd").iterdir()))
 
 
-def test_a_name_is_looked_at_only_if_it_is_short(daemon: DaemonUnderTest) -> None:
+def test_only_short_names_are_processed(daemon: DaemonUnderTest) -> None:
     with daemon.client() as client:
         client.get_status()
         before = memory_kb(daemon)
@@ -50,7 +50,7 @@ def test_a_name_is_looked_at_only_if_it_is_short(daemon: DaemonUnderTest) -> Non
         assert memory_kb(daemon) - before < 120_000
 
 
-def test_texts_have_their_own_lengths() -> None:
+def test_texts_have_their_own_limits() -> None:
     spec = rtcf.component("pkg", "T", name="n", remaps=["a:=" + "b" * 1000])
     lengths.check(control_pb2.LoadRequest(component=spec))
     for field in ("name", "ns", "package", "type"):
@@ -63,7 +63,7 @@ def test_texts_have_their_own_lengths() -> None:
         lengths.check(names)
 
 
-def test_a_refusal_fits_into_metadata_and_keeps_its_advice() -> None:
+def test_an_error_fits_into_metadata_and_keeps_its_advice() -> None:
     assert bounded("  short\n one ") == "short one"
     text = bounded("no component " + "ä€😀" * 5000 + ": list them")
     assert len(text.encode()) < 4000
@@ -72,7 +72,7 @@ def test_a_refusal_fits_into_metadata_and_keeps_its_advice() -> None:
     assert suggestion("x" * 1_000_000, ["y" * 1_000_000]) == ""
 
 
-def test_who_may_only_look_has_so_many_calls_and_streams_at_a_time() -> None:
+def test_an_observer_has_limited_calls_and_streams() -> None:
     ann = Peer(1, 1, "ann", frozenset())
     usage = Usage()
     watches = [usage.calling("WatchStatistics", ann, Level.OBSERVE) for _ in range(8)]
@@ -84,7 +84,7 @@ def test_who_may_only_look_has_so_many_calls_and_streams_at_a_time() -> None:
     ):
         pass
     with usage.calling("WatchStatistics", ann, Level.OPERATE):
-        pass  # who may stop loops is not held back
+        pass  # users who may stop loops are not limited
     for each in watches:
         each.__exit__(None, None, None)
     with usage.calling("WatchStatistics", ann, Level.OBSERVE):
@@ -108,7 +108,7 @@ sys.stdin.read()
 
 
 @root_only
-def test_a_stranger_without_a_right_leaves_room_for_others() -> None:
+def test_a_user_without_rights_leaves_room_for_others() -> None:
     rules = "[access]\ndefault = 'none'\n[limits]\nclients = 16\n"
     with (
         open_to_strangers(rules) as daemon,
@@ -145,7 +145,7 @@ def test_half_closed_clients_that_read_nothing_leave_no_descriptor(
         each.close()
 
 
-def test_a_user_database_that_hangs_keeps_out_whom_it_has_to_name_only(
+def test_a_hanging_user_database_affects_only_users_whose_names_are_needed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     gate = threading.Event()
@@ -168,7 +168,7 @@ def test_a_user_database_that_hangs_keeps_out_whom_it_has_to_name_only(
     gate.set()
 
 
-def test_work_that_hangs_is_given_up_on_and_keeps_its_place() -> None:
+def test_hanging_work_times_out_and_keeps_its_thread() -> None:
     gate = threading.Event()
 
     async def work() -> None:
@@ -186,7 +186,7 @@ def test_work_that_hangs_is_given_up_on_and_keeps_its_place() -> None:
     asyncio.run(work())
 
 
-def test_a_journal_that_hangs_holds_up_nobody_and_what_is_lost_is_counted() -> None:
+def test_a_hanging_journal_blocks_nobody_and_dropped_records_are_counted() -> None:
     gate = threading.Event()
     written: list[str] = []
 
@@ -199,7 +199,7 @@ def test_a_journal_that_hangs_holds_up_nobody_and_what_is_lost_is_counted() -> N
     logger = logging.Logger("test")
     logger.addHandler(handler)
     for number in range(100):
-        logger.info("record %d", number)  # returns, though nothing is written
+        logger.info("record %d", number)  # returns, although nothing is written
     assert not written
     gate.set()
     wait_for(lambda: written and "were lost" in written[-1], "the count")

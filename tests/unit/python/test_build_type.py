@@ -1,4 +1,4 @@
-"""`rtcf_add_components` in a package of somebody's own, by the build tree's find_package."""
+"""`rtcf_add_components` in a user's package, with the build tree's find_package."""
 
 import json
 import subprocess
@@ -11,7 +11,7 @@ PACKAGE = Path(__file__).parents[3] / "debian" / "tests" / "offset"
 
 
 def _configure(folder: Path, *options: str) -> tuple[str, str]:
-    """Return what CMake says, and the command that compiles the component."""
+    """Return CMake's output, and the command that compiles the component."""
     done = subprocess.run(
         ["cmake", "-S", PACKAGE, "-B", folder, f"-Drtcf_DIR={BUILD_TREE / 'cmake' / 'rtcf'}",
          "-DCMAKE_EXPORT_COMPILE_COMMANDS=ON", *options],
@@ -22,14 +22,14 @@ def _configure(folder: Path, *options: str) -> tuple[str, str]:
     return done.stdout, entry["command"]
 
 
-def test_a_build_without_a_type_is_optimised_has_lines_and_says_so(tmp_path: Path) -> None:
+def test_a_build_without_a_type_is_optimised_with_lines_and_a_note(tmp_path: Path) -> None:
     said, command = _configure(tmp_path)
     assert "rtcf: CMAKE_BUILD_TYPE is not set: components are built as with RelWithDebInfo" in said
     assert {"-O2", "-g", "-DNDEBUG"} <= set(command.split())
 
 
 @pytest.mark.parametrize("build_type", ["Debug", "Release"])
-def test_a_type_that_is_set_is_taken(tmp_path: Path, build_type: str) -> None:
+def test_a_given_build_type_is_used(tmp_path: Path, build_type: str) -> None:
     said, command = _configure(tmp_path, f"-DCMAKE_BUILD_TYPE={build_type}")
     assert "rtcf:" not in said
     assert "-O2" not in command.split()

@@ -1,4 +1,4 @@
-"""`rtcfctl check`: reports of the sanitizer, libraries, exit codes."""
+"""`rtcfctl check`: sanitizer reports, libraries, exit codes."""
 
 import json
 import os
@@ -49,7 +49,7 @@ def test_reports_are_read_from_the_call_to_the_update() -> None:
 
 @pytest.fixture
 def executor(tmp_path: Path) -> Path:
-    """One that offers type T and says what its environment tells it to."""
+    """An executor that offers type T and prints as its environment demands."""
     (tmp_path / "lib" / "pkg").mkdir(parents=True)
     (tmp_path / "lib" / "pkg" / "main.so").write_text('{"types": {"T": "fine"}}')
     peer = Path(__file__).with_name("peer_executor.py")
@@ -111,7 +111,7 @@ def test_violations_are_exit_code_1_with_their_stacks(executor: Path) -> None:
         ("pgk T", "", 0, 'no package "pgk"'),
     ],
 )
-def test_what_cannot_be_checked_is_refused(
+def test_uncheckable_components_are_rejected(
     executor: Path, words: str, says: str, status: int, text: str
 ) -> None:
     done = check(executor, *words.split(), says=says, status=status)
@@ -119,7 +119,7 @@ def test_what_cannot_be_checked_is_refused(
     assert text in done.stderr
 
 
-def test_no_executor_in_a_build_tree_names_the_command_that_builds_it(tmp_path: Path) -> None:
+def test_a_missing_executor_in_a_build_tree_names_the_build_command(tmp_path: Path) -> None:
     with pytest.raises(RtcfError, match=f"build it with `make -C {tmp_path} checker`"):
         checking.check(
             checking.executor_of(tmp_path / "build"), "pkg", "T", 1, build_tree=tmp_path / "build"
@@ -128,13 +128,13 @@ def test_no_executor_in_a_build_tree_names_the_command_that_builds_it(tmp_path: 
     assert "\nchecker: " in goals
 
 
-def test_no_executor_names_the_package(executor: Path) -> None:
+def test_a_missing_executor_names_the_package(executor: Path) -> None:
     executor.unlink()
     done = check(executor, "pkg", "T")
     assert (done.returncode, "install rtcf-check" in done.stderr) == (1, True)
 
 
-def test_the_inside_of_libraries_is_left_out_for_people() -> None:
+def test_text_output_omits_the_inside_of_libraries() -> None:
     report = """\
 ==1==ERROR: RealtimeSanitizer: unsafe-library-call
 Intercepted call to real-time unsafe function `malloc` in real-time context!

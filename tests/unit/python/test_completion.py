@@ -1,4 +1,4 @@
-"""What the shell offers: verbs, options, and the names that rtcfd knows at that moment."""
+"""Shell completion: verbs, options, and the names that rtcfd knows at that moment."""
 
 import subprocess
 from pathlib import Path
@@ -73,7 +73,7 @@ def test_bash_asks_rtcfctl(offered: DaemonUnderTest) -> None:
     assert done.stdout.split() == ["alpha"]
 
 
-def test_without_rtcfd_there_is_nothing_to_offer_and_nothing_is_said(tmp_path: Path) -> None:
+def test_without_rtcfd_completion_is_silent_and_empty(tmp_path: Path) -> None:
     done = subprocess.run(
         [BUILD_TREE / "bin" / "rtcfctl", "__complete", "info", ""],
         env={"RTCF_SOCKET": str(tmp_path / "none")},
@@ -85,7 +85,7 @@ def test_without_rtcfd_there_is_nothing_to_offer_and_nothing_is_said(tmp_path: P
 
 
 @pytest.mark.parametrize("active", [True, False])
-def test_a_prompt_wakes_no_daemon_up(
+def test_completion_starts_no_daemon(
     offered: DaemonUnderTest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, active: bool
 ) -> None:
     systemctl = tmp_path / "bin" / "systemctl"

@@ -1,4 +1,4 @@
-"""Conditions on values of cycles: what they mean, and what is refused."""
+"""Conditions on values of cycles: their meaning, and errors."""
 
 import math
 
@@ -38,7 +38,7 @@ def over(text: str, **columns: list[float]) -> list[bool]:
         ("a.x != 2", [True, True, False]),
     ],
 )
-def test_a_condition_means_what_it_says(text: str, expected: list[bool]) -> None:
+def test_a_condition_selects_the_expected_cycles(text: str, expected: list[bool]) -> None:
     assert over(text, a_x=[0.0, 1.0, 2.0], b_y=[1.0, math.nan, 6.0]) == expected
 
 
@@ -69,7 +69,7 @@ def test_a_bool_is_a_condition() -> None:
         ("(" * 90 + "a.x > 1" + ")" * 90 + "> " + "-" * 100 + "1", "parentheses"),
     ],
 )
-def test_what_is_no_condition_is_refused_in_a_line(text: str, said: str) -> None:
+def test_an_invalid_condition_is_rejected_in_one_line(text: str, said: str) -> None:
     with pytest.raises(ConditionError) as refused:
         over(text, a_x=[1.0])
     assert said in str(refused.value)
@@ -79,15 +79,15 @@ def test_what_is_no_condition_is_refused_in_a_line(text: str, said: str) -> None
 @given(st.text(max_size=60) | st.text("ab.x/()<>=!&|-+*,0123456789 []stae", max_size=40))
 @example("0Ā\n")
 @example("a.x\n+\r1")
-def test_any_text_is_a_condition_or_refused(text: str) -> None:
+def test_any_text_is_a_condition_or_rejected(text: str) -> None:
     try:
         condition = Condition(text)
         condition.over([np.array([1.0, math.nan])] * len(condition.signals), 2)
     except ConditionError as error:
-        assert str(error).isprintable(), "line ends are shown as escapes"
+        assert str(error).isprintable(), "line ends are escaped"
 
 
-def test_signals_are_looked_for_in_the_stream() -> None:
+def test_signals_are_resolved_in_the_stream() -> None:
     signals = {
         "/a.v": Signal("/a.v", "", 0, "<f8", (3,), 0),
         "/a.m.p.x": Signal("/a.m.p.x", "", 1, "<f8", (), 0),
@@ -106,7 +106,7 @@ def test_signals_are_looked_for_in_the_stream() -> None:
         assert said in str(refused.value)
 
 
-def test_a_batch_that_only_tells_of_lost_cycles_is_true_nowhere() -> None:
+def test_a_batch_with_only_dropped_cycles_matches_nothing() -> None:
     column = ports_pb2.PortColumn(component="/a", name="q", size=24)
     schema = PortSchema((column,), (), {"/a.q": Signal("/a.q", "", 0, "<f8", (3,), 0)})
     message = ports_pb2.PortBatch(first_cycle=7, lost=5, values=[b""])

@@ -1,4 +1,4 @@
-"""Settings: defaults, the configuration file, what is allowed."""
+"""Settings: defaults, the configuration file, valid values."""
 
 import os
 import re
@@ -58,7 +58,7 @@ def test_a_file_is_read(tmp_path: Path) -> None:
     )
 
 
-# Two rules, of which the second has a mistake.
+# Two rules, of which the second contains a mistake.
 RULES = (
     "[[access.parameters]]\nwho = ['a']\n\n"
     "[[access.parameters]] # of b\nwho = ['b']\n"
@@ -114,7 +114,7 @@ RULES = (
         ("[limits]\nclient = 1", 'unknown key "limits.client"; did you mean "clients"'),
     ],
 )
-def test_a_bad_file_is_refused_by_name(tmp_path: Path, text: str, said: str) -> None:
+def test_a_bad_file_is_rejected_by_name(tmp_path: Path, text: str, said: str) -> None:
     file = written(tmp_path, text)
     with pytest.raises(Refusal) as refused:
         settings_file.read(file)
@@ -132,7 +132,7 @@ def test_a_bad_file_is_refused_by_name(tmp_path: Path, text: str, said: str) -> 
         ("[limits]\nclients = ", "2: limits.clients"),
     ],
 )
-def test_a_number_that_is_none_is_refused(tmp_path: Path, text: str, key: str, number: str) -> None:
+def test_an_invalid_number_is_rejected(tmp_path: Path, text: str, key: str, number: str) -> None:
     file = written(tmp_path, text + number)
     with pytest.raises(Refusal) as refused:
         settings_file.read(file)
@@ -162,7 +162,7 @@ def test_a_number_that_is_none_is_refused(tmp_path: Path, text: str, key: str, n
         "[daemon]\nsocket = {{a = {}}}",
     ],
 )
-def test_an_integer_beyond_64_bits_is_refused_with_its_line(
+def test_an_integer_beyond_64_bits_is_rejected_with_its_line(
     tmp_path: Path, text: str, digits: int, number: str
 ) -> None:
     file = written(tmp_path, text.format(number))
@@ -174,7 +174,7 @@ def test_an_integer_beyond_64_bits_is_refused_with_its_line(
     assert len(said) < len(str(file)) + 100 < digits
 
 
-def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
+def test_a_file_that_is_no_text_is_rejected(tmp_path: Path) -> None:
     file = tmp_path / "rtcfd.toml"
     file.write_bytes("[runner]".encode("utf-16"))
     with pytest.raises(Refusal) as refused:
@@ -183,7 +183,7 @@ def test_a_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("odd", odd_files.ODD)
-def test_what_is_in_the_place_of_the_file_is_refused(
+def test_anything_but_a_regular_file_is_rejected(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, odd: Callable[[Path], None]
 ) -> None:
     file = tmp_path / "rtcfd.toml"
@@ -197,7 +197,7 @@ def test_what_is_in_the_place_of_the_file_is_refused(
         assert "\n" not in str(refused.value)
 
 
-def test_only_a_file_that_is_not_there_means_the_defaults(
+def test_only_a_missing_file_means_the_defaults(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder, state = tmp_path / "rtcfd", tmp_path / "state"
@@ -218,33 +218,33 @@ def test_only_a_file_that_is_not_there_means_the_defaults(
         f"cannot read {file}: it is a symbolic link that leads nowhere; the last good settings are "
         "used instead"
     )
-    # Of a folder on the way to it as well.
+    # The same for a folder on the path to it.
     file.unlink()
     folder.rmdir()
     odd_files.dangling(folder)
     assert options.parse(line, None, last_good=True).access.default.word == "observe"
 
 
-def test_a_byte_order_mark_is_passed_over(tmp_path: Path) -> None:
+def test_a_byte_order_mark_is_skipped(tmp_path: Path) -> None:
     file = tmp_path / "rtcfd.toml"
     file.write_bytes("[runner]\nspin_us = 7\n".encode("utf-8-sig"))
     assert settings_file.read(file).runner.spin_us == 7
 
 
-def test_a_cpu_that_is_not_there_is_refused() -> None:
+def test_a_missing_cpu_is_rejected() -> None:
     with pytest.raises(Refusal, match="CPU 4096"):
         runner_settings.check(runner_pb2.RunnerSettings(cpu=4096))
     runner_settings.check(runner_pb2.RunnerSettings(cpu=max(os.sched_getaffinity(0))))
 
 
-def test_the_unspecified_leaves_a_setting_as_it_is() -> None:
+def test_unspecified_leaves_a_setting_unchanged() -> None:
     base = runner_settings.defaults(runner_pb2.REALTIME_REQUIRED)
     change = runner_pb2.RunnerSettings(realtime=runner_pb2.REALTIME_UNSPECIFIED, spin_us=3)
     result = runner_settings.merged(base, change)
     assert (result.realtime, result.spin_us) == (runner_pb2.REALTIME_REQUIRED, 3)
 
 
-def test_the_command_line_goes_before_the_file(
+def test_the_command_line_overrides_the_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = written(tmp_path, '[daemon]\nsocket = "/f"\npath = ["/f/lib"]\nrealtime = "required"')
@@ -268,7 +268,7 @@ def test_the_command_line_goes_before_the_file(
     assert options.parse(["--foreground"], None).socket == Path("/e")
 
 
-def test_the_service_takes_systemds_folder(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_service_uses_systemds_folder(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("STATE_DIRECTORY", "/var/lib/here")
     given = options.parse([], None)
     assert given.runtime_dir == Path("/run/rtcfd")

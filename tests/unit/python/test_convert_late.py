@@ -1,4 +1,4 @@
-"""Recordings of graphs that have changed meanwhile, as other files."""
+"""Conversion of recordings whose graph changed during the recording."""
 
 import csv
 from pathlib import Path
@@ -34,7 +34,7 @@ def _cycles(schema: PortSchema, first: int, *columns: list[list[float]]) -> Port
     return PortBatch(schema, 1, first, 0, False, message)
 
 
-def test_an_array_that_came_later_has_empty_cells_until_then(tmp_path: Path) -> None:
+def test_a_later_array_has_empty_cells_before_it_appears(tmp_path: Path) -> None:
     number = _state("/a", "x", "double", 8)
     before = schema_of(ports_pb2.PortSchema(columns=[number]))
     after = schema_of(ports_pb2.PortSchema(columns=[number, _state("/b", "v", "double[3]", 24)]))

@@ -1,4 +1,4 @@
-"""tests/run with property tests: a counterexample is no chance, and is not lost."""
+"""tests/run with property tests: a counterexample fails the run, and is kept."""
 
 import re
 import shutil
@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 TREE = Path(__file__).resolve().parents[3]
-# The first run fails, each later one passes; the test's process knows by a file which it is.
+# The first run fails, each later one passes; a file tells the process which run it is.
 HEAD = """
 import atexit
 from pathlib import Path
@@ -29,7 +29,7 @@ def test_property(x):
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """Give a source tree without tests."""
+    """Return a source tree without tests."""
     (tmp_path / "tests").mkdir()
     shutil.copy(TREE / "tests" / "conftest.py", tmp_path / "tests")
     shutil.copy(TREE / "pyproject.toml", tmp_path)
@@ -37,7 +37,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def run_tests(folder: Path, text: str) -> subprocess.CompletedProcess[str]:
-    """Run pytest on a file as tests/run does, with its own functions."""
+    """Run pytest on a file like tests/run, with its own functions."""
     (folder / "tests" / "test_it.py").write_text(text)
     functions = "/^most_by_chance=/p; /^once_more() {/,/^}/p; /^with_pytest() {/,/^}/p"
     script = f"""
@@ -50,7 +50,7 @@ def run_tests(folder: Path, text: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_a_counterexample_fails_at_once(folder: Path) -> None:
+def test_a_counterexample_fails_without_repetition(folder: Path) -> None:
     done = run_tests(folder, HEAD + PROPERTY + "def test_other():\n    assert not FIRST\n")
     assert done.returncode == 1, done.stdout
     noted = "counterexample (kept in build/hypothesis): tests/test_it.py::test_property"
@@ -62,20 +62,20 @@ def test_a_counterexample_fails_at_once(folder: Path) -> None:
 def test_a_counterexample_is_tried_first_by_the_next_run(folder: Path) -> None:
     assert run_tests(folder, HEAD + PROPERTY).returncode == 1
     (folder / "ran").unlink()
-    # No draws of its own: what fails is the kept one.
+    # No new draws: the kept example fails.
     reuse = "@settings(phases=[Phase.reuse])\n"
     done = run_tests(folder, HEAD + reuse + PROPERTY.lstrip())
     assert done.returncode == 1, done.stdout
     assert re.search(r"x=1000\b", done.stdout)
 
 
-def test_another_failure_is_run_once_more(folder: Path) -> None:
+def test_any_other_failure_is_repeated(folder: Path) -> None:
     done = run_tests(folder, HEAD + "def test_other():\n    assert not FIRST\n")
     assert done.returncode == 0, done.stdout
     assert "make test: once more: tests/test_it.py::test_other\n" in done.stdout
 
 
-def test_a_failure_that_does_not_come_back_is_no_counterexample(folder: Path) -> None:
+def test_a_failure_that_cannot_be_reproduced_is_no_counterexample(folder: Path) -> None:
     once = """
 @given(st.integers())
 def test_property(x):

@@ -1,4 +1,4 @@
-"""Where the loops of a user's private daemons claim CPUs."""
+"""The folder of CPU claims of a user's private daemons."""
 
 import os
 from pathlib import Path
@@ -14,7 +14,7 @@ def test_claims_are_in_the_runtime_folder_of_the_user(
     assert claims_folder_of_user(tmp_path / "own") == tmp_path / "rtcf-cpus"
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="makes a folder of another user")
+@pytest.mark.skipif(os.geteuid() != 0, reason="requires root to create a folder of another user")
 def test_claims_are_not_in_the_runtime_folder_of_another_user(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

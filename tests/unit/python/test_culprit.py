@@ -1,4 +1,4 @@
-"""The culprit of a late cycle, of synthetic traces of the kernel with culprits of random kind."""
+"""The cause of a late cycle, from synthetic kernel traces with causes of random kind."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from rtcf.kernel.culprit import (
 )
 from rtcf.kernel.pages import Decoder, Page
 
-LOOP, LOOP_PRIORITY = 100, 19  # of the kernel: SCHED_FIFO 80
+LOOP, LOOP_PRIORITY = 100, 19  # kernel's scale: SCHED_FIFO 80
 CPU = 1
 PERIOD_NS = 1_000_000
 US = 1000
@@ -31,7 +31,7 @@ names = st.text("abcdefghijklmnopqrstuvwxyz-/_:0123456789", min_size=1, max_size
 
 @dataclass
 class Timeline:
-    """A CPU with a loop; writes the trace of what is done on it, one after the other."""
+    """A CPU with a loop; writes the trace of consecutive actions on it."""
 
     now: int = 0
     events: list[Event] = field(default_factory=list)
@@ -46,18 +46,18 @@ class Timeline:
         runnable: bool,
         uninterruptible: bool = False,
     ) -> None:
-        """Go to another thread; `runnable`: the one of before would go on."""
+        """Switch to another thread; `runnable`: the previous one remains runnable."""
         previous, name_of_previous, of_previous = self.current
         states = (previous, name_of_previous, runnable, of_previous)
         self.events.append(Switch(self.now, CPU, *states, pid, name, priority, uninterruptible))
         self.current = (pid, name, priority)
 
     def loop(self, *, runnable: bool = False) -> None:
-        """Give the CPU to the loop."""
+        """Switch to the loop."""
         self.switch(LOOP, "rtcf-loop", LOOP_PRIORITY, runnable=runnable)
 
     def idle(self) -> None:
-        """Have nothing to do."""
+        """Switch to the idle task."""
         self.switch(0, "swapper/1", 120, runnable=False)
 
     def wake(self) -> None:
@@ -65,17 +65,17 @@ class Timeline:
         self.events.append(Wake(self.now, CPU, LOOP))
 
     def run(self, ns: int) -> None:
-        """Go on with what is being done."""
+        """Let time pass in the present thread."""
         self.now += ns
 
     def interrupt(self, key: str, name: str, ns: int) -> None:
-        """Be interrupted."""
+        """Run an interrupt."""
         self.events.append(Enter(self.now, CPU, key, name))
         self.now += ns
         self.events.append(Leave(self.now, CPU, key))
 
     def thread(self, name: str, ns: int, pid: int = 200, priority: int = 9) -> None:
-        """Let a more urgent thread run in the place of the loop."""
+        """Run a more urgent thread in place of the loop."""
         self.switch(pid, name, priority, runnable=True)
         self.now += ns
         self.loop()
@@ -93,7 +93,7 @@ noise = st.lists(
 
 
 def begun() -> tuple[Timeline, int]:
-    """Return the beginning of a cycle on an idle CPU, and its deadline."""
+    """Return the start of a cycle on an idle CPU, and its deadline."""
     line = Timeline()
     line.idle()
     line.run(PERIOD_NS)
@@ -104,7 +104,7 @@ def begun() -> tuple[Timeline, int]:
 
 
 def disturb(line: Timeline, disturbances: list[tuple[str, str, int]]) -> None:
-    """Let short things happen in the loop's time."""
+    """Add short interruptions of the loop."""
     for place, (kind, name, ns) in enumerate(disturbances):
         if kind == "interrupt":
             line.interrupt(f"noise {place}", f"noise {name}", ns)
@@ -117,7 +117,7 @@ def disturb(line: Timeline, disturbances: list[tuple[str, str, int]]) -> None:
 
 
 def culprit(line: Timeline, kind: str, name: str, ns: int) -> tuple[Kind, str]:
-    """Let something take the loop's CPU; return what is to be found."""
+    """Take the CPU from the loop in a way of this kind; return the expected cause."""
     match kind:
         case "storm":
             while ns > 0:
@@ -162,7 +162,7 @@ def culprit(line: Timeline, kind: str, name: str, ns: int) -> tuple[Kind, str]:
             line.loop()
             return Kind.BLOCKED, "slept in a system call"
         case _:
-            line.run(ns)  # the machine stands still
+            line.run(ns)  # the machine stalls
             return Kind.UNKNOWN, "nothing else ran"
 
 
@@ -185,7 +185,7 @@ def cycles_before(line: Timeline, count: int) -> None:
     kind=st.sampled_from(KINDS), name=names, late_us=st.integers(100, 5000),
     before=st.integers(0, 3), first=noise, last=noise,
 )  # fmt: skip
-def test_what_took_the_loops_cpu_in_a_cycle_is_named(
+def test_the_cause_of_a_late_cycle_is_named(
     kind: str,
     name: str,
     late_us: int,
@@ -203,7 +203,7 @@ def test_what_took_the_loops_cpu_in_a_cycle_is_named(
     line.loop(runnable=True)
     begin = line.now
     disturb(line, first)
-    # Late by less than what the culprit takes, and by more than all else.
+    # Late by less than the cause's duration, and by more than all other interruptions.
     found = culprit(line, kind, name, PERIOD_NS + late_us * US)
     disturb(line, last)
     late = LateCycle(deadline, begin, line.now, line.now - deadline - PERIOD_NS)
@@ -215,8 +215,8 @@ def test_what_took_the_loops_cpu_in_a_cycle_is_named(
 
 
 @given(st.sampled_from(("storm", "thread")), names, st.integers(10, 900))
-def test_what_delays_the_beginning_is_named(kind: str, name: str, taken_us: int) -> None:
-    """What runs when the loop is woken, and has its way first."""
+def test_the_cause_of_a_late_start_is_named(kind: str, name: str, taken_us: int) -> None:
+    """A thread that runs when the loop is woken, and finishes first."""
     line = Timeline()
     line.idle()
     line.run(PERIOD_NS)
@@ -255,10 +255,8 @@ def test_what_delays_the_beginning_is_named(kind: str, name: str, taken_us: int)
         ),
     ],
 )
-def test_a_thread_is_named_as_it_was_when_it_gave_the_cpu_back(
-    at_first: int, at_last: int, words: str
-) -> None:
-    """It runs while the loop sleeps, and takes another name and priority."""
+def test_a_thread_is_named_as_at_its_last_switch(at_first: int, at_last: int, words: str) -> None:
+    """It runs while the loop sleeps, and changes its name and priority."""
     line, _ = begun()
     line.idle()
     line.switch(4711, "python3", at_first, runnable=False)
@@ -277,8 +275,8 @@ def test_a_thread_is_named_as_it_was_when_it_gave_the_cpu_back(
 
 
 @pytest.mark.parametrize("then", [0, 4712])
-def test_a_loop_that_is_passed_over_was_throttled_before(then: int) -> None:
-    """It woke while a thread ran that had the CPU already."""
+def test_a_loop_that_is_passed_over_was_throttled(then: int) -> None:
+    """It woke while a thread ran that already had the CPU."""
     line, _ = begun()
     line.idle()
     line.switch(4711, "builder", 120, runnable=False)
@@ -297,7 +295,7 @@ def test_a_loop_that_is_passed_over_was_throttled_before(then: int) -> None:
     assert "a limit of CPU time" in said.words
 
 
-def test_page_faults_take_as_long_as_on_this_machine() -> None:
+def test_the_duration_of_page_faults_is_measured() -> None:
     line, deadline = begun()
     begin = line.now
     for _ in range(100):
@@ -309,8 +307,8 @@ def test_page_faults_take_as_long_as_on_this_machine() -> None:
 
 
 @given(st.integers(1, 3), names)
-def test_a_timer_that_comes_late_is_unknown(threads: int, name: str) -> None:
-    """Less urgent threads run on meanwhile, and are not to blame for it."""
+def test_a_late_timer_is_an_unknown_cause(threads: int, name: str) -> None:
+    """Less urgent threads keep running, and are not the cause."""
     line = Timeline()
     line.idle()
     line.run(PERIOD_NS)
@@ -329,7 +327,7 @@ def test_a_timer_that_comes_late_is_unknown(threads: int, name: str) -> None:
     assert "the timer came late" in said.words
 
 
-def test_a_cycle_that_waits_for_the_one_before_blames_that() -> None:
+def test_a_cycle_delayed_by_the_previous_one_names_that() -> None:
     line = Timeline()
     line.idle()
     line.wake()
@@ -373,7 +371,7 @@ def test_many_threads_of_one_name_are_named_together() -> None:
     st.integers(0, 1000), st.integers(0, 1000), st.integers(0, 1000), st.integers(1, 2000),
 )  # fmt: skip
 @example([], 0, 0, 1, 1)
-def test_of_any_events_a_culprit_takes_no_longer_than_the_cycle(
+def test_no_cause_is_longer_than_its_cycle(
     events: list[Event], deadline: int, latency: int, duration: int, late_ns: int
 ) -> None:
     events = sorted(events, key=lambda each: each.time_ns)
@@ -384,7 +382,7 @@ def test_of_any_events_a_culprit_takes_no_longer_than_the_cycle(
 
 
 @given(st.integers(0, 2), st.integers(0, 2))
-def test_where_events_are_lost_nobody_is_blamed(before: int, behind: int) -> None:
+def test_no_cause_is_named_where_events_are_lost(before: int, behind: int) -> None:
     line, deadline = begun()
     for _ in range(before):
         line.thread("other", 100 * US)
@@ -426,7 +424,7 @@ HEADER = """	field: u64 timestamp;	offset:0;	size:8;	signed:0;
 
 
 def entry(delta: int, data: bytes) -> bytes:
-    """Return an entry of a page, as the kernel writes it."""
+    """Return an entry of a page in the kernel's format."""
     data += bytes(-len(data) % 4)
     if len(data) // 4 <= 28:
         return struct.pack("<I", len(data) // 4 | delta << 5) + data
@@ -462,7 +460,7 @@ def test_pages_of_the_kernel_are_read() -> None:
     assert lost == Lost(1000, 3)
 
 
-def test_a_format_of_another_kind_is_refused() -> None:
+def test_another_format_is_rejected() -> None:
     with pytest.raises(ValueError, match="has no ID"):
         Decoder({"sched_switch": "nothing"}, HEADER)
     with pytest.raises(KeyError):

@@ -1,4 +1,4 @@
-"""rtcfd from outside: its socket, its life, its runners."""
+"""rtcfd as a client sees it: its socket, its start and end, its runners."""
 
 import os
 import re
@@ -22,7 +22,7 @@ def test_serves_the_default_runner_stopped(client: rtcf.Client) -> None:
     assert is_alive(status.runners[0].pid)
 
 
-def test_the_socket_is_for_owner_and_group_a_private_one_for_its_owner(
+def test_socket_permissions_depend_on_the_kind_of_daemon(
     stopped_daemon: DaemonUnderTest,
 ) -> None:
     stopped_daemon.start()
@@ -45,14 +45,14 @@ def test_a_signal_ends_it_with_its_executors(
     assert not Path(f"{daemon.socket}.d").exists()
 
 
-def test_a_stale_socket_is_taken(stopped_daemon: DaemonUnderTest) -> None:
+def test_a_stale_socket_is_replaced(stopped_daemon: DaemonUnderTest) -> None:
     with socket.socket(socket.AF_UNIX) as stale:
         stale.bind(str(stopped_daemon.socket))
     stopped_daemon.start()
     assert stopped_daemon.executor_pid()
 
 
-def test_a_live_socket_is_refused(daemon: DaemonUnderTest, tmp_path: Path) -> None:
+def test_a_socket_in_use_is_rejected(daemon: DaemonUnderTest, tmp_path: Path) -> None:
     folder = tmp_path / "second"
     folder.mkdir()
     second = DaemonUnderTest(folder)
@@ -64,7 +64,7 @@ def test_a_live_socket_is_refused(daemon: DaemonUnderTest, tmp_path: Path) -> No
     assert daemon.executor_pid()
 
 
-def test_no_executor_binary_is_one_line(stopped_daemon: DaemonUnderTest) -> None:
+def test_a_missing_executor_is_reported_in_one_line(stopped_daemon: DaemonUnderTest) -> None:
     stopped_daemon.executor.unlink()
     stopped_daemon.start()
     assert stopped_daemon.process is not None
@@ -75,7 +75,7 @@ def test_no_executor_binary_is_one_line(stopped_daemon: DaemonUnderTest) -> None
     )
 
 
-def test_a_refused_start_leaves_nothing(stopped_daemon: DaemonUnderTest) -> None:
+def test_a_failed_start_leaves_nothing(stopped_daemon: DaemonUnderTest) -> None:
     stopped_daemon.state = Path("/proc/none")
     stopped_daemon.start()
     assert stopped_daemon.process is not None
@@ -85,7 +85,7 @@ def test_a_refused_start_leaves_nothing(stopped_daemon: DaemonUnderTest) -> None
     assert not Path(f"{stopped_daemon.socket}.d").exists()
 
 
-def test_a_refused_start_leaves_the_folder_of_the_daemon_that_serves(
+def test_a_failed_start_keeps_the_folder_of_the_running_daemon(
     daemon: DaemonUnderTest, client: rtcf.Client, tmp_path: Path
 ) -> None:
     client.remove_runner("rt_runner")
@@ -117,14 +117,14 @@ def test_two_rtcfds_share_no_state(
         f"{daemon.process.pid}): end that, or choose another --state-dir\n"
     )
     assert daemon.saved()["settings"]["frequency_hz"] == 123.0
-    # Not by a rtcfd that is no more, however it ended.
+    # Nor does an rtcfd that has ended, in whatever way, block the state.
     daemon.end(signal.SIGKILL)
     second.start()
     assert "ready;" in second.log()
     assert second.end() == 0
 
 
-def test_an_executor_that_ends_at_once_shows_in_the_status(
+def test_an_executor_that_ends_immediately_shows_in_the_status(
     stopped_daemon: DaemonUnderTest,
 ) -> None:
     stopped_daemon.executor.write_text("#!/bin/sh\nexit 7\n")
@@ -150,10 +150,10 @@ def test_an_executor_that_does_not_answer_is_stuck(
         os.kill(pid, signal.SIGCONT)
 
 
-def test_runners_come_and_go(daemon: DaemonUnderTest, client: rtcf.Client) -> None:
+def test_runners_are_added_and_removed(daemon: DaemonUnderTest, client: rtcf.Client) -> None:
     added = client.add_runner("arm", runner_pb2.RunnerSettings(frequency_hz=2000.0))
     assert added.settings.frequency_hz == 2000.0
-    assert added.settings.priority == 82  # by its frequency
+    assert added.settings.priority == 82  # derived from its frequency
     client.load(rtcf.component("demo", "Fine"), "arm")
     assert client.get_order("arm") == ["/Fine"]
     assert client.get_order() == []
@@ -178,35 +178,35 @@ def test_a_change_of_settings_keeps_the_rest(client: rtcf.Client) -> None:
         ("rt_runer", "NOT_FOUND", r'did you mean "rt_runner"\?'),
     ],
 )
-def test_unknown_runner_is_refused(client: rtcf.Client, runner: str, code: str, text: str) -> None:
+def test_an_unknown_runner_is_rejected(
+    client: rtcf.Client, runner: str, code: str, text: str
+) -> None:
     with pytest.raises(rtcf.RefusedError, match=text) as refused:
         client.start(runner)
     assert refused.value.code == code
 
 
 @pytest.mark.parametrize("name", ["1st", "a/b", "../x", "a b", "ä"])
-def test_bad_runner_name_is_refused(client: rtcf.Client, name: str) -> None:
+def test_a_bad_runner_name_is_rejected(client: rtcf.Client, name: str) -> None:
     with pytest.raises(rtcf.RefusedError, match="is not valid") as refused:
         client.add_runner(name)
     assert refused.value.code == "INVALID_ARGUMENT"
 
 
-def test_a_runner_that_is_there_is_refused(client: rtcf.Client) -> None:
+def test_an_existing_runner_is_rejected(client: rtcf.Client) -> None:
     with pytest.raises(rtcf.RefusedError, match="runner rt_runner exists already") as refused:
         client.add_runner("rt_runner")
     assert refused.value.code == "ALREADY_EXISTS"
 
 
 @pytest.mark.parametrize("frequency", [0.0, -1.0, 50001.0, float("nan"), float("inf")])
-def test_bad_frequency_is_refused_and_nothing_changed(
-    client: rtcf.Client, frequency: float
-) -> None:
+def test_a_bad_frequency_is_rejected_without_changes(client: rtcf.Client, frequency: float) -> None:
     with pytest.raises(rtcf.RefusedError, match=r"0\.1 to 50000 Hz"):
         client.set_runner(runner_pb2.RunnerSettings(frequency_hz=frequency))
     assert client.get_status().runners[0].settings.frequency_hz == 1000.0
 
 
-def test_a_refusal_of_the_executor_changes_no_settings(client: rtcf.Client) -> None:
+def test_an_error_of_the_executor_changes_no_settings(client: rtcf.Client) -> None:
     bad = runner_pb2.RunnerSettings(frequency_hz=10.0, ros=runner_pb2.RosSettings(whitelist="("))
     with pytest.raises(rtcf.RefusedError, match="unmatched"):
         client.set_runner(bad)
@@ -241,7 +241,7 @@ def test_log_records_arrive_with_their_source(daemon: DaemonUnderTest, client: r
     assert "WARNING rt_runner /Logs: from the loop (logs.cpp:12, #7)" in line
 
 
-def test_too_many_log_records_are_counted_and_the_count_is_told(
+def test_dropped_log_records_are_counted_and_reported(
     stopped_daemon: DaemonUnderTest,
 ) -> None:
     stopped_daemon.settings.write_text("[limits]\nlog_records_per_s = 1\n")

@@ -1,4 +1,4 @@
-"""Priorities that nobody chose: by the frequency, so that the faster of two loops runs first."""
+"""Default priorities: derived from the frequency, so that the faster of two loops runs first."""
 
 import asyncio
 import itertools
@@ -26,18 +26,18 @@ def priority(**chosen: Any) -> int:
     ("frequency_hz", "expected"),
     [(1000, 80), (2000, 82), (500, 78), (1400, 81), (0.1, 53), (50000, 91)],
 )
-def test_it_goes_by_the_frequency(frequency_hz: float, expected: int) -> None:
+def test_the_default_follows_the_frequency(frequency_hz: float, expected: int) -> None:
     assert priority(frequency_hz=frequency_hz) == expected
 
 
-def test_a_faster_loop_never_has_a_lower_one() -> None:
+def test_a_faster_loop_never_has_a_lower_priority() -> None:
     found = [priority(frequency_hz=0.1 * 1.2**step) for step in range(72)]
     assert all(slower <= faster for slower, faster in itertools.pairwise(found))
-    assert all(found[step] < found[step + 4] for step in range(68)), "one that is twice as fast"
+    assert all(found[step] < found[step + 4] for step in range(68)), "a frequency twice as high"
     assert LOW <= found[0] <= found[-1] <= HIGH
 
 
-def test_what_people_gave_wins() -> None:
+def test_a_given_priority_wins() -> None:
     assert priority(frequency_hz=50.0, priority=80) == 80
     file = runner_settings.merged(DEFAULTS, runner_pb2.RunnerSettings(priority=33))
     desired = Desired("arm")
@@ -45,13 +45,13 @@ def test_what_people_gave_wins() -> None:
     assert desired.complete(file).priority == 33
 
 
-def test_a_change_of_the_frequency_brings_its_priority_and_no_other_change_does() -> None:
+def test_only_a_change_of_the_frequency_changes_the_priority() -> None:
     desired = Desired("arm")
     faster = runner_pb2.RunnerSettings(frequency_hz=4000.0)
     assert desired.effect(faster, DEFAULTS) == runner_pb2.RunnerSettings(
         frequency_hz=4000.0, priority=84
     )
-    assert faster == runner_pb2.RunnerSettings(frequency_hz=4000.0), "what is saved"
+    assert faster == runner_pb2.RunnerSettings(frequency_hz=4000.0), "the saved settings"
     spin = runner_pb2.RunnerSettings(spin_us=3)
     assert desired.effect(spin, DEFAULTS) == spin
     desired.choose(runner_pb2.RunnerSettings(priority=20))
@@ -90,12 +90,12 @@ def test_loops_that_share_a_cpu_are_named() -> None:
         "CPU 3 has several loops, leg (priority 82), arm (priority 80): "
         "each loop runs before the loops after it"
     )
-    # Of one that is looked at alone the others are known too.
+    # The others are known even if only one is queried.
     assert shared_cpus([statuses[0]]) == [two]
 
 
 class Told:
-    """A runner that tells what it was told, or is stuck."""
+    """A runner with a given status, or one that is stuck."""
 
     def __init__(self, name: str, found: runner_pb2.RunnerStatus | None) -> None:
         self.name = name
@@ -108,7 +108,7 @@ class Told:
         return self._found
 
 
-def test_a_runner_that_is_stuck_holds_up_no_other_status() -> None:
+def test_a_stuck_runner_delays_no_other_status() -> None:
     arm, leg = Told("arm", status("arm", 3, 80)), Told("leg", status("leg", 3, 82))
     stuck = Told("stuck", None)
 

@@ -1,4 +1,4 @@
-"""The describer of libraries: one process for all who ask, and no answer that stays wrong."""
+"""The describer of libraries: one process for all callers, and no stale answers."""
 
 import asyncio
 import contextlib
@@ -23,7 +23,7 @@ def library(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def describer(tmp_path: Path) -> Describer:
-    """One whose process notes that it ran, and succeeds where what it needs is there."""
+    """A describer whose process notes its run, and succeeds if its dependency exists."""
     binary = tmp_path / "executor"
     binary.write_text(
         f"#!/bin/sh\necho >> {tmp_path}/runs\n"
@@ -34,11 +34,11 @@ def describer(tmp_path: Path) -> Describer:
 
 
 def runs(folder: Path) -> int:
-    """Return how many processes there were that describe."""
+    """Return the number of description processes so far."""
     return len((folder / "runs").read_text())
 
 
-def test_who_asks_at_once_waits_for_one_process(
+def test_simultaneous_callers_share_one_process(
     describer: Describer, library: Path, tmp_path: Path
 ) -> None:
     (tmp_path / "needed").touch()
@@ -51,7 +51,7 @@ def test_who_asks_at_once_waits_for_one_process(
     assert runs(tmp_path) == 1
 
 
-def test_what_did_not_load_is_looked_at_again_though_its_file_is_the_same(
+def test_a_failed_library_is_loaded_again_even_if_unchanged(
     describer: Describer, library: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(describe, "FAILURE_KEPT_S", 3600.0)
@@ -60,9 +60,9 @@ def test_what_did_not_load_is_looked_at_again_though_its_file_is_the_same(
         for _ in range(3):
             found = await describer.describe(library, "pkg")
             assert "libneeded.so: cannot open" in found.problem
-        assert runs(tmp_path) == 1  # who asks all the time starts no process each time
+        assert runs(tmp_path) == 1  # repeated calls start no further process
         monkeypatch.setattr(describe, "FAILURE_KEPT_S", 0.0)
-        (tmp_path / "needed").touch()  # as another package is installed
+        (tmp_path / "needed").touch()  # like the installation of another package
         assert not (await describer.describe(library, "pkg")).problem
 
     asyncio.run(work())
@@ -74,7 +74,7 @@ def test_what_did_not_load_is_looked_at_again_though_its_file_is_the_same(
         ("kill -SEGV $$", "was killed by SIGSEGV", True),
         ("kill -ABRT $$", "was killed by SIGABRT", True),
         ("exec yes 'a constructor that complains'", "wrote without end", True),
-        # As where memory is short.
+        # As when memory is short.
         ("kill -KILL $$", "was killed by SIGKILL", False),
         ("kill -BUS $$", "was killed by SIGBUS", False),
         ("echo libneeded.so: cannot open >&2; exit 1", "libneeded.so: cannot open", False),
@@ -82,14 +82,14 @@ def test_what_did_not_load_is_looked_at_again_though_its_file_is_the_same(
         ("exec sleep 3600", "did not end within", False),
     ],
 )
-def test_what_a_library_did_is_kept_and_what_may_have_another_cause_is_not(
+def test_only_failures_caused_by_the_library_are_cached(
     library: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, does: str, said: str, kept: bool
 ) -> None:
     binary = tmp_path / "executor"
     binary.write_text(f"#!/bin/sh\necho >> {tmp_path}/runs\n{does}\n")
     binary.chmod(0o755)
     monkeypatch.setattr(describe, "FAILURE_KEPT_S", 0.0)
-    # However slow this machine is, only the one that sleeps takes so long.
+    # Only the sleeping one exceeds the timeout, even on a slow machine.
     monkeypatch.setattr(describe, "TIMEOUT_S", 3.0 if "sleep" in does else 600.0)
     describer = Describer(binary)
 
@@ -101,7 +101,7 @@ def test_what_a_library_did_is_kept_and_what_may_have_another_cause_is_not(
     assert runs(tmp_path) == (1 if kept else 2)
 
 
-def test_what_is_kept_of_a_failure_ends_with_its_file_with_its_rights_and_with_a_reload(
+def test_a_cached_failure_ends_with_a_new_file_new_rights_or_a_reload(
     stopped_daemon: DaemonUnderTest,
 ) -> None:
     daemon = stopped_daemon
@@ -121,16 +121,16 @@ def test_what_is_kept_of_a_failure_ends_with_its_file_with_its_rights_and_with_a
         assert [look(client), look(client)] == [1, 1]
         daemon.package("odd", crash="SIGSEGV", rebuilt=True)
         assert [look(client), look(client)] == [2, 2]
-        # Who may write it may have put other code there, or made it trusted.
+        # Its owner may have replaced the code, or made it trusted.
         library.chmod(0o600)
         assert [look(client), look(client)] == [3, 3]
         client.reload()
         assert [look(client), look(client)] == [4, 4]
-        # A library that loads is not loaded again for it.
+        # A library that loads is not loaded again.
         assert not client.list_types("demo").problems
 
 
-def test_of_a_file_that_is_rebuilt_again_and_again_the_last_is_kept(
+def test_the_last_of_many_rebuilds_is_cached(
     describer: Describer, library: Path, tmp_path: Path
 ) -> None:
     (tmp_path / "needed").touch()
@@ -147,13 +147,13 @@ def test_of_a_file_that_is_rebuilt_again_and_again_the_last_is_kept(
 
 
 @pytest.mark.parametrize("pipe", ["1", "2"], ids=["output", "errors"])
-def test_a_library_that_writes_without_end_is_ended(
+def test_a_library_with_endless_output_is_killed(
     library: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, pipe: str
 ) -> None:
     binary = tmp_path / "executor"
     binary.write_text(f"#!/bin/sh\nexec yes 'a constructor that complains' >&{pipe}\n")
     binary.chmod(0o755)
-    monkeypatch.setattr(describe, "TIMEOUT_S", 600.0)  # not why it ends
+    monkeypatch.setattr(describe, "TIMEOUT_S", 600.0)  # not the reason for its end
 
     async def work() -> str:
         return str((await Describer(binary).describe(library, "pkg")).problem)
@@ -161,7 +161,9 @@ def test_a_library_that_writes_without_end_is_ended(
     assert asyncio.run(work()) == "the process that loaded it wrote without end"
 
 
-def test_where_memory_runs_out_what_describes_goes_first(library: Path, tmp_path: Path) -> None:
+def test_the_describing_process_is_the_first_to_be_killed_without_memory(
+    library: Path, tmp_path: Path
+) -> None:
     binary = tmp_path / "executor"
     binary.write_text(
         '#!/bin/sh\nuntil [ "$(cat /proc/$$/oom_score_adj)" = 500 ]; do sleep 0.05; done\n'
@@ -171,14 +173,14 @@ def test_where_memory_runs_out_what_describes_goes_first(library: Path, tmp_path
     assert "as is due" in asyncio.run(Describer(binary).describe(library, "pkg")).problem
 
 
-def test_what_a_library_has_started_ends_with_its_process(library: Path, tmp_path: Path) -> None:
+def test_child_processes_of_a_library_end_with_its_process(library: Path, tmp_path: Path) -> None:
     binary = tmp_path / "executor"
     child = tmp_path / "child"
     binary.write_text(f"#!/bin/sh\nsleep 1000 >/dev/null 2>&1 &\necho $! > {child}\n")
     binary.chmod(0o755)
     asyncio.run(Describer(binary).describe(library, "pkg"))
     status = Path(f"/proc/{int(child.read_text())}/stat")
-    with contextlib.suppress(FileNotFoundError):  # or its parent has not yet waited for it
+    with contextlib.suppress(FileNotFoundError):  # or a zombie
         wait_for(lambda: status.read_text().rpartition(")")[2].split()[0] == "Z", "its end")
 
 
@@ -190,7 +192,7 @@ def test_what_a_library_has_started_ends_with_its_process(library: Path, tmp_pat
         (odd_files.device, "cannot read it: it is a device, not a regular file"),
     ],
 )
-def test_what_is_no_file_is_not_opened(
+def test_only_regular_files_are_opened(
     describer: Describer, tmp_path: Path, odd: Callable[[Path], None], said: str
 ) -> None:
     (tmp_path / "needed").touch()

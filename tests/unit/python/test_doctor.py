@@ -1,4 +1,4 @@
-"""`rtcfctl doctor`: each finding follows the machine, here of files made for it; and for real."""
+"""`rtcfctl doctor`: each finding depends on files created for the test; and on the real machine."""
 
 import json
 import os
@@ -18,8 +18,8 @@ from strangers import open_to_strangers, root_only, stranger
 PID = 42
 CPU = "/sys/devices/system/cpu"
 
-# A machine on which nothing stands in the way, and what changes one finding of it:
-# topic, file, its content, the grade then, and a part of what is said to mend it.
+# A machine without findings, and changes that cause one finding each: topic, file, its content,
+# the resulting grade, and a part of the advice.
 FIT = {
     "/sys/kernel/realtime": "1",
     "/proc/version": "Linux version 6.1.0 SMP PREEMPT_RT",
@@ -85,7 +85,7 @@ def findings(root: Path, changes: dict[str, str], loop: Loop = LOOP) -> dict[str
     return {finding.topic: finding for finding in diagnose(Host(root), loop)}
 
 
-def test_a_fit_machine_has_nothing_to_mend(tmp_path: Path) -> None:
+def test_a_good_machine_has_no_findings(tmp_path: Path) -> None:
     found = findings(tmp_path, {})
     assert {topic: each.found for topic, each in found.items() if each.grade != Grade.GOOD} == {}
 
@@ -101,14 +101,14 @@ def test_each_finding_follows_the_machine(
     assert {other for other, each in found.items() if each.grade > Grade.UNKNOWN} == {topic}
 
 
-def test_swap_matters_to_a_loop_that_is_not_locked(tmp_path: Path) -> None:
+def test_swap_is_a_finding_for_an_unlocked_loop(tmp_path: Path) -> None:
     swaps = {"/proc/swaps": "Filename Type\n/dev/sda2 partition"}
     assert findings(tmp_path, swaps)["swap"].grade == Grade.GOOD
     loose = Loop(3, 80, PID, lock_memory=False)
     assert findings(tmp_path, swaps, loose)["swap"].grade == Grade.BAD
 
 
-def test_a_competitor_on_another_cpu_is_none(tmp_path: Path) -> None:
+def test_a_competitor_on_another_cpu_is_no_finding(tmp_path: Path) -> None:
     changes = {"/proc/7/task/7/stat": STAT, "/proc/7/task/7/status": "Cpus_allowed_list:\t0-2"}
     assert findings(tmp_path, changes)["real-time competitors"].grade == Grade.GOOD
 
@@ -123,24 +123,24 @@ def test_a_group_without_real_time_run_time_is_found(tmp_path: Path) -> None:
     assert (found.grade, "/box has no real-time run time" in found.found) == (Grade.BAD, True)
 
 
-def test_what_cannot_be_read_is_said_to_be_unknown_or_absent(tmp_path: Path) -> None:
+def test_unreadable_files_are_reported_as_unknown_or_absent(tmp_path: Path) -> None:
     for finding in diagnose(Host(tmp_path), Loop(0, 80)):
         assert finding.found
 
 
-def test_lists_of_cpus_are_understood() -> None:
+def test_lists_of_cpus_are_parsed() -> None:
     assert cpus("0-2,5\n") == {0, 1, 2, 5}
     assert cpus("") == cpus("(null)") == set()
 
 
-def test_it_measures_and_judges_for_real_and_leaves_nothing_behind(
+def test_a_real_measurement_gives_a_verdict_and_leaves_nothing(
     daemon: DaemonUnderTest,
 ) -> None:
     done = daemon.ctl("-o", "json", "doctor", "--seconds", "0.2")
     document = json.loads(done.stdout)
     grades = {each["topic"]: each["grade"] for each in document["findings"]}
     assert {"kernel preemption", "wake-up latency", "runner rt_runner"} <= set(grades)
-    # The verdict is the exit code, too.
+    # The verdict is also the exit code.
     assert done.returncode == {"good": 0, "warning": 4, "bad": 5}[document["verdict"]["grade"]]
     with daemon.client() as client:
         assert [each.runner for each in client.get_status().runners] == ["rt_runner"]
@@ -154,7 +154,7 @@ def test_it_measures_and_judges_for_real_and_leaves_nothing_behind(
         ([Grade.BAD, Grade.WARNING], 5),
     ],
 )
-def test_the_worst_that_was_found_is_the_exit_code(grades: list[Grade], code: int) -> None:
+def test_the_worst_grade_is_the_exit_code(grades: list[Grade], code: int) -> None:
     found = [Finding(f"topic {at}", grade, "so", "otherwise") for at, grade in enumerate(grades)]
     assert [doctor.report(found, None, Output(kind)) for kind in ("table", "json")] == [code, code]
 
@@ -166,7 +166,7 @@ def test_the_worst_that_was_found_is_the_exit_code(grades: list[Grade], code: in
         ("0-2", "", "", 2),
         ("0-3", "1-2", "", 2),
         ("0-1", "2-3", "", 1),
-        # Of those with the fewest loops.
+        # Among the CPUs with the fewest loops.
         ("0-3", "", "3", 2),
         ("0-3", "1-2", "2", 1),
         ("0-3", "1-2", "1 2 13", 3),
@@ -175,7 +175,7 @@ def test_the_worst_that_was_found_is_the_exit_code(grades: list[Grade], code: in
         ("0", "", "0 0 0", 0),
     ],
 )
-def test_a_loop_that_may_choose_gets_the_cpu_that_executors_take(
+def test_a_loop_without_cpu_uses_the_executors_choice(
     tmp_path: Path, allowed: str, isolated: str, loops: str, cpu: int
 ) -> None:
     changes = {
@@ -187,7 +187,7 @@ def test_a_loop_that_may_choose_gets_the_cpu_that_executors_take(
     assert cpu_of_next_loop(Host(tmp_path), PID, taken) == cpu
 
 
-def test_it_measures_where_the_loop_would_run_and_at_its_priority(
+def test_it_measures_on_the_loops_cpu_at_its_priority(
     daemon: DaemonUnderTest,
 ) -> None:
     cpu = min(os.sched_getaffinity(0))
@@ -209,7 +209,7 @@ def test_it_measures_where_the_loop_would_run_and_at_its_priority(
         wait_for(lambda: measured() is None, "the end of its loop")
 
 
-def test_without_rtcfd_it_looks_all_the_same(tmp_path: Path, daemon: DaemonUnderTest) -> None:
+def test_it_works_without_rtcfd(tmp_path: Path, daemon: DaemonUnderTest) -> None:
     done = daemon.ctl("--socket", str(tmp_path / "none"), "doctor")
     assert done.returncode == 5
     assert "bad      rtcfd: rtcfd is not running" in done.stdout
@@ -219,7 +219,7 @@ def test_without_rtcfd_it_looks_all_the_same(tmp_path: Path, daemon: DaemonUnder
 
 @root_only
 @pytest.mark.parametrize("connects", [True, False])
-def test_without_rights_it_says_what_is_missing(connects: bool) -> None:
+def test_without_rights_it_names_the_missing_ones(connects: bool) -> None:
     program = (
         "import sys\n"
         "from rtcfctl.main import main\n"
@@ -237,7 +237,7 @@ def test_without_rights_it_says_what_is_missing(connects: bool) -> None:
 
 def test_a_state_that_cannot_be_saved_is_named(daemon: DaemonUnderTest) -> None:
     assert daemon.process is not None
-    # No file can grow: what a full disk does to whoever writes.
+    # No file can grow, as on a full disk.
     resource.prlimit(daemon.process.pid, resource.RLIMIT_FSIZE, (0, resource.RLIM_INFINITY))
     with daemon.client() as client:
         client.load(rtcf.component("demo", "Fine"))
@@ -245,20 +245,20 @@ def test_a_state_that_cannot_be_saved_is_named(daemon: DaemonUnderTest) -> None:
         assert "not saved: File too large" in " ".join(daemon.ctl(*verb).stdout.split())
 
 
-def test_a_runner_that_is_not_there_is_no_finding(daemon: DaemonUnderTest) -> None:
+def test_a_missing_runner_is_an_error_not_a_finding(daemon: DaemonUnderTest) -> None:
     done = daemon.ctl("-r", "none", "doctor", "--seconds", "0")
     assert (done.returncode, done.stdout) == (1, "")
     assert 'no runner "none"' in done.stderr
 
 
-def test_no_loop_is_put_beside_one_that_runs(daemon: DaemonUnderTest) -> None:
+def test_no_test_loop_is_started_next_to_a_running_loop(daemon: DaemonUnderTest) -> None:
     with daemon.client() as client:
         client.add_runner("arm", runner_pb2.RunnerSettings(cpu=0))
         client.set_runner(runner_pb2.RunnerSettings(cpu=0))
         client.start("arm")
         said = daemon.ctl("doctor", "--seconds", "0.2").stdout
         assert "not measured: the loop of arm runs on CPU 0" in said
-        # What runs tells more than an empty loop would.
+        # A running loop is better evidence than an empty one.
         said = daemon.ctl("-r", "arm", "doctor", "--seconds", "60").stdout
         assert "worst, of the running loop, 10 cycles" in said
 

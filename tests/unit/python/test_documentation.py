@@ -1,4 +1,4 @@
-"""What README, docs and manual pages name is there: pages, packages, commands and their options."""
+"""Pages, packages, commands and options named in README, docs and manual pages exist."""
 
 import argparse
 import re
@@ -17,7 +17,7 @@ OURS = set(re.findall(r"^Package: (\S+)", CONTROL, re.MULTILINE))
 
 
 @pytest.mark.parametrize("page", PAGES, ids=NAMES)
-def test_links_lead_to_pages_that_are_installed_under_these_names(page: Path) -> None:
+def test_links_lead_to_existing_pages(page: Path) -> None:
     for link in re.findall(r"\]\(([^)#]+)\)", page.read_text()):
         if not link.startswith("http"):
             assert (page.parent / link).exists(), link
@@ -25,8 +25,8 @@ def test_links_lead_to_pages_that_are_installed_under_these_names(page: Path) ->
         assert (TREE / name).exists(), name
 
 
-def test_links_of_what_is_installed_lead_to_what_is_installed() -> None:
-    installed: dict[Path, Path] = {}  # by place there, the file here
+def test_links_of_installed_pages_lead_to_installed_files() -> None:
+    installed: dict[Path, Path] = {}  # installed path -> source file
     for line in (TREE / "debian" / "rtcf-doc.install").read_text().splitlines():
         pattern, folder = line.split()
         installed |= {Path("/", folder, file.name): file for file in TREE.glob(pattern)}
@@ -49,8 +49,8 @@ def options_of(found: argparse.ArgumentParser) -> Iterator[str]:
             yield from (each for each in action.option_strings if each.startswith("--"))
 
 
-def test_each_option_of_rtcfctl_stands_in_its_manual_page() -> None:
-    # The scope's are told where its service is.
+def test_each_option_of_rtcfctl_is_in_its_manual_page() -> None:
+    # The scope's options are in the page of its service.
     pages = [(TREE / "docs" / "man" / name).read_text() for name in ("rtcfctl.1", "rtcf-scope.8")]
     named = set(re.findall(r"--[a-z-]*[a-z]", "".join(pages).replace("\\-", "-")))
     assert sorted({*options_of(parser())} - named - {"--help"}) == []
@@ -59,7 +59,7 @@ def test_each_option_of_rtcfctl_stands_in_its_manual_page() -> None:
 @pytest.mark.parametrize(
     "setting", ["on_boot", "on_crash", "realtime", "overrun", "sim_time", "ros_peers"]
 )
-def test_the_words_of_an_option_stand_in_the_manual_page(setting: str) -> None:
+def test_the_values_of_an_option_are_in_the_manual_page(setting: str) -> None:
     (runner,) = (a for a in parser()._actions if isinstance(a, argparse._SubParsersAction))
     (noun,) = (
         a for a in runner.choices["runner"]._actions if isinstance(a, argparse._SubParsersAction)
@@ -81,7 +81,7 @@ def test_the_index_is_linked_from_the_readme() -> None:
     assert "](docs/index.md)" in (TREE / "README.md").read_text()
 
 
-def test_manual_pages_name_files_of_the_documentation_as_they_are_installed() -> None:
+def test_manual_pages_use_installed_paths_of_the_docs() -> None:
     installed = (TREE / "debian" / "rtcf-doc.install").read_text()
     assert "README.md usr/share/doc/rtcf\n" in installed
     assert "docs/*.md usr/share/doc/rtcf/docs\n" in installed
@@ -100,7 +100,7 @@ def test_commands_in_pages_are_commands_of_rtcfctl(page: Path) -> None:
             words = words[1:]
         if words[:1] != ["rtcfctl"]:
             continue
-        # In a text, what a reader fills in stands in capitals or as "…".
+        # Placeholders in texts are capitals or "…".
         given = ["1" if re.fullmatch(r"N|S|…", word) else word for word in words[1:]]
         cut = next((at for at, word in enumerate(given) if word in ("|", "&&", ";", ">")), None)
         try:
@@ -119,7 +119,7 @@ def test_our_packages_in_pages_exist(page: Path) -> None:
 
 
 @pytest.mark.parametrize(("page", "begin"), [(p, b) for p in ELSEWHERE for b in ELSEWHERE[p]])
-def test_what_is_typed_elsewhere_is_in_its_page(page: str, begin: str) -> None:
+def test_commands_tested_elsewhere_are_in_their_page(page: str, begin: str) -> None:
     (file,) = (each for each in PAGES if each.name == page)
     assert any(line.startswith(begin) for line in shell_lines(file.read_text()))
     for test in re.findall(r"tests/\S+\.py", ELSEWHERE[page][begin]):

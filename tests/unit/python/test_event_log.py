@@ -1,4 +1,4 @@
-"""The log of events: nothing is lost without a count, whoever reads it how."""
+"""The event log: nothing is lost without a count, for any reader."""
 
 import asyncio
 
@@ -21,7 +21,7 @@ KIND = control_pb2.Event.KIND_GRAPH
              max_size=20),
     st.integers(1, 7),
 )  # fmt: skip
-def test_events_read_and_lost_make_up_all(
+def test_events_read_and_dropped_add_up(
     kept: int, steps: list[tuple[str, int]], batch: int
 ) -> None:
     log = EventLog(kept)
@@ -44,7 +44,7 @@ def test_events_read_and_lost_make_up_all(
     assert counted == log.last == number
 
 
-def test_a_slow_watcher_is_told_how_many_it_missed_and_holds_up_nobody() -> None:
+def test_a_slow_watcher_gets_the_dropped_count_and_blocks_nobody() -> None:
     async def run() -> list[control_pb2.WatchEventsResponse]:
         log = EventLog(kept=3)
         watching = watch(log, control_pb2.WatchEventsRequest(), lambda: None)
@@ -65,7 +65,7 @@ def test_a_slow_watcher_is_told_how_many_it_missed_and_holds_up_nobody() -> None
     assert first.log_id == third.log_id != ""
 
 
-def test_a_place_in_another_log_begins_with_all_that_is_kept() -> None:
+def test_a_position_in_another_log_starts_with_all_stored_events() -> None:
     async def run(request: control_pb2.WatchEventsRequest) -> list[int]:
         log = EventLog()
         request.log_id = log.log_id if request.log_id == "this" else "another"
@@ -84,7 +84,7 @@ def test_a_place_in_another_log_begins_with_all_that_is_kept() -> None:
     assert asyncio.run(run(request(after=0, runners=["arm"], until_now=True))) == [2, 4]
 
 
-def test_a_watch_of_runners_that_are_gone_ends_after_all_that_is_kept_of_them() -> None:
+def test_a_watch_of_removed_runners_ends_after_their_stored_events() -> None:
     async def run() -> list[int]:
         log = EventLog()
         for _ in range(1000):

@@ -1,4 +1,4 @@
-"""What rtcfd takes an executor's word for: who it is, and who has changed what."""
+"""Trust in executors: verification of their identity, and attribution of their changes."""
 
 import asyncio
 import os
@@ -19,13 +19,13 @@ from rtcfd.runners import ros_services
 from rtcfd_in_process import Rtcfd, called_by, spec, until
 
 
-def test_a_stranger_at_an_executors_socket_is_not_taken_for_it(
+def test_a_foreign_process_at_an_executors_socket_is_rejected(
     stopped_daemon: DaemonUnderTest,
 ) -> None:
     real = stopped_daemon.executor.with_name("real")
     stopped_daemon.executor.rename(real)
     pid_file = stopped_daemon.folder / "pid"
-    # Another process, of a session of its own, serves; what was started does not.
+    # Another process, in another session, serves the socket; the started one does not.
     stopped_daemon.executor.write_text(
         f'#!/bin/sh\n[ "$1" = --describe ] && exec {real} "$@"\n'
         f'setsid sh -c \'echo $$ > {pid_file}; exec {real} "$@"\' sh "$@" &\n'
@@ -33,7 +33,7 @@ def test_a_stranger_at_an_executors_socket_is_not_taken_for_it(
     )
     stopped_daemon.executor.chmod(0o755)
     daemon = stopped_daemon.start()
-    wait_for(pid_file.exists, "the stranger")
+    wait_for(pid_file.exists, "the other user's process")
     try:
         refused = pytest.raises(rtcf.RefusedError, match="which is not the executor of rt_runner")
         with daemon.client() as client, refused:
@@ -42,7 +42,7 @@ def test_a_stranger_at_an_executors_socket_is_not_taken_for_it(
         os.kill(int(pid_file.read_text()), signal.SIGKILL)
 
 
-def test_an_executor_of_another_runner_is_not_taken_for_ours(
+def test_an_executor_of_another_runner_is_rejected(
     stopped_daemon: DaemonUnderTest,
 ) -> None:
     real = stopped_daemon.executor.with_name("real")
@@ -58,7 +58,7 @@ def test_an_executor_of_another_runner_is_not_taken_for_ours(
         client.start()
 
 
-def test_who_has_set_a_parameter_to_what_is_in_the_log(daemon: DaemonUnderTest) -> None:
+def test_the_log_names_the_user_of_a_parameter_change(daemon: DaemonUnderTest) -> None:
     with daemon.client() as client:
         client.load(rtcf.component("demo", "Fine", name="x"))
         client.set_parameters("x", [rtcf.parse_parameter("kp:=2.5")])
@@ -66,7 +66,7 @@ def test_who_has_set_a_parameter_to_what_is_in_the_log(daemon: DaemonUnderTest) 
 
 
 async def started_by_alice(rtcfd: Rtcfd) -> Peer:
-    """Return an executor that a call of alice has started, and that ROS peers may do all with."""
+    """Return an executor started by a call of alice; ROS peers have all rights over it."""
     rtcfd.runners._shared.serve_ros = ros_services.serve
     await rtcfd.start()
     restart = control_pb2.RestartRunnerRequest(runner="rt_runner")
@@ -90,7 +90,7 @@ async def ros_calls(peer: Peer, call: wire.ServiceCall) -> wire.ServiceAnswer:
     return await answered
 
 
-def test_a_fault_is_not_in_the_name_of_who_started_the_executor(
+def test_a_fault_is_not_attributed_to_the_user_who_started_the_executor(
     rtcfd: Callable[[], Rtcfd],
 ) -> None:
     async def play() -> None:
@@ -111,7 +111,7 @@ def test_a_fault_is_not_in_the_name_of_who_started_the_executor(
     asyncio.run(play())
 
 
-def test_ros_starts_a_loop_after_a_stop_that_was_later_than_the_start_of_its_executor(
+def test_ros_can_start_a_loop_after_a_stop(
     rtcfd: Callable[[], Rtcfd],
 ) -> None:
     async def play() -> None:
@@ -126,7 +126,7 @@ def test_ros_starts_a_loop_after_a_stop_that_was_later_than_the_start_of_its_exe
     asyncio.run(play())
 
 
-def test_what_ros_loads_is_not_in_the_name_of_who_started_the_executor(
+def test_a_load_by_ros_is_not_attributed_to_the_user_who_started_the_executor(
     rtcfd: Callable[[], Rtcfd],
 ) -> None:
     async def play() -> None:
@@ -143,7 +143,7 @@ def test_what_ros_loads_is_not_in_the_name_of_who_started_the_executor(
     asyncio.run(play())
 
 
-def test_parameters_that_ros_changes_one_after_the_other_are_noted_in_one_turn(
+def test_parameter_changes_by_ros_are_recorded_together(
     rtcfd: Callable[[], Rtcfd], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     held = tmp_path / "held"
@@ -165,7 +165,7 @@ def test_parameters_that_ros_changes_one_after_the_other_are_noted_in_one_turn(
             save(name, *state)
 
         monkeypatch.setattr(daemon.store, "save", counted)
-        # While a change is under way, ROS makes many.
+        # Many changes through ROS arrive while another change runs.
         (held / "set_parameters").touch()
         parameters = [rtcf.parse_parameter("kp:=2.0")]
         change = control_pb2.SetParametersRequest(
@@ -192,11 +192,11 @@ def test_parameters_that_ros_changes_one_after_the_other_are_noted_in_one_turn(
         for name in names:
             (noted,) = history.of(name)
             assert (noted.parameter, noted.how) == ("kp", "dynamic_reconfigure")
-        # In its turn after all of them.
+        # Queued behind all of them.
         await called_by("alice", daemon.call("SetParameters", change))
         count = len(saved)
         await daemon.runners.close(in_order=True)
         return count
 
-    # For the changes before and after, for the loop's end; and once for all of ROS.
+    # Saves for the changes before and after and for the loop's end; one for all ROS changes.
     assert asyncio.run(play()) <= 4

@@ -1,4 +1,4 @@
-"""Deaths of executors: what is said, what is taken out, what goes on."""
+"""Deaths of executors: reports, components taken out, recovery."""
 
 import os
 import signal
@@ -15,7 +15,7 @@ from rtcfd.recovery.verdict import judge
 
 
 def die(client: rtcf.Client, name: str, how: str) -> None:
-    """Let the executor die in a component's update."""
+    """Make the executor die in a component's update."""
     with pytest.raises(rtcf.RefusedError):
         client.set_parameters(name, [rtcf.parse_parameter(f"die:={how}")])
 
@@ -98,7 +98,7 @@ def test_a_quarantined_component_can_be_replaced(
         ("exit", "ended with exit status 3 while /bad.update in cycle"),
     ],
 )
-def test_what_else_a_component_does_to_its_process(
+def test_other_causes_of_death_by_a_component(
     daemon: DaemonUnderTest, running: rtcf.Client, how: str, text: str
 ) -> None:
     die(running, "/bad", how)
@@ -107,7 +107,7 @@ def test_what_else_a_component_does_to_its_process(
     assert running.get_order() == ["/extra", "/good"]
 
 
-def test_a_kill_from_outside_takes_nothing_out(
+def test_a_kill_from_outside_takes_no_component_out(
     daemon: DaemonUnderTest, running: rtcf.Client
 ) -> None:
     die(running, "/bad", "SIGKILL")
@@ -117,7 +117,7 @@ def test_a_kill_from_outside_takes_nothing_out(
     assert "with all its components" in state(running).status
 
 
-def test_an_executor_that_was_asked_to_end_is_brought_back_by_start(
+def test_start_restarts_an_executor_that_was_asked_to_end(
     daemon: DaemonUnderTest, running: rtcf.Client
 ) -> None:
     os.kill(daemon.executor_pid(), signal.SIGTERM)
@@ -131,7 +131,7 @@ def test_an_executor_that_was_asked_to_end_is_brought_back_by_start(
     assert state(running).status == ""
 
 
-def test_a_loop_goes_on_without_an_optional_culprit(
+def test_a_loop_continues_without_an_optional_culprit(
     daemon: DaemonUnderTest, running: rtcf.Client
 ) -> None:
     running.set_runner(runner_pb2.RunnerSettings(on_crash=runner_pb2.ON_CRASH_RESUME))
@@ -144,7 +144,7 @@ def test_a_loop_goes_on_without_an_optional_culprit(
     assert daemon.saved()["running"] is True
 
 
-def test_a_loop_is_held_without_a_culprit_that_is_not_optional(
+def test_a_loop_is_held_without_a_required_culprit(
     daemon: DaemonUnderTest, running: rtcf.Client
 ) -> None:
     running.set_runner(runner_pb2.RunnerSettings(on_crash=runner_pb2.ON_CRASH_RESUME))
@@ -153,7 +153,7 @@ def test_a_loop_is_held_without_a_culprit_that_is_not_optional(
     assert state(running).state == runner_pb2.RUNNER_STATE_FAULTED
 
 
-def test_a_loop_is_held_without_what_is_not_optional_and_does_not_come_back(
+def test_a_loop_is_held_if_a_required_component_cannot_be_restored(
     daemon: DaemonUnderTest, running: rtcf.Client
 ) -> None:
     daemon.package("gone", types={"Gone": "fine"})
@@ -168,7 +168,7 @@ def test_a_loop_is_held_without_what_is_not_optional_and_does_not_come_back(
     assert daemon.saved()["running"] is False
 
 
-def test_many_crashes_hold_the_loop_and_then_end_the_attempts(
+def test_many_crashes_hold_the_loop_and_end_the_restarts(
     daemon: DaemonUnderTest, running: rtcf.Client
 ) -> None:
     running.set_runner(runner_pb2.RunnerSettings(on_crash=runner_pb2.ON_CRASH_RESUME))
@@ -182,7 +182,7 @@ def test_many_crashes_hold_the_loop_and_then_end_the_attempts(
         running.release(["extra"])
         running.start()
     die(running, "/extra", "SIGSEGV")
-    wait_for(lambda: "the last of 6 in 60 s" in daemon.log(), "the end of the attempts")
+    wait_for(lambda: "the last of 6 in 60 s" in daemon.log(), "the last restart")
     assert state(running).state == runner_pb2.RUNNER_STATE_DOWN
     running.start()
     assert running.get_order() == ["/bad", "/good"]
@@ -222,7 +222,7 @@ def test_a_loop_after_a_restart_of_both(
         assert state(again).state == expected
 
 
-def test_a_loop_is_not_started_at_boot_without_a_component_unless_it_ran_without_it(
+def test_an_incomplete_loop_starts_at_boot_only_if_it_ran_incomplete(
     daemon: DaemonUnderTest, running: rtcf.Client
 ) -> None:
     daemon.package("gone", types={"Gone": "fine"})
@@ -259,7 +259,7 @@ def test_a_flight_recorder_is_read_through_proc_and_after_its_end() -> None:
     recorder.close()
 
 
-def test_what_is_no_flight_recorder_is_refused() -> None:
+def test_an_invalid_flight_recorder_is_rejected() -> None:
     writer = FlightWriter()
     writer.put(0, 0)
     with pytest.raises(ValueError, match="not a flight recorder"):
@@ -293,7 +293,7 @@ def test_what_is_no_flight_recorder_is_refused() -> None:
         (End(-9), Note(), "while no component was running", ""),
     ],
 )  # fmt: skip
-def test_running_is_named_and_only_the_thread_that_died_is_blamed(
+def test_only_the_component_of_the_dead_thread_is_blamed(
     end: End, note: Note | None, text: str, culprit: str
 ) -> None:
     verdict = judge(end, note)

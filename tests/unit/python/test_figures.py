@@ -1,4 +1,4 @@
-"""From when on figures count, and when a loop is said to be late."""
+"""The start of statistics, and the alarm for late loops."""
 
 import asyncio
 from collections.abc import Callable
@@ -24,21 +24,21 @@ def shown(counts: Figures, found: runner_pb2.RunnerStatus) -> tuple[int, int, st
     return found.overruns, found.missed, found.late
 
 
-def test_status_of_an_older_executor_counts_from_where_statistics_do() -> None:
+def test_status_and_statistics_of_an_older_executor_have_the_same_start() -> None:
     counts = Figures()
     counts.leave_out(status(0, 7, 9), runner_pb2.RunnerStatistics(overruns=0, missed=0))
     assert shown(counts, status(100, 8, 12))[:2] == (1, 3)
-    # Of an executor that is adopted, its statistics tell.
+    # For an adopted executor, its statistics determine the start.
     counts.leave_out(status(100, 8, 12), runner_pb2.RunnerStatistics(overruns=3, missed=5))
     assert shown(counts, status(200, 9, 12))[:2] == (4, 5)
 
 
 @pytest.mark.parametrize("protocol", [FIGURES_PROTOCOL - 1, FIGURES_PROTOCOL])
-def test_a_reset_is_one_request_of_who_can_do_it_in_one(
+def test_a_reset_is_one_request_if_the_executor_supports_it(
     rtcfd: Callable[[], Rtcfd], monkeypatch: pytest.MonkeyPatch, protocol: int
 ) -> None:
-    """Cycles end late between any two requests; what an older executor's status counts from its
-    start is left out here."""
+    """Cycles end late between any two requests; the counts that an older executor's status has
+    from its start are subtracted here."""
     monkeypatch.setenv("PEER_PROTOCOL", str(protocol))
     asked: list[str] = []
     late = [7]
@@ -61,7 +61,7 @@ def test_a_reset_is_one_request_of_who_can_do_it_in_one(
         asked.clear()
         await life.call("ResetStatistics", control_pb2.ResetStatisticsRequest())
         one = ["reset_statistics"]
-        old = [*one, "get_status", "get_statistics"]  # by which there was one more
+        old = [*one, "get_status", "get_statistics"]  # one more overrun each
         assert asked == (old if protocol < FIGURES_PROTOCOL else one)
         late[0] += 3
         left_out = 7 - 1 if protocol < FIGURES_PROTOCOL else 0
@@ -73,7 +73,7 @@ def test_a_reset_is_one_request_of_who_can_do_it_in_one(
     asyncio.run(play())
 
 
-def test_a_loop_that_keeps_being_late_is_late_and_one_late_cycle_is_not(
+def test_only_a_constantly_late_loop_raises_the_alarm(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     clock = [100.0]
@@ -88,11 +88,11 @@ def test_a_loop_that_keeps_being_late_is_late_and_one_late_cycle_is_not(
     stopped = status(2100, 420)
     stopped.state = runner_pb2.RUNNER_STATE_STOPPED
     assert shown(counts, stopped)[2] == ""
-    # Now and then one is not permanently.
+    # An occasional late cycle is not permanent.
     clock[0] += 10
     counts.told_of_late_cycles(status(12000, 402), "1 cycle ended late")
     assert shown(counts, status(12000, 402))[2] == ""
-    # It is in time again.
+    # It is on time again.
     counts.told_of_late_cycles(status(13000, 902), said)
     clock[0] += 20
     assert shown(counts, status(20000, 902))[2] == ""

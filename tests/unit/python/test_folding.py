@@ -1,4 +1,4 @@
-"""Places and lines of drawings of graphs: nothing lies on anything else."""
+"""Positions and lines of graph drawings: no parts overlap."""
 
 import itertools
 import math
@@ -13,7 +13,7 @@ SIZES = Sizes(wide=150, high=40, gap_x=46, gap_y=24, lane_x=5, lane_y=4, port=6)
 
 @st.composite
 def graphs(draw: st.DrawFn) -> tuple[list[str], list[Link]]:
-    """Give components in the order of their schedule, and what they read."""
+    """Draw components in the order of their schedule, and their connections."""
     names = [f"/c{number}" for number in range(draw(st.integers(1, 60)))]
     links = []
     for number in range(draw(st.integers(0, 120))):
@@ -37,7 +37,7 @@ def size(cells: dict[str, Cell]) -> tuple[int, int]:
 
 
 @given(graph=graphs(), columns=st.integers(2, 12))
-def test_each_component_has_a_place_of_its_own(
+def test_each_component_has_its_own_position(
     graph: tuple[list[str], list[Link]], columns: int
 ) -> None:
     names, links = graph
@@ -67,7 +67,7 @@ def test_no_line_crosses_a_box(graph: tuple[list[str], list[Link]], columns: int
             assert min(x1, x2) >= 0 and max(x1, x2) <= wide
             assert min(y1, y2) >= 0 and max(y1, y2) <= high
         to = cells[link.reader]
-        # It ends at its reader, and comes from outside of the box.
+        # It ends at its reader, and arrives from outside the box.
         side = SIZES.left(to.column) + (SIZES.wide if to.turned else 0.0)
         assert way[-1][0] == side
         assert (way[-2][0] > side) == to.turned
@@ -75,7 +75,7 @@ def test_no_line_crosses_a_box(graph: tuple[list[str], list[Link]], columns: int
 
 
 @given(count=st.integers(1, 300), columns=st.integers(2, 20))
-def test_a_chain_becomes_rows_that_turn(count: int, columns: int) -> None:
+def test_a_chain_is_folded_into_rows(count: int, columns: int) -> None:
     names, links = chain(count)
     cells = place(names, links, columns)
     wide, high = size(cells)
@@ -86,11 +86,11 @@ def test_a_chain_becomes_rows_that_turn(count: int, columns: int) -> None:
         else:
             assert (b.column, b.row, b.turned) == (a.column, a.row + 1, not a.turned)
     for way in route(cells, links, SIZES):
-        assert len(way) in (2, 4)  # straight, or once around
+        assert len(way) in (2, 4)  # straight, or with one detour
 
 
 @given(graph=graphs())
-def test_in_one_row_values_go_to_the_right(graph: tuple[list[str], list[Link]]) -> None:
+def test_values_flow_to_the_right_within_a_row(graph: tuple[list[str], list[Link]]) -> None:
     names, links = graph
     cells = place(names, links, len(names) + 1)
     assert not any(each.turned for each in cells.values())
@@ -100,9 +100,7 @@ def test_in_one_row_values_go_to_the_right(graph: tuple[list[str], list[Link]]) 
 
 
 @given(graph=graphs(), columns=st.integers(2, 12))
-def test_layers_are_those_of_the_longest_way(
-    graph: tuple[list[str], list[Link]], columns: int
-) -> None:
+def test_layers_follow_the_longest_path(graph: tuple[list[str], list[Link]], columns: int) -> None:
     names, links = graph
     longest = dict.fromkeys(names, 1)
     for name in names:
@@ -113,7 +111,7 @@ def test_layers_are_those_of_the_longest_way(
 
 
 @pytest.mark.parametrize("columns", [3, 6, 9])
-def test_many_readers_of_one_are_a_block(columns: int) -> None:
+def test_many_readers_of_one_writer_form_a_block(columns: int) -> None:
     names = [f"/c{number}" for number in range(200)]
     cells = place(names, [Link("/s", names[0], each) for each in names[1:]], columns)
     wide, high = size(cells)
@@ -121,7 +119,7 @@ def test_many_readers_of_one_are_a_block(columns: int) -> None:
     assert high == math.ceil(199 / (columns - 1))
 
 
-def test_chains_stand_below_each_other() -> None:
+def test_chains_are_placed_below_each_other() -> None:
     names = [f"/c{number}" for number in range(200)]
     links = [Link(f"/{a}", a, b) for a, b in itertools.pairwise(names) if not b.endswith("0")]
     cells = place(names, links, 12)

@@ -1,4 +1,4 @@
-"""The control socket: who owns it, how many it serves, what it does with nonsense."""
+"""The control socket: ownership, client limit, invalid input."""
 
 import random
 import signal
@@ -15,7 +15,7 @@ from rtcf.v1 import control_pb2
 TIMES = [300, pytest.param(10_000, marks=pytest.mark.long)]
 
 
-def test_a_socket_that_another_took_is_left_to_it(daemon: DaemonUnderTest) -> None:
+def test_a_socket_taken_over_by_another_daemon_is_kept(daemon: DaemonUnderTest) -> None:
     daemon.socket.unlink()
     with socket.socket(socket.AF_UNIX) as other:
         other.bind(str(daemon.socket))
@@ -23,14 +23,14 @@ def test_a_socket_that_another_took_is_left_to_it(daemon: DaemonUnderTest) -> No
         assert daemon.socket.is_socket()
 
 
-def test_a_file_in_the_way_is_refused_and_kept(stopped_daemon: DaemonUnderTest) -> None:
+def test_a_file_at_the_sockets_path_is_rejected_and_kept(stopped_daemon: DaemonUnderTest) -> None:
     stopped_daemon.socket.write_text("mine")
     stopped_daemon.start()
     assert "is in the way and is no socket" in stopped_daemon.log()
     assert stopped_daemon.socket.read_text() == "mine"
 
 
-def test_a_link_in_the_way_is_refused_and_kept(stopped_daemon: DaemonUnderTest) -> None:
+def test_a_link_at_the_sockets_path_is_rejected_and_kept(stopped_daemon: DaemonUnderTest) -> None:
     target = stopped_daemon.folder / "target"
     with socket.socket(socket.AF_UNIX) as stale:
         stale.bind(str(target))
@@ -40,12 +40,12 @@ def test_a_link_in_the_way_is_refused_and_kept(stopped_daemon: DaemonUnderTest) 
     assert target.is_socket()
 
 
-def test_a_socket_that_was_passed_is_adopted_and_left_behind(tmp_path: Path) -> None:
+def test_a_passed_socket_is_adopted_and_kept(tmp_path: Path) -> None:
     path = tmp_path / "passed"
     with socket.socket(socket.AF_UNIX) as listener:
         listener.bind(str(path))
         listener.listen()
-        # A client that comes before rtcfd does.
+        # A client that connects before rtcfd starts.
         early = subprocess.Popen(
             [BUILD_TREE / "bin" / "rtcfctl", "--socket", path, "status"],
             stdout=subprocess.PIPE,
@@ -70,7 +70,7 @@ def test_a_socket_that_was_passed_is_adopted_and_left_behind(tmp_path: Path) -> 
     assert path.is_socket()
 
 
-def test_one_client_too_many_is_told_so(stopped_daemon: DaemonUnderTest) -> None:
+def test_a_client_beyond_the_limit_gets_an_error(stopped_daemon: DaemonUnderTest) -> None:
     config = stopped_daemon.folder / "rtcfd.toml"
     config.write_text("[limits]\nclients = 2\n")
     daemon = stopped_daemon.start("--config", str(config))
@@ -79,7 +79,7 @@ def test_one_client_too_many_is_told_so(stopped_daemon: DaemonUnderTest) -> None
         two.get_status()
         with pytest.raises(rtcf.RefusedError, match="serves 2 clients already.*raise clients"):
             three.get_status()
-    # Those that have left make room.
+    # Disconnected clients make room.
     with daemon.client() as four:
         wait_for(lambda: _answers(four), "an answer")
 
@@ -92,7 +92,7 @@ def _answers(client: rtcf.Client) -> bool:
     return True
 
 
-def test_a_request_that_is_too_large_is_refused(stopped_daemon: DaemonUnderTest) -> None:
+def test_a_request_that_is_too_large_is_rejected(stopped_daemon: DaemonUnderTest) -> None:
     config = stopped_daemon.folder / "rtcfd.toml"
     config.write_text("[limits]\nmessage_kb = 16\n")
     daemon = stopped_daemon.start("--config", str(config))
@@ -120,7 +120,7 @@ def test_malformed_requests_change_nothing_and_end_nothing(
         for _ in range(times):
             method = noise.choice([*names, "NoSuchMethod"])
             call = channel.unary_stream(f"/rtcf.v1.Control/{method}")
-            # Never a valid message: there is no wire type 7.
+            # Never a valid message: wire type 7 does not exist.
             data = b"\x0f" + noise.randbytes(noise.randrange(64))
             with pytest.raises(grpc.RpcError) as refused:
                 list(call(data, timeout=DEADLINE_S))
@@ -133,17 +133,17 @@ def test_malformed_requests_change_nothing_and_end_nothing(
 
 
 @pytest.mark.parametrize("times", TIMES)
-def test_noise_on_the_socket_ends_nothing(daemon: DaemonUnderTest, times: int) -> None:
+def test_random_bytes_on_the_socket_end_nothing(daemon: DaemonUnderTest, times: int) -> None:
     noise = random.Random(times)
     for number in range(times):
         with socket.socket(socket.AF_UNIX) as client:
             client.connect(str(daemon.socket))
             try:
-                if number % 2:  # a connection of HTTP/2, and then noise
+                if number % 2:  # an HTTP/2 preface, then random bytes
                     client.sendall(b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n")
                 client.sendall(noise.randbytes(noise.randrange(200)))
             except OSError:
-                pass  # it was hung up on
+                pass  # rtcfd closed the connection
     with daemon.client() as client:
         wait_for(lambda: _answers(client), "an answer")
     assert "Traceback" not in daemon.log()

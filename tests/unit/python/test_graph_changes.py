@@ -1,4 +1,4 @@
-"""Changes of a graph: refusals, what is kept, what comes back."""
+"""Changes of a graph: errors, kept values, restoration."""
 
 import json
 import os
@@ -29,7 +29,7 @@ def test_a_loaded_component_is_listed_in_order(client: rtcf.Client) -> None:
     assert [each.name for each in client.list_connections()] == ["/arm/a_out", "/b_out"]
 
 
-def test_relative_names_are_taken_in_the_root(client: rtcf.Client) -> None:
+def test_relative_names_are_resolved_in_the_root(client: rtcf.Client) -> None:
     client.load(rtcf.component("demo", "Fine", name="a"))
     assert client.get_component("a").full_name == "/a"
     client.unload(["a"])
@@ -46,7 +46,7 @@ def test_relative_names_are_taken_in_the_root(client: rtcf.Client) -> None:
         ("demo", "Refused", "FAILED_PRECONDITION", r"Refused\.configure failed"),
     ],
 )
-def test_refused_load_changes_nothing(
+def test_a_failed_load_changes_nothing(
     daemon: DaemonUnderTest,
     client: rtcf.Client,
     package: str,
@@ -68,16 +68,14 @@ def test_unknown_package_lists_the_folders(daemon: DaemonUnderTest, client: rtcf
     assert "/usr/lib/rtcf" in str(refused.value)
 
 
-def test_a_type_that_is_in_two_places_is_said(daemon: DaemonUnderTest, client: rtcf.Client) -> None:
+def test_a_type_in_two_folders_is_reported(daemon: DaemonUnderTest, client: rtcf.Client) -> None:
     daemon.package("demo", "elsewhere", types={"Fine": "fine"})
     (note,) = client.load(rtcf.component("demo", "Fine")).notes
     taken, other = (daemon.packages / "demo" / f"{name}.so" for name in ("elsewhere", "main"))
     assert note == f"several libraries provide demo/Fine: rtcfd uses {taken}, not {other}"
 
 
-def test_holders_of_one_launch_are_told_a_note_once(
-    daemon: DaemonUnderTest, client: rtcf.Client
-) -> None:
+def test_a_launch_gets_a_note_once(daemon: DaemonUnderTest, client: rtcf.Client) -> None:
     daemon.package("demo", "elsewhere", types={"Fine": "fine"})
 
     def leased(name: str) -> tuple[tuple[rtcf.Tenancy, Iterator[Any]], list[str]]:
@@ -97,19 +95,19 @@ def test_holders_of_one_launch_are_told_a_note_once(
     assert nothing == []
     end(*first)
     end(*second)
-    third, again = leased("three")  # another launch
+    third, again = leased("three")  # from another launch
     assert again == told
     end(*third)
 
 
-def test_duplicate_name_is_refused(client: rtcf.Client) -> None:
+def test_a_duplicate_name_is_rejected(client: rtcf.Client) -> None:
     client.load(rtcf.component("demo", "Fine"))
     with pytest.raises(rtcf.RefusedError, match="/Fine is there already") as refused:
         client.load(rtcf.component("demo", "Fine"))
     assert refused.value.code == "ALREADY_EXISTS"
 
 
-def test_a_library_that_does_not_load_gives_the_loaders_text(
+def test_a_library_that_does_not_load_reports_the_loaders_text(
     daemon: DaemonUnderTest, client: rtcf.Client
 ) -> None:
     library = daemon.package("bad", problem="undefined symbol: _ZN3FooE")
@@ -120,7 +118,7 @@ def test_a_library_that_does_not_load_gives_the_loaders_text(
     assert client.list_types("bad").problems == [f"{library}: undefined symbol: _ZN3FooE"]
 
 
-def test_a_library_that_crashes_is_refused_by_signal(
+def test_a_library_that_crashes_is_rejected_with_its_signal(
     daemon: DaemonUnderTest, client: rtcf.Client
 ) -> None:
     daemon.package("bad", crash="SIGSEGV")
@@ -128,14 +126,16 @@ def test_a_library_that_crashes_is_refused_by_signal(
         client.load(rtcf.component("bad", "Foo"))
 
 
-def test_a_library_that_was_mended_is_seen(daemon: DaemonUnderTest, client: rtcf.Client) -> None:
+def test_a_repaired_library_is_noticed(daemon: DaemonUnderTest, client: rtcf.Client) -> None:
     daemon.package("late", types={"Old": "fine"})
     assert [each.type for each in client.list_types("late").types] == ["Old"]
     daemon.package("late", types={"Newer": "fine"})
     assert [each.type for each in client.list_types("late").types] == ["Newer"]
 
 
-def test_a_crash_at_load_is_told_and_not_kept(daemon: DaemonUnderTest, client: rtcf.Client) -> None:
+def test_a_crash_during_load_is_reported_and_not_saved(
+    daemon: DaemonUnderTest, client: rtcf.Client
+) -> None:
     client.load(rtcf.component("demo", "Fine"))
     with pytest.raises(
         rtcf.RefusedError, match=r"was killed by SIGSEGV .* while /Crashes\.configure was running"
@@ -146,7 +146,7 @@ def test_a_crash_at_load_is_told_and_not_kept(daemon: DaemonUnderTest, client: r
     assert list(saved(daemon)) == ["/Fine"]
 
 
-def test_progress_is_streamed_and_stop_and_queries_do_not_wait(
+def test_progress_is_streamed_while_stop_and_queries_work(
     daemon: DaemonUnderTest, client: rtcf.Client, tmp_path: Path
 ) -> None:
     go = tmp_path / "go"
@@ -166,7 +166,7 @@ def test_progress_is_streamed_and_stop_and_queries_do_not_wait(
     assert results[0].component == "/Slow"
 
 
-def test_a_change_outlives_its_caller(
+def test_a_change_continues_without_its_client(
     daemon: DaemonUnderTest, client: rtcf.Client, tmp_path: Path
 ) -> None:
     go = tmp_path / "go"
@@ -187,7 +187,7 @@ def test_a_change_outlives_its_caller(
     assert list(saved(daemon)) == ["/Slow"]
 
 
-def test_replacement_inherits_what_is_empty(daemon: DaemonUnderTest, client: rtcf.Client) -> None:
+def test_a_replacement_inherits_unset_fields(daemon: DaemonUnderTest, client: rtcf.Client) -> None:
     old = rtcf.component(
         "demo", "Fine", name="x", ns="/arm", remaps=["in1:=/a"], first=True, breaks=["in2"],
         parameters=["k:=1"],
@@ -202,7 +202,7 @@ def test_replacement_inherits_what_is_empty(daemon: DaemonUnderTest, client: rtc
     assert list(saved(daemon)) == ["/arm/x"]
 
 
-def test_the_graph_comes_back_held_after_a_restart(
+def test_the_graph_is_restored_held_after_a_restart(
     daemon: DaemonUnderTest, client: rtcf.Client
 ) -> None:
     client.set_runner(runner_pb2.RunnerSettings(frequency_hz=250.0))
@@ -230,7 +230,7 @@ def test_the_graph_comes_back_held_after_a_restart(
         assert not again.get_component("c").spec.breaks
 
 
-def test_what_does_not_load_again_is_left_out_and_reported(
+def test_components_that_cannot_be_restored_are_left_out_and_reported(
     daemon: DaemonUnderTest, client: rtcf.Client
 ) -> None:
     daemon.package("gone", types={"Gone": "fine"})
@@ -249,7 +249,7 @@ def test_what_does_not_load_again_is_left_out_and_reported(
         assert set(saved(daemon)) == {"/Fine"}
 
 
-def test_a_component_can_be_taken_out_while_the_executor_is_down(
+def test_a_component_can_be_unloaded_without_executor(
     daemon: DaemonUnderTest, client: rtcf.Client
 ) -> None:
     client.load(rtcf.component("demo", "Fine", name="a"))
@@ -284,7 +284,7 @@ def test_a_corrupt_state_is_set_aside(stopped_daemon: DaemonUnderTest, content: 
     assert f"set aside as {aside.name}" in stopped_daemon.ctl("status").stdout
 
 
-def test_the_state_of_a_newer_rtcfd_is_set_aside_for_it(stopped_daemon: DaemonUnderTest) -> None:
+def test_the_state_of_a_newer_rtcfd_is_set_aside(stopped_daemon: DaemonUnderTest) -> None:
     stopped_daemon.state.mkdir()
     content = f'{{"version": {store.VERSION + 1}, "runner": "rt_runner", "more": []}}'
     (stopped_daemon.state / "rt_runner.json").write_text(content)
@@ -296,7 +296,7 @@ def test_the_state_of_a_newer_rtcfd_is_set_aside_for_it(stopped_daemon: DaemonUn
     assert f"it is of version {store.VERSION + 1}, of a newer rtcfd than this" in said
 
 
-# As rtcfd wrote it before components could be left out, quarantined and held.
+# The format of rtcfd before components could be left out, quarantined and held.
 OLDEST = """\
 {
   "version": 1,
@@ -324,7 +324,7 @@ def test_the_state_of_an_older_rtcfd_is_upgraded_and_kept(stopped_daemon: Daemon
     assert [each["name"] for each in saved["components"]] == ["a", "b"]
 
 
-def test_a_change_that_cannot_be_saved_stands_and_says_so(
+def test_a_change_that_cannot_be_saved_stays_with_a_note(
     daemon: DaemonUnderTest, client: rtcf.Client
 ) -> None:
     daemon.state.rmdir()

@@ -1,4 +1,4 @@
-"""Graph files: reading, refusing, writing; `rtcfctl apply` and `save`."""
+"""Graph files: parsing, errors, writing; `rtcfctl apply` and `save`."""
 
 import os
 import stat
@@ -95,13 +95,13 @@ def test_several_runners_are_read() -> None:
         ("runners: {a: {runner: b, components: []}}\n", 1, 'unknown key "runner" of runner a'),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_said_with_its_line(text: str, line: int | None, problem: str) -> None:
+def test_an_error_is_reported_with_its_line(text: str, line: int | None, problem: str) -> None:
     place = r"g\.yaml: " if line is None else rf"g\.yaml:{line}: "
     with pytest.raises(rtcf.GraphFileError, match=f"{place}.*({problem})"):
         rtcf.read_graphs(text, "g.yaml")
 
 
-def test_what_is_written_is_read_again_and_says_the_same_to_others() -> None:
+def test_a_written_file_is_read_back_by_rtcf_and_other_readers() -> None:
     (graph,) = rtcf.read_graphs(FULL, "x")
     parameters = ["a:='1e3'", "b:='yes'", "c:=''", "d:='0o7'", "e:='a: b'", "f:=1e20", "g:=.nan"]
     graph.components[0].parameters.extend(rtcf.parse_parameter(text) for text in parameters)
@@ -109,7 +109,7 @@ def test_what_is_written_is_read_again_and_says_the_same_to_others() -> None:
     (again,) = rtcf.read_graphs(text, "y")
     assert again.runner == graph.runner
     assert again.settings == graph.settings
-    assert str(again.components[0]) == str(graph.components[0])  # a NaN is not equal to itself
+    assert str(again.components[0]) == str(graph.components[0])  # a NaN does not equal itself
     others = yaml.safe_load(text)["components"][0]["parameters"]
     assert (others["a"], others["b"], others["c"], others["d"]) == ("1e3", "yes", "", "0o7")
     two = rtcf.write_graphs([graph, rtcf.Graph("b")])
@@ -118,7 +118,7 @@ def test_what_is_written_is_read_again_and_says_the_same_to_others() -> None:
 
 TEXTS = st.one_of(
     st.text(max_size=40),
-    # What YAML reads as something else, or cannot read.
+    # Texts that YAML reads as another type, or cannot read.
     st.text(alphabet="0123456789+-.:_eExXoOinfNaA~#'\"\\ \n\r\t\x85\u2028", max_size=12),
     st.sampled_from(["9" * 20, "9" * 5000, '"a\\q"', "2001-01-01", "12:30:45", "null", "=", "<<"]),
 )
@@ -132,14 +132,14 @@ TEXTS = st.one_of(
 @example("9" * 5000)
 @example("a\x85b")
 @example("'a'")
-def test_any_text_is_saved_and_read_again(text: str) -> None:
+def test_any_text_is_saved_and_read_back(text: str) -> None:
     spec = graph_pb2.ComponentSpec(package="p", type="T", name="x")
     spec.parameters.add(name="k", value=graph_pb2.ParameterValue(string_value=text))
     (graph,) = rtcf.read_graphs(rtcf.write_graphs([rtcf.Graph("arm", components=[spec])]), "x")
     assert list(graph.components) == [spec]
 
 
-def test_a_live_spec_has_the_values_of_now() -> None:
+def test_a_live_spec_has_the_present_values() -> None:
     info = graph_pb2.ComponentInfo(
         spec=rtcf.component("p", "T", name="a", parameters=["given:=1"], every=1)
     )
@@ -193,7 +193,7 @@ def test_apply_shows_the_difference_and_changes_once(
     assert daemon.ctl("apply", file).stdout == "nothing to change\n"
 
 
-def test_a_graph_that_is_refused_changes_nothing(
+def test_a_rejected_graph_changes_nothing(
     daemon: DaemonUnderTest, client: rtcf.Client, tmp_path: Path
 ) -> None:
     client.load(rtcf.component("demo", "Fine", name="kept"))
@@ -204,9 +204,7 @@ def test_a_graph_that_is_refused_changes_nothing(
     assert client.get_status().runners[0].settings.frequency_hz == 1000.0
 
 
-def test_a_file_that_is_not_valid_is_refused_by_line(
-    daemon: DaemonUnderTest, tmp_path: Path
-) -> None:
+def test_an_invalid_file_is_rejected_with_its_line(daemon: DaemonUnderTest, tmp_path: Path) -> None:
     file = write(tmp_path, "components:\n- {package: demo, typ: Fine}\n")
     done = daemon.ctl("apply", file)
     assert done.returncode == 1
@@ -228,7 +226,7 @@ def test_a_runner_is_added_with_its_graph_or_not_at_all(
     assert len(client.get_status().runners) == 2
 
 
-def test_of_several_runners_none_is_changed_if_one_is_refused(
+def test_no_runner_changes_if_one_of_them_is_rejected(
     daemon: DaemonUnderTest, client: rtcf.Client, tmp_path: Path
 ) -> None:
     client.add_runner("arm")
@@ -245,7 +243,7 @@ runners:
     assert "no runner leg (runners: arm, rt_runner)" in wrong.stderr
 
 
-def test_save_writes_what_apply_reads(
+def test_apply_reads_files_written_by_save(
     daemon: DaemonUnderTest, client: rtcf.Client, tmp_path: Path
 ) -> None:
     client.set_runner(runner_pb2.RunnerSettings(frequency_hz=500.0))
@@ -293,7 +291,7 @@ def test_save_replaces_no_pipe_and_no_link(daemon: DaemonUnderTest, tmp_path: Pa
     assert link.is_symlink()
     assert file.read_text() == text
     assert stat.S_IMODE(file.stat().st_mode) == 0o664
-    # A name of the kernel's, whatever it leads to.
+    # A name of the kernel's, whatever its target.
     log = tmp_path / "log"
     log.write_text("before\n")
     with log.open("a") as out:
@@ -303,8 +301,8 @@ def test_save_replaces_no_pipe_and_no_link(daemon: DaemonUnderTest, tmp_path: Pa
     assert log.read_text() == f"before\n{text}saved rt_runner to /proc/self/fd/1\n"
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="a stranger's files take root")
-def test_save_trusts_no_file_of_a_stranger_in_a_folder_of_everybody(
+@pytest.mark.skipif(os.geteuid() != 0, reason="requires root to create files of another user")
+def test_save_trusts_no_foreign_file_in_a_world_writable_folder(
     daemon: DaemonUnderTest, tmp_path: Path
 ) -> None:
     everybodys = tmp_path / "tmp"

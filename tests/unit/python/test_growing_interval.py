@@ -1,10 +1,10 @@
-"""How often what is said again and again is said."""
+"""Intervals between repetitions of a message."""
 
 import pytest
 from rtcfd.common.growing_interval import GrowingInterval
 
 
-def test_intervals_grow_up_to_the_longest_and_begin_anew_after_quiet(
+def test_intervals_grow_to_the_longest_and_restart_after_a_pause(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     clock = [100.0]
@@ -18,7 +18,7 @@ def test_intervals_grow_up_to_the_longest_and_begin_anew_after_quiet(
     assert said == [(0, 0), (10, 0), (30, 1), (70, 3), (110, 3), (150, 3), (190, 3), (230, 3),
                     (270, 3)]  # fmt: skip
     clock[0] += 30.0
-    assert interval.due() == 0, "there was nothing to say for long"
+    assert interval.due() == 0, "the interval restarts after a pause"
     clock[0] += 10.0
     assert interval.due() == 0
     clock[0] += 10.0

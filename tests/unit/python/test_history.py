@@ -1,4 +1,4 @@
-"""Who set which parameter to what, and when: kept, bounded, taken back."""
+"""The history of parameter changes with user and time: stored, bounded, undone."""
 
 import os
 import signal
@@ -38,10 +38,10 @@ def value(number: float) -> graph_pb2.ParameterValue:
 
 @seed(SEED)
 @given(st.lists(steps, max_size=60))
-def test_changes_are_taken_back_in_the_order_they_were_made(sequence: list[tuple]) -> None:  # type: ignore[type-arg]
+def test_changes_are_undone_in_reverse_order(sequence: list[tuple]) -> None:  # type: ignore[type-arg]
     changes = History()
     disk = ""
-    model: dict[str, list[dict[str, str]]] = defaultdict(list)  # what is not taken back
+    model: dict[str, list[dict[str, str]]] = defaultdict(list)  # changes not undone
     for what, component, values in sequence:
         if what == "set":
             changes.note(
@@ -65,7 +65,7 @@ def test_changes_are_taken_back_in_the_order_they_were_made(sequence: list[tuple
             assert [str(each) for each in changes.of()] == before
 
 
-def test_one_component_that_is_tuned_all_day_leaves_others_theirs() -> None:
+def test_many_changes_of_one_component_displace_no_others() -> None:
     changes = History()
     changes.note("/quiet", [("kp", None, value(1.0))], "ann", "set")
     for number in range(10 * history.MOST):
@@ -74,7 +74,7 @@ def test_one_component_that_is_tuned_all_day_leaves_others_theirs() -> None:
     assert len(changes.of("/quiet")) == 1
 
 
-def test_all_together_have_a_bound_too_and_the_oldest_goes() -> None:
+def test_the_total_is_bounded_and_the_oldest_change_is_dropped() -> None:
     changes = History()
     for number in range(history.MOST + 10):
         changes.note(f"/c{number}", [("kp", None, value(number))], "ann", "set")
@@ -82,7 +82,7 @@ def test_all_together_have_a_bound_too_and_the_oldest_goes() -> None:
     assert (len(found), found[0].component) == (history.MOST, "/c10")
 
 
-def test_the_file_is_bounded_too(tmp_path: Path) -> None:
+def test_the_file_is_bounded(tmp_path: Path) -> None:
     store = Store(tmp_path)
     desired = Desired("arm")
     store.save("arm", store.text(desired), False)
@@ -99,7 +99,7 @@ def test_the_file_is_bounded_too(tmp_path: Path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_what_did_not_get_to_disk_does_so_the_next_time() -> None:
+def test_unwritten_changes_are_written_the_next_time() -> None:
     changes = History()
     changes.note("/a", [("kp", None, value(1.0))], "ann", "set")
     changes.to_write()
@@ -110,7 +110,7 @@ def test_what_did_not_get_to_disk_does_so_the_next_time() -> None:
     assert changes.to_write() == ([], False)
 
 
-def test_lines_that_are_none_are_passed_over(tmp_path: Path) -> None:
+def test_invalid_lines_are_skipped(tmp_path: Path) -> None:
     store = Store(tmp_path)
     store.save("arm", store.text(Desired("arm")), False)
     good = History()
@@ -128,7 +128,7 @@ def kp(client: rtcf.Client) -> float:
     return float(client.get_component("pid").parameters[0].value.double_value)
 
 
-def test_what_was_set_is_taken_back_step_by_step_also_after_a_restart(
+def test_changes_are_undone_step_by_step_even_after_a_restart(
     daemon: DaemonUnderTest, client: rtcf.Client
 ) -> None:
     client.load(rtcf.component("demo", "Fine", name="pid", parameters=["kp:=1.5"]))
@@ -162,7 +162,7 @@ def test_what_was_set_is_taken_back_step_by_step_also_after_a_restart(
     assert "/pid.kp" in shown[2]
 
 
-def test_what_was_changed_otherwise_since_is_not_taken_back(client: rtcf.Client) -> None:
+def test_a_parameter_changed_since_is_not_undone(client: rtcf.Client) -> None:
     client.load(rtcf.component("demo", "Fine", name="pid"))
     client.set_parameters("pid", [rtcf.parse_parameter("kp:=2.5")])
     client.unload(["pid"])
@@ -173,7 +173,7 @@ def test_what_was_changed_otherwise_since_is_not_taken_back(client: rtcf.Client)
         client.undo_parameters("other")
 
 
-def test_a_graph_that_is_applied_says_what_it_changed(client: rtcf.Client) -> None:
+def test_apply_records_its_changes(client: rtcf.Client) -> None:
     for text in ("kp:=1.5", "kp:=1.5", "kp:=2.0"):
         spec = rtcf.component("demo", "Fine", name="pid", parameters=[text])
         client._change(client._stub.Apply, control_pb2.ApplyRequest(components=[spec]), None)
@@ -190,7 +190,7 @@ def test_a_launch_is_named(client: rtcf.Client) -> None:
     tenancy.end()
 
 
-def test_a_change_whose_caller_left_is_noted_with_who_made_it(
+def test_a_change_without_its_client_is_recorded_with_its_user(
     stopped_daemon: DaemonUnderTest, tmp_path: Path
 ) -> None:
     held = tmp_path / "held"
@@ -227,7 +227,7 @@ with rtcf.Client(sys.argv[1]) as client:
 
 
 @root_only
-def test_who_undoes_is_bound_as_who_sets() -> None:
+def test_undo_needs_the_same_rights_as_set() -> None:
     rules = (
         "[access]\nobserve = ['nobody']\n"
         "[[access.parameters]]\nwho = ['nobody']\nnames = ['/pid.kp']\nmost_per_s = 0.5\n"
@@ -246,7 +246,7 @@ def test_who_undoes_is_bound_as_who_sets() -> None:
     assert said[2] == "3\n"
 
 
-def test_long_texts_are_bounded_in_bytes_and_what_was_changed_at_once_stays_whole() -> None:
+def test_long_texts_are_bounded_and_simultaneous_changes_stay_together() -> None:
     changes, disk = History(), 0
     for number in range(40):
         for component in "abcdefghijkl":
@@ -261,12 +261,12 @@ def test_long_texts_are_bounded_in_bytes_and_what_was_changed_at_once_stays_whol
         last = changes.to_take_back(component)
         assert [each.parameter for each in last] == ["p", "q", "r"]
         assert last[0].value.string_value.startswith("039")
-    # Larger than all that a component may have: it is kept whole, and alone.
+    # Larger than a component's share: it is stored whole, and alone.
     changes.note("l", [(f"p{each}", text, text) for each in range(15)], "ann", "set")
     assert len(changes.of("l")) == 15
 
 
-def test_an_answer_holds_the_newest_changes_that_a_client_takes() -> None:
+def test_an_answer_has_the_newest_changes_that_fit() -> None:
     desired = Desired("r")
     text = graph_pb2.ParameterValue(string_value="x" * 65000)
     for number in range(8):

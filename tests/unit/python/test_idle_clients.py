@@ -1,5 +1,5 @@
-"""Connections that nobody uses end: those that never made a call, and those that made none for
-long; a call that lasts is no idleness.  Who is hung up on is let read to the end."""
+"""Idle connections end: those without any call, and those without a call for a long time. A
+lasting call is not idle. The peer of a closed connection can read the rest of the data."""
 
 import asyncio
 import socket
@@ -20,7 +20,7 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 class Front:
-    """Clients in front of a server that hangs up on who talks to it, with some last words."""
+    """Clients in front of a server that answers each client with some last words and closes."""
 
     def __init__(self, folder: Path, level: Level, last_words: bytes) -> None:
         self._folder = folder
@@ -28,8 +28,8 @@ class Front:
         self.clients = Clients(
             Doors(folder / "trusted", folder / "others"), Limits(), lambda _: level
         )
-        self.shown: list[str] = []  # of each connection, as gRPC shows it
-        self._writers: list[asyncio.StreamWriter] = []  # Python 3.13 hangs up when they go
+        self.shown: list[str] = []  # per connection, as gRPC sees it
+        self._writers: list[asyncio.StreamWriter] = []  # Python 3.13 closes lost writers
 
     async def serve(self) -> None:
         async def answer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -48,11 +48,11 @@ class Front:
 
     @property
     def writer(self) -> asyncio.StreamWriter:
-        """What the newest client writes by."""
+        """The writer to the newest client."""
         return self._writers[-1]
 
     async def connect(self) -> asyncio.StreamReader:
-        """Return what a new client reads; it is kept as long as the front is."""
+        """Return the reader of a new client, which lasts as long as the front."""
         number = len(self.shown)
         reader, writer = await asyncio.open_unix_connection(self._folder / "s")
         self._writers.append(writer)
@@ -91,7 +91,7 @@ def test_a_connection_that_makes_no_call_ends(
     with_front(tmp_path, work, level)
 
 
-def test_a_connection_that_makes_no_more_calls_ends_and_not_before_its_last_does(
+def test_an_idle_connection_ends_after_its_last_call(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(clients, "_FIRST_CALL_S", 3600.0)
@@ -100,7 +100,7 @@ def test_a_connection_that_makes_no_more_calls_ends_and_not_before_its_last_does
     async def work(front: Front) -> None:
         lasting = await front.connect()
         with front.clients.calling(front.shown[0], "WatchStatistics"):
-            # One that came later, and was used, has been hung up on while this one was not.
+            # A later connection, already used, was closed before this one.
             idle = await front.connect()
             with front.clients.calling(front.shown[1], "GetStatus"):
                 pass
@@ -111,7 +111,7 @@ def test_a_connection_that_makes_no_more_calls_ends_and_not_before_its_last_does
     with_front(tmp_path, work)
 
 
-def test_who_was_hung_up_on_may_still_talk_until_it_has_read_all(
+def test_a_closed_connections_peer_may_write_until_it_has_read_all(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(clients, "_LINGER_S", DEADLINE_S)
@@ -128,7 +128,7 @@ def test_who_was_hung_up_on_may_still_talk_until_it_has_read_all(
     with_front(tmp_path, work)
 
 
-def test_what_was_answered_is_handed_on_though_its_reader_still_talks(
+def test_an_answer_is_delivered_although_its_reader_still_writes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     last_words = b"x" * 1000
@@ -154,17 +154,19 @@ def test_what_was_answered_is_handed_on_though_its_reader_still_talks(
     with_front(tmp_path, work, last_words=last_words)
 
 
-def test_who_was_hung_up_on_and_talks_on_holds_nobody_up(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_closed_connections_peer_that_keeps_writing_blocks_nobody(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(clients, "_LINGER_S", 0.01)
 
     class Talker(socket.socket):
-        """One that always has something more to say, as seen by who listens."""
+        """A socket whose peer always has more data."""
 
         words = 0
 
         def recv(self, size: int, flags: int = 0) -> bytes:
             self.words += 1
-            assert self.words < 1_000_000, "nothing else has its turn"
+            assert self.words < 1_000_000, "the event loop is starved"
             return b"x"
 
     ours, theirs = socket.socketpair()

@@ -1,4 +1,4 @@
-"""What the journal gets, and one that does not read."""
+"""Records sent to the journal, and a journal that does not read."""
 
 import fcntl
 import logging
@@ -14,7 +14,7 @@ from daemon_under_test import DEADLINE_S, wait_for
 from rtcfd.journal import JournalHandler
 from rtcfd.log_thread import LogThread
 
-# What a process does that logs more than its journal takes.
+# A process that logs more than the journal's socket holds.
 _LOGGING = """
 import logging, sys
 sys.path[:] = {path!r}
@@ -28,7 +28,7 @@ print("all logged", flush=True)
 
 
 class Journal:
-    """A socket as the journal's, which reads when it is told to."""
+    """A socket like the journal's, which reads on demand."""
 
     def __init__(self, address: Path) -> None:
         self.address = str(address)
@@ -46,7 +46,7 @@ class Journal:
             assert not data
             with os.fdopen(descriptors[0], "rb") as file:
                 seals = fcntl.fcntl(file, fcntl.F_GET_SEALS)
-                # Without these the journal does not take it.
+                # Without these seals the journal rejects it.
                 assert seals & fcntl.F_SEAL_WRITE
                 assert seals & fcntl.F_SEAL_SHRINK
                 file.seek(0)
@@ -94,7 +94,7 @@ def test_a_record_comes_with_its_fields(journal: Journal, logger: logging.Logger
 
 
 @pytest.mark.parametrize("message", ["a = b\nPRIORITY=0\n", "=", "", "ä\n", "\n"])
-def test_a_message_stays_one_field_whatever_is_in_it(
+def test_a_message_with_any_content_stays_one_field(
     journal: Journal, logger: logging.Logger, message: str
 ) -> None:
     logger.info("%s", message)
@@ -102,12 +102,12 @@ def test_a_message_stays_one_field_whatever_is_in_it(
     assert (found["MESSAGE"], found["PRIORITY"]) == (message, "6")
 
 
-def test_what_is_no_text_stays_readable(journal: Journal, logger: logging.Logger) -> None:
+def test_invalid_text_stays_readable(journal: Journal, logger: logging.Logger) -> None:
     logger.info("cannot read %s", os.fsdecode(b"/home/\xff"))
     assert journal.read()["MESSAGE"] == "cannot read /home/\\udcff"
 
 
-def test_a_record_larger_than_a_datagram_comes_as_a_file(
+def test_a_record_larger_than_a_datagram_is_sent_as_a_file(
     journal: Journal, logger: logging.Logger
 ) -> None:
     long = "\n".join(f"line {number}" for number in range(2_000_000))
@@ -119,11 +119,11 @@ def test_a_record_larger_than_a_datagram_comes_as_a_file(
     assert journal.read()["MESSAGE"] == "small"
 
 
-def test_a_journal_that_does_not_read_holds_up_nobody(
+def test_a_journal_that_does_not_read_blocks_nobody(
     journal: Journal, logger: logging.Logger
 ) -> None:
     for number in range(2000):
-        logger.info("record %d", number)  # returns, though nothing is read
+        logger.info("record %d", number)  # returns, although nothing is read
     taken, lost = 0, 0
     while taken + lost < 2000:
         message = journal.read()["MESSAGE"]
@@ -135,7 +135,7 @@ def test_a_journal_that_does_not_read_holds_up_nobody(
     assert lost
 
 
-def test_a_process_ends_whose_journal_does_not_read(journal: Journal) -> None:
+def test_a_process_can_end_without_a_reading_journal(journal: Journal) -> None:
     script = _LOGGING.format(path=sys.path, address=journal.address)
     done = subprocess.run(
         [sys.executable, "-c", script],
@@ -144,7 +144,7 @@ def test_a_process_ends_whose_journal_does_not_read(journal: Journal) -> None:
     assert (done.stdout, done.stderr, done.returncode) == ("all logged\n", "", 0)
 
 
-def test_a_journal_that_comes_back_is_told_what_it_missed(
+def test_a_recovered_journal_gets_the_count_of_dropped_records(
     journal: Journal, logger: logging.Logger
 ) -> None:
     logger.info("first")
@@ -155,7 +155,7 @@ def test_a_journal_that_comes_back_is_told_what_it_missed(
     (handler,) = logger.handlers
     assert isinstance(handler, LogThread)
     waiting = handler._queue
-    wait_for(lambda: not waiting.unfinished_tasks, "the record to be lost")
+    wait_for(lambda: not waiting.unfinished_tasks, "the record to be dropped")
     again = Journal(Path(journal.address))
     logger.info("second")
     assert again.read()["MESSAGE"] == "second"

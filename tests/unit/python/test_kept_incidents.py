@@ -1,4 +1,4 @@
-"""Frames are copied when an incident happens, whatever else is being written just then."""
+"""Frames are copied at the incident, even while another incident's file is being written."""
 
 import asyncio
 import os
@@ -39,7 +39,7 @@ def test_frames_are_copied_while_the_file_of_another_incident_is_written(
         file.write_bytes(b"")
 
     monkeypatch.setattr(incidents, "_write", slow_write)
-    # What a loop fills on.
+    # The loop continues to fill these frames.
     frames = _frames(b"before")
 
     def facts(runner: str) -> dict[str, Any]:
@@ -73,7 +73,7 @@ def test_frames_are_copied_while_the_file_of_another_incident_is_written(
 
 @pytest.fixture
 def held_writing(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[threading.Event, Any]]:
-    """Let no file be written before an event; the other one says that one has been begun."""
+    """Block writes of files until an event; yield it and an event set at the start of a write."""
     begun, may_write = threading.Event(), threading.Event()
 
     def held(_: int, file: Path, __: Any) -> None:
@@ -134,7 +134,7 @@ def test_a_runner_is_removed_while_its_incident_is_written(
             assert not await kept.all()
         finally:
             may_write.set()
-        # rtcfd ends with the file whole.
+        # rtcfd ends with a complete file.
         await daemon.runners.close(in_order=True)
         (incident,) = await kept.all()
         assert incident.file.endswith("-arm.mcap")
@@ -143,7 +143,7 @@ def test_a_runner_is_removed_while_its_incident_is_written(
 
 
 def _memory(rings: int, frames: int) -> int:
-    """Return rings of frames without values, all whole."""
+    """Return rings of frames without values, all complete."""
     words = frame_layout.HEAD_WORDS
     bytes_of_ring = frames * words * frame_layout.WORD.size
     begin = frame_layout.entry_at(frame_layout.ENTRIES)
@@ -159,7 +159,7 @@ def _memory(rings: int, frames: int) -> int:
     return _frames(bytes(memory))
 
 
-def test_what_is_written_anew_during_the_copy_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_frames_overwritten_during_the_copy_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     live = _memory(rings=2, frames=8)
     copy_all = copying._copy
 
@@ -168,8 +168,8 @@ def test_what_is_written_anew_during_the_copy_is_left_out(monkeypatch: pytest.Mo
         first, second = (
             frame_layout.ENTRY.unpack(os.pread(live, 48, frame_layout.entry_at(i))) for i in (0, 1)
         )
-        # The first ring makes room for another one; of the second, frame 0 has become frame 8,
-        # and frame 1 is just being written.
+        # The first ring is being reused; in the second, frame 0 has been replaced by frame 8, and
+        # frame 1 is being written.
         os.pwrite(live, struct.pack("<Q", 3), frame_layout.entry_at(0))
         assert first[0] == 1
         for place, mark in ((0, 2 * 8 + 2), (1, 2 * 9 + 1)):
@@ -184,7 +184,7 @@ def test_what_is_written_anew_during_the_copy_is_left_out(monkeypatch: pytest.Mo
 
 
 def _written(_: int, file: Path, facts: dict[str, Any]) -> None:
-    """Write what an incident's file says of itself, and nothing else."""
+    """Write only the description of an incident's file."""
     pairs = {"runner": facts["runner"], "time_ns": str(facts["time_ns"])}
     if "sequence" in facts:
         pairs["sequence"] = str(facts["sequence"])
@@ -194,7 +194,7 @@ def _written(_: int, file: Path, facts: dict[str, Any]) -> None:
         writer.close()
 
 
-def test_what_is_kept_is_listed_while_another_is_written(
+def test_stored_incidents_are_listed_while_another_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     writing, may_write = threading.Event(), threading.Event()
@@ -226,19 +226,19 @@ def test_what_is_kept_is_listed_while_another_is_written(
     asyncio.run(play())
 
 
-def test_the_newest_is_the_one_that_was_kept_last_whatever_the_clock_said(
+def test_incidents_are_ordered_by_number_not_by_clock(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(incidents, "_write", _written)
     hour_ns = 3600 * 10**9
 
     async def play() -> None:
-        # One of an rtcfd that did not count is older than all others.
+        # An incident of an rtcfd without numbering is older than all others.
         old = tmp_path / "incidents" / "old.mcap"
         old.parent.mkdir()
         _written(0, old, {"runner": "arm", "time_ns": 1000 * hour_ns})
         for _ in range(2):
-            kept = Incidents(tmp_path / "incidents", Limits)  # of another rtcfd
+            kept = Incidents(tmp_path / "incidents", Limits)  # from another rtcfd
             for now in (500, 100, 300):
                 await kept.keep(_frames(b"x"), {"runner": "arm", "time_ns": now * hour_ns})
         found = await kept.all()
@@ -246,7 +246,7 @@ def test_the_newest_is_the_one_that_was_kept_last_whatever_the_clock_said(
         hours = [each.time_ns // hour_ns for each in found]
         assert hours == [1000, 500, 100, 300, 500, 100, 300]
         assert await kept.get("") == found[-1]
-        # What is kept longest goes first.
+        # The oldest incident is removed first.
         size = found[-1].bytes
         incidents._tidy(tmp_path / "incidents", 3 * size, Path(found[-1].file))
         assert [each.sequence for each in await kept.all()] == [4, 5, 6]

@@ -1,4 +1,4 @@
-"""Enumerators that are none: refused wherever they come in."""
+"""Unknown enumerators are rejected in every request."""
 
 import json
 from collections.abc import Iterator
@@ -13,7 +13,7 @@ from rtcf.v1 import control_pb2, runner_pb2
 from rtcfd.common import known_values
 from rtcfd.common.refusals import InvalidArgument
 
-UNKNOWN: Any = 99  # of no enumeration
+UNKNOWN: Any = 99  # not a value of any enumeration
 REQUESTS = [
     method.input_type for method in control_pb2.DESCRIPTOR.services_by_name["Control"].methods
 ]
@@ -22,7 +22,7 @@ REQUESTS = [
 def enumerators(
     message: Descriptor, above: tuple[str, ...] = ()
 ) -> Iterator[list[FieldDescriptor]]:
-    """Yield the way to each enumerator of a message."""
+    """Yield the path to each enumerator of a message."""
     for field in message.fields:
         if field.enum_type is not None:
             yield [field]
@@ -32,12 +32,12 @@ def enumerators(
 
 
 def with_value(request: Descriptor, way: list[FieldDescriptor], value: int) -> Any:
-    """Return a request that has one value."""
+    """Return a request with one value set."""
     top = message = MessageFactory().GetPrototype(request)()
     for field in way[:-1]:
         inner = getattr(message, field.name)
         if field.label == FieldDescriptor.LABEL_REPEATED:
-            inner.add()  # another one, that is all right, before it
+            inner.add()  # a valid element before it
             message = inner.add()
         else:
             inner.SetInParent()
@@ -51,7 +51,7 @@ def with_value(request: Descriptor, way: list[FieldDescriptor], value: int) -> A
 
 
 @pytest.mark.parametrize("request_type", REQUESTS, ids=lambda each: str(each.name))
-def test_each_enumerator_of_a_request_is_one_that_is_known(request_type: Descriptor) -> None:
+def test_each_enumerator_of_a_request_is_checked(request_type: Descriptor) -> None:
     for way in enumerators(request_type):
         with pytest.raises(InvalidArgument, match=f"{way[-1].name} {UNKNOWN} is not known"):
             known_values.check(with_value(request_type, way, UNKNOWN))
@@ -59,11 +59,11 @@ def test_each_enumerator_of_a_request_is_one_that_is_known(request_type: Descrip
             known_values.check(with_value(request_type, way, known))
 
 
-def test_there_are_enumerators_to_look_at() -> None:
+def test_requests_have_enumerators() -> None:
     assert sum(len(list(enumerators(each))) for each in REQUESTS) > 20
 
 
-def test_a_setting_that_is_not_known_is_refused_and_not_stored(
+def test_an_unknown_setting_is_rejected_and_not_stored(
     daemon: DaemonUnderTest, client: rtcf.Client
 ) -> None:
     client.set_runner(runner_pb2.RunnerSettings(frequency_hz=250.0))
@@ -100,7 +100,7 @@ def test_a_setting_that_is_not_known_is_refused_and_not_stored(
         ),
     ],
 )
-def test_a_state_with_a_value_that_is_not_known_is_set_aside(
+def test_a_state_with_an_unknown_value_is_set_aside(
     stopped_daemon: DaemonUnderTest, place: Any, what: str
 ) -> None:
     stopped_daemon.start()

@@ -1,4 +1,4 @@
-"""What rt_runner and rt_launcher make of their private parameters and arguments."""
+"""Private parameters and arguments of rt_runner and rt_launcher."""
 
 import os
 from typing import Any
@@ -85,7 +85,7 @@ def test_each_parameter_of_a_runner_is_a_setting() -> None:
     )  # fmt: skip
 
 
-def test_what_is_not_said_is_left_to_the_daemon() -> None:
+def test_missing_parameters_are_left_to_the_daemon() -> None:
     found, lines = runner_parameters.read({})
     assert found.settings == runner_pb2.RunnerSettings()
     assert (found.mode, found.daemon, found.exit_on_fault, lines) == ("no_wait", "auto", True, [])
@@ -93,12 +93,12 @@ def test_what_is_not_said_is_left_to_the_daemon() -> None:
     assert found.mode == "wait_for_components"
 
 
-def test_what_rtcf_2021_took_is_taken() -> None:
+def test_parameters_of_rtcf_2021_are_accepted() -> None:
     found, lines = runner_parameters.read({"mode": "No_Wait", "safe_stack_size_kB": 0})
     assert (found.mode, found.settings.stack_kb, lines) == ("no_wait", 16, [])
 
 
-def test_numbers_are_taken_as_roscpp_took_them() -> None:
+def test_numbers_are_converted_as_in_roscpp() -> None:
     last = max(os.sched_getaffinity(0))
     found, _ = runner_parameters.read(
         {
@@ -165,7 +165,7 @@ def test_a_wrong_parameter_of_a_runner_is_one_clear_line(
     assert message in refusal_of(values)
 
 
-def test_a_parameter_that_is_not_known_is_a_warning_with_what_it_resembles() -> None:
+def test_an_unknown_parameter_is_a_warning_with_a_suggestion() -> None:
     _, lines = runner_parameters.read(
         {"freqency": 1000, "robot": "r1", "rtcf_runner": {"socket": "/s"}}
     )
@@ -175,7 +175,7 @@ def test_a_parameter_that_is_not_known_is_a_warning_with_what_it_resembles() -> 
     ]
 
 
-def test_a_launcher_keeps_its_own_parameters_and_leaves_the_component_the_others() -> None:
+def test_a_launcher_passes_other_parameters_to_the_component() -> None:
     found, notes = component_parameters.read(
         {
             "runner": "arm",
@@ -194,7 +194,7 @@ def test_a_launcher_keeps_its_own_parameters_and_leaves_the_component_the_others
     assert notes == []
 
 
-def test_a_launchers_own_parameters_give_way_to_the_components() -> None:
+def test_the_components_parameters_precede_the_launchers() -> None:
     values = {"every": 0.5, "phase": 1, "optional": True, "runner": "arm", "rtcf_every": 2}
     found, notes = component_parameters.read(values, ["every", "phase", "optional", "runner"])
     assert (found.every, found.phase, found.optional, found.runner) == (2, None, False, None)
@@ -205,7 +205,7 @@ def test_a_launchers_own_parameters_give_way_to_the_components() -> None:
     )
 
 
-def test_values_that_do_not_fit_a_launcher_are_the_components_and_that_is_said() -> None:
+def test_values_unsuitable_for_a_launcher_go_to_the_component_with_a_note() -> None:
     found, notes = component_parameters.read({"every": 0.5, "phase": 2, "on_lease_lost": "die"})
     assert (found.every, found.phase) == (0, None)
     assert found.others == {"every": 0.5, "phase": 2, "on_lease_lost": "die"}
@@ -237,7 +237,7 @@ def test_a_wrong_parameter_of_a_launcher_is_named(values: dict[str, Any]) -> Non
     assert f"~{next(iter(values))} " in str(found.value)
 
 
-def test_declared_parameters_get_values_of_their_kind() -> None:
+def test_declared_parameters_get_values_of_their_type() -> None:
     declared = {name: graph_pb2.ParameterInfo(name=name, type="double") for name in ("kp", "limit")}
     settings, rest, slips = component_parameters.settings({"kp": 2, "gains": {"a": 1}}, declared)
     assert [(each.name, each.value.int_value) for each in settings] == [("kp", 2)]
@@ -249,7 +249,7 @@ def test_declared_parameters_get_values_of_their_kind() -> None:
         component_parameters.settings({"kp": [1, 2]}, declared)
 
 
-def test_arguments_are_those_of_a_ros_node() -> None:
+def test_arguments_are_parsed_as_by_a_ros_node() -> None:
     given = arguments.parse(
         ["pkg", "Type", "in:=/a", "_kp:=2.5", "_label:='7'", "__name:=H1", "__log:=/l/H1-2.log"],
         {"ROS_NAMESPACE": "arm/left", "ROS_MASTER_URI": "http://m:1", "ROS_IP": "10.0.0.1"},
@@ -263,7 +263,7 @@ def test_arguments_are_those_of_a_ros_node() -> None:
     assert given.log_file == "/l/H1-2.log"
 
 
-def test_a_relative_runner_is_looked_for_from_the_own_namespace_upward() -> None:
+def test_a_relative_runner_is_searched_from_the_own_namespace_upward() -> None:
     assert arguments.upward("rt_runner", "/arm/left") == [
         "/arm/left/rt_runner",
         "/arm/rt_runner",
@@ -273,19 +273,19 @@ def test_a_relative_runner_is_looked_for_from_the_own_namespace_upward() -> None
     assert runner_name("/arm/left/rt_runner") == "arm_left_rt_runner"
 
 
-def test_masters_are_the_same_if_host_and_port_are() -> None:
+def test_masters_are_equal_if_host_and_port_are() -> None:
     assert daemon_choice.same_master("http://localhost:11311", "http://127.0.0.1:11311/")
     assert not daemon_choice.same_master("http://localhost:11311", "http://localhost:11312")
     assert not daemon_choice.same_master("http://localhost:11311", "http://robot.example:11311")
 
 
-def test_the_component_is_named_by_arguments_with_options_anywhere_or_by_parameters() -> None:
+def test_the_component_is_named_by_arguments_or_parameters() -> None:
     for words in (["-f", "pkg", "T"], ["--is_first", "pkg", "ns::T"], ["pkg", " T ", "-f"]):
         assert Words.parse(words).joined({"gain": 1}) == Words("pkg", "T", True)
     assert Words.parse(["pkg", "T"]).joined({}) == Words("pkg", "T")
     values = {"rt_package": "pkg", "rt_type": "T", "gain": 1}
     assert Words.parse(["-f"]).joined(values) == Words("pkg", "T", True)
-    assert values == {"gain": 1}  # the component's alone
+    assert values == {"gain": 1}  # only the component's
 
 
 @pytest.mark.parametrize(
@@ -301,7 +301,7 @@ def test_the_component_is_named_by_arguments_with_options_anywhere_or_by_paramet
         ([], {"rt_type": 5, "rt_package": "pkg"}, "~rt_type must be a string, not 5"),
     ],
 )
-def test_a_component_that_is_not_named_once_is_refused(
+def test_a_component_named_not_exactly_once_is_rejected(
     words: list[str], values: dict[str, Any], message: str
 ) -> None:
     with pytest.raises(Ending) as raised:

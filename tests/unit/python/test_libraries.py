@@ -1,4 +1,4 @@
-"""Libraries that do not load, and others of the same package in another folder."""
+"""Libraries that fail to load, and libraries of the same package in several folders."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from daemon_under_test import DaemonUnderTest, wait_for
 
 @pytest.fixture
 def later(stopped_daemon: DaemonUnderTest) -> Path:
-    """Give a second folder of the search path, with a library of the package demo."""
+    """Return a second folder of the search path, with a library of the package demo."""
     folder = stopped_daemon.folder / "later"
     (folder / "demo").mkdir(parents=True)
     library = folder / "demo" / "main.so"
@@ -19,12 +19,12 @@ def later(stopped_daemon: DaemonUnderTest) -> Path:
 
 
 def offered(client: rtcf.Client, name: str) -> str:
-    """Return the library that a type is taken from."""
+    """Return the library that provides a type."""
     (library,) = (each.library for each in client.list_types("demo").types if each.type == name)
     return str(library)
 
 
-def test_a_library_that_no_longer_loads_is_not_replaced_by_one_of_another_folder(
+def test_a_broken_library_is_not_replaced_by_one_of_another_folder(
     stopped_daemon: DaemonUnderTest, later: Path
 ) -> None:
     first = stopped_daemon.packages / "demo" / "main.so"
@@ -39,17 +39,17 @@ def test_a_library_that_no_longer_loads_is_not_replaced_by_one_of_another_folder
             f"demo/Fine: {first} does not load, and {later} in a later folder does not replace "
             f"it: repair or remove {first}: {first}: undefined symbol: _ZN3FooE"
         )
-        # Nothing is offered that cannot be loaded.
+        # Only loadable types are offered.
         listed = client.list_types("demo")
         assert [each.type for each in listed.types] == []
         assert listed.problems == [f"{first}: undefined symbol: _ZN3FooE"]
-        # On request: without the first one, the later one is the first.
+        # By a deliberate change: without the first library, the later one is used.
         first.unlink()
         client.load(rtcf.component("demo", "Fine", name="b"))
         assert offered(client, "Fine") == str(later)
 
 
-def test_a_component_whose_library_no_longer_loads_is_left_out_at_the_next_start(
+def test_a_component_of_a_broken_library_is_left_out_at_the_next_start(
     stopped_daemon: DaemonUnderTest, later: Path
 ) -> None:
     with stopped_daemon.client() as client:

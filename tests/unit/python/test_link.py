@@ -1,4 +1,4 @@
-"""The link to an executor: overlapping requests, limits, a peer that misbehaves."""
+"""The link to an executor: concurrent requests, limits, a misbehaving peer."""
 
 import asyncio
 from collections.abc import Awaitable, Callable
@@ -40,7 +40,7 @@ async def received(reader: asyncio.StreamReader) -> wire.Request:
     return request
 
 
-def test_answers_find_their_requests_in_any_order(tmp_path: Path) -> None:
+def test_answers_are_matched_to_requests_in_any_order(tmp_path: Path) -> None:
     async def peer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         requests = [await received(reader) for _ in range(3)]
         for request in reversed(requests):
@@ -60,7 +60,7 @@ def test_answers_find_their_requests_in_any_order(tmp_path: Path) -> None:
     against(tmp_path, peer, test)
 
 
-def test_no_answer_in_time_is_unavailable(tmp_path: Path) -> None:
+def test_a_timeout_is_unavailable(tmp_path: Path) -> None:
     async def peer(reader: asyncio.StreamReader, _: asyncio.StreamWriter) -> None:
         await reader.read()
 
@@ -81,7 +81,7 @@ def test_no_answer_in_time_is_unavailable(tmp_path: Path) -> None:
     ],
     ids=["end of stream", "half a length", "too long", "no message"],
 )
-def test_a_peer_that_breaks_off_fails_what_waits(tmp_path: Path, reply: bytes) -> None:
+def test_a_broken_connection_fails_waiting_requests(tmp_path: Path, reply: bytes) -> None:
     async def peer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         await received(reader)
         writer.write(reply)
@@ -97,7 +97,7 @@ def test_a_peer_that_breaks_off_fails_what_waits(tmp_path: Path, reply: bytes) -
     against(tmp_path, peer, test)
 
 
-def test_both_say_which_protocol_they_speak(tmp_path: Path) -> None:
+def test_both_sides_send_their_protocol_version(tmp_path: Path) -> None:
     async def peer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         request = await received(reader)
         answer = wire.HelloResult(protocol=request.hello.protocol + 7)

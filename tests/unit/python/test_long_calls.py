@@ -1,4 +1,4 @@
-"""Calls that last: each of their messages is looked at, and who loses a right meanwhile is told."""
+"""Lasting calls: each message is checked, and a client that loses a right is told."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -51,7 +51,7 @@ LASTING = ["events -f", "stats --watch 0.1"]
 
 
 @pytest.mark.parametrize("command", [*LASTING, "logs -f"])
-def test_who_watches_a_runner_that_never_was_is_told(daemon: DaemonUnderTest, command: str) -> None:
+def test_watching_an_unknown_runner_is_an_error(daemon: DaemonUnderTest, command: str) -> None:
     done = daemon.ctl("-r", "nobody", *command.split())
     assert done.returncode == 1
     assert done.stderr == (
@@ -60,7 +60,7 @@ def test_who_watches_a_runner_that_never_was_is_told(daemon: DaemonUnderTest, co
 
 
 @pytest.mark.parametrize("command", LASTING)
-def test_who_watches_a_runner_is_told_when_it_is_removed(
+def test_a_watcher_is_told_when_its_runner_is_removed(
     daemon: DaemonUnderTest, client: rtcf.Client, command: str
 ) -> None:
     client.add_runner("arm")
@@ -78,7 +78,7 @@ def test_who_watches_a_runner_is_told_when_it_is_removed(
         assert " arm runner_removed: runner removed" in shown.splitlines()[-1]
 
 
-def test_a_source_is_watched_as_long_as_its_component_is_there(
+def test_a_source_is_watched_while_its_component_exists(
     client: rtcf.Client, tmp_path: Path
 ) -> None:
     source = tmp_path / "source.py"
@@ -99,12 +99,12 @@ def test_a_source_is_watched_as_long_as_its_component_is_there(
 @pytest.mark.parametrize(
     "stream",
     [
-        # From the begin on, so that there is one at once.
+        # From the start on, so that one exists immediately.
         "client.watch_events(after=Place())",
         "client.watch_statistics(interval_s=0.1)",
     ],
 )
-def test_who_watches_sees_nothing_more_when_the_right_is_gone(stream: str) -> None:
+def test_a_watch_ends_when_the_right_is_withdrawn(stream: str) -> None:
     program = WATCH.format(stream=stream)
     with (
         open_to_strangers(rules("observe")) as daemon,
@@ -121,7 +121,7 @@ def test_who_watches_sees_nothing_more_when_the_right_is_gone(stream: str) -> No
 
 
 @root_only
-def test_a_later_message_takes_the_right_too() -> None:
+def test_later_messages_require_the_right_too() -> None:
     with (
         open_to_strangers(rules("admin")) as daemon,
         stranger(HOLD, str(daemon.socket)) as holder,
@@ -151,7 +151,7 @@ def test_a_later_message_takes_the_right_too() -> None:
     ],
     ids=["malformed", "too long"],
 )
-def test_a_second_message_that_is_refused_ends_the_call_and_what_it_holds(
+def test_a_rejected_second_message_ends_the_call_and_its_lease(
     daemon: DaemonUnderTest, client: rtcf.Client, message: bytes, said: str
 ) -> None:
     opening = control_pb2.OpenLease(
@@ -173,4 +173,4 @@ def test_a_second_message_that_is_refused_ends_the_call_and_what_it_holds(
         requests.put(None)
     assert refused.value.code() == grpc.StatusCode.INVALID_ARGUMENT
     assert said in refused.value.details()
-    wait_for(lambda: not client.list_components(), "the end of what was held")
+    wait_for(lambda: not client.list_components(), "the end of the lease")

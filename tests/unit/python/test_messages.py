@@ -1,4 +1,4 @@
-"""The messages and services that RTCF 2021 has: its bags, scripts and peers go by their sums."""
+"""Messages and services of RTCF 2021, whose MD5 sums its bags, scripts and peers rely on."""
 
 from pathlib import Path
 
@@ -25,7 +25,7 @@ SERVICES = {
 
 
 @pytest.mark.parametrize("name", MESSAGES)
-def test_a_message_of_rtcf_2021_keeps_its_sum(name: str) -> None:
+def test_a_message_of_rtcf_2021_keeps_its_md5_sum(name: str) -> None:
     context = MsgContext.create_default()
     file = FOLDER / "msg" / f"{name}.msg"
     message = load_msg_from_file(context, str(file), f"rtcf_msgs/{name}")
@@ -34,7 +34,7 @@ def test_a_message_of_rtcf_2021_keeps_its_sum(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", SERVICES)
-def test_a_service_of_rtcf_2021_keeps_its_sum(name: str) -> None:
+def test_a_service_of_rtcf_2021_keeps_its_md5_sum(name: str) -> None:
     context = MsgContext.create_default()
     file = FOLDER / "srv" / f"{name}.srv"
     service = load_srv_from_file(context, str(file), f"rtcf_msgs/{name}")

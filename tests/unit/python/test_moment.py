@@ -1,4 +1,4 @@
-"""What is kept of a stream until the moment that is waited for."""
+"""The cycles of a stream that are kept around a condition."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,7 @@ def _batch(first: int, count: int, lost: int = 0, last: bool = False) -> PortBat
     return PortBatch(PortSchema(), 1, first, lost, False, message)
 
 
-def test_no_more_is_kept_than_is_asked_for_also_where_cycles_were_lost() -> None:
+def test_only_the_requested_span_is_kept_even_if_cycles_were_dropped() -> None:
     moment = Moment(_At(9_005), pre_s=0.1, post_s=0.01)  # type: ignore[arg-type]
     kept: list[PortBatch] = []
     for first in range(0, 10_000, 10):
@@ -41,12 +41,12 @@ def test_no_more_is_kept_than_is_asked_for_also_where_cycles_were_lost() -> None
     assert cycles == list(range(8_905, 9_016))
 
 
-def test_it_is_over_when_the_loop_is() -> None:
+def test_it_ends_with_the_loop() -> None:
     moment = Moment(_At(5), pre_s=0.1, post_s=60.0)  # type: ignore[arg-type]
     assert moment.take(_batch(0, 10)) and not moment.over
     (end,) = moment.take(_batch(10, 10, last=True))
     assert len(end) == 10 and moment.over
-    # The same if the moment is in the loop's last cycles, and not before there was one.
+    # The same for a condition in the loop's last cycles; an earlier end does not count.
     moment = Moment(_At(5), pre_s=0.1, post_s=60.0)
     assert not moment.take(_batch(0, 3, last=True)) and not moment.over
     assert moment.take(_batch(0, 10, last=True)) and moment.over

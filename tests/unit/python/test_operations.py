@@ -1,4 +1,4 @@
-"""Operations of one kind: queued ones are withdrawn, begun ones run to their end; stop is final."""
+"""Order of operations: queued ones can be withdrawn, started ones finish; a stop is final."""
 
 import asyncio
 import contextlib
@@ -22,14 +22,14 @@ RUNNING, STOPPED = runner_pb2.RUNNER_STATE_RUNNING, runner_pb2.RUNNER_STATE_STOP
 
 
 class Held:
-    """What the peer executors wait for; see peer_executor.py."""
+    """Delays in the peer executors; see peer_executor.py."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         folder.mkdir()
 
     def waits(self, kind: str) -> Callable[[], bool]:
-        """Return what tells whether an executor has come to it."""
+        """Return a function that tells whether an executor waits there."""
         return (self.folder / f"{kind} waits").exists
 
     @contextlib.contextmanager
@@ -42,7 +42,7 @@ class Held:
 
 
 class Call(threading.Thread):
-    """A call by a client of its own, in the background."""
+    """A call by a separate client, in the background."""
 
     def __init__(self, daemon: DaemonUnderTest, do: Callable[[rtcf.Client], Any]) -> None:
         super().__init__()
@@ -85,19 +85,19 @@ def status(daemon: DaemonUnderTest) -> runner_pb2.RunnerStatus:
 
 
 def busy_with(daemon: DaemonUnderTest, what: str) -> None:
-    """Wait until an operation holds the turn: it shows after a while."""
+    """Wait until the status shows a running operation, which takes a while."""
     wait_for(lambda: what in status(daemon).status, what)
 
 
 def ask_and_leave(
     daemon: DaemonUnderTest, method: str, request: Any, until: Callable[[], Any] | None = None
 ) -> None:
-    """Ctrl-C on a client: once `until` is true, or its call is surely queued."""
+    """Interrupt a client, as Ctrl-C does, once `until` is true or its call is surely queued."""
     before = daemon.log().count("its caller disconnected")
     with daemon.client() as client:
         ask = getattr(client._stub, method)
         call = ask.future(request) if hasattr(ask, "future") else ask(request)
-        # Calls of one connection are taken in their order.
+        # Calls of one connection are received in order.
         client.get_status()
         if until is not None:
             wait_for(until, "the call to begin")
@@ -107,7 +107,7 @@ def ask_and_leave(
     )
 
 
-def test_what_waits_is_withdrawn_when_its_caller_leaves(
+def test_a_queued_call_is_withdrawn_when_its_client_leaves(
     service: DaemonUnderTest, held: Held
 ) -> None:
     with held.back("set_parameters"):
@@ -119,20 +119,20 @@ def test_what_waits_is_withdrawn_when_its_caller_leaves(
     assert "the start is done" not in service.log()
 
 
-def test_a_start_that_waits_is_withdrawn_by_a_stop(service: DaemonUnderTest, held: Held) -> None:
+def test_a_stop_withdraws_a_queued_start(service: DaemonUnderTest, held: Held) -> None:
     with held.back("set_parameters"):
         call = Call(service, lambda c: c.set_parameters("a", [rtcf.parse_parameter("kp:=2.0")]))
         busy_with(service, "a change of parameters")
         starting = Call(service, lambda c: c.start())
         with service.client() as client:
-            wait_for(lambda: client.stop() and not starting.is_alive(), "the start to be refused")
+            wait_for(lambda: client.stop() and not starting.is_alive(), "the start to fail")
     assert "withdrawn: the loop was stopped after the request" in starting.end()
     assert call.end() == ""
     assert status(service).state == STOPPED
     assert service.saved()["running"] is False
 
 
-def test_a_start_under_way_does_not_outlive_a_stop(service: DaemonUnderTest, held: Held) -> None:
+def test_a_stop_ends_a_start_in_progress(service: DaemonUnderTest, held: Held) -> None:
     with held.back("start"):
         starting = Call(service, lambda c: c.start())
         busy_with(service, "the start")
@@ -143,7 +143,9 @@ def test_a_start_under_way_does_not_outlive_a_stop(service: DaemonUnderTest, hel
     assert service.saved()["running"] is False
 
 
-def test_a_stop_whose_caller_leaves_is_done_and_saved(service: DaemonUnderTest, held: Held) -> None:
+def test_a_stop_without_its_client_is_executed_and_saved(
+    service: DaemonUnderTest, held: Held
+) -> None:
     with service.client() as client:
         client.start()
     with held.back("stop"):
@@ -153,7 +155,7 @@ def test_a_stop_whose_caller_leaves_is_done_and_saved(service: DaemonUnderTest, 
 
 
 @pytest.mark.parametrize("kind", ["stop", "get_statistics"])
-def test_what_the_end_of_an_executor_cuts_off_is_answered_with_what_is_known_of_that(
+def test_calls_cut_off_by_the_end_of_an_executor_get_its_reason(
     service: DaemonUnderTest, held: Held, kind: str
 ) -> None:
     with service.client() as client:
@@ -161,7 +163,7 @@ def test_what_the_end_of_an_executor_cuts_off_is_answered_with_what_is_known_of_
         with held.back(kind):
             notes: list[str] = []
             asks: dict[str, Callable[[rtcf.Client], object]] = {
-                "stop": lambda c: notes.extend(c.stop().notes),  # the loop has ended: no refusal
+                "stop": lambda c: notes.extend(c.stop().notes),  # the loop has ended: no error
                 "get_statistics": lambda c: c.get_statistics(),
             }
             call = Call(service, asks[kind])
@@ -176,7 +178,7 @@ def test_what_the_end_of_an_executor_cuts_off_is_answered_with_what_is_known_of_
     assert "while /a.update was running" in known
 
 
-def test_the_end_of_a_loop_is_not_overtaken_by_the_answer_to_its_start(
+def test_the_answer_to_a_start_does_not_hide_the_end_of_the_loop(
     service: DaemonUnderTest, held: Held
 ) -> None:
     with held.back("brief"), service.client() as client:
@@ -188,7 +190,7 @@ def test_the_end_of_a_loop_is_not_overtaken_by_the_answer_to_its_start(
     assert "rt_runner stopped" in ready[-1]
 
 
-def test_a_runner_whose_holder_dies_while_it_is_taken_is_given_back(
+def test_a_runner_is_released_if_its_holder_dies_during_the_lease(
     service: DaemonUnderTest, held: Held
 ) -> None:
     with service.client() as client:
@@ -199,17 +201,17 @@ def test_a_runner_whose_holder_dies_while_it_is_taken_is_given_back(
             next(iter(tenancy))
             wait_for(lambda: status(service).holder == "somebody", "the hold")
             tenancy.drop()
-        wait_for(lambda: not status(service).holder, "the runner to be given back")
+        wait_for(lambda: not status(service).holder, "the release of the runner")
     wait_for(lambda: service.saved()["hold"] is None, "the state on disk")
 
 
-def test_a_leased_load_that_rtcfd_leaves_half_done_is_still_leased(
+def test_a_leased_load_interrupted_by_the_end_of_rtcfd_stays_leased(
     service: DaemonUnderTest, held: Held
 ) -> None:
     with held.back("load"), service.client() as client:
         spec = rtcf.component("demo", "Fine", name="leased")
         tenancy = client.lease_component(control_pb2.OpenLease(component=spec, holder="somebody"))
-        wait_for(lambda: "/leased" in service.saved()["leased"], "the terms on disk")
+        wait_for(lambda: "/leased" in service.saved()["leased"], "the settings on disk")
         service.end(signal.SIGUSR1)
         tenancy.drop()
     service.start_service()
@@ -218,7 +220,7 @@ def test_a_leased_load_that_rtcfd_leaves_half_done_is_still_leased(
         wait_for(lambda: len(client.list_components()) == 1, "the end of the lease")
 
 
-def test_a_start_during_a_restart_waits_for_the_executor_to_be_gone(
+def test_a_start_during_a_restart_waits_for_the_end_of_the_executor(
     service: DaemonUnderTest, held: Held
 ) -> None:
     before = service.executor_pid()
@@ -233,7 +235,7 @@ def test_a_start_during_a_restart_waits_for_the_executor_to_be_gone(
 
 
 @pytest.mark.parametrize("method", ["RemoveRunner", "RestartRunner"])
-def test_what_has_begun_ends_without_its_caller(
+def test_a_started_operation_finishes_without_its_client(
     service: DaemonUnderTest, held: Held, method: str
 ) -> None:
     before = service.executor_pid()
@@ -242,26 +244,24 @@ def test_what_has_begun_ends_without_its_caller(
         ask_and_leave(service, method, request, held.waits("exit"))
     with service.client() as client:
         if method == "RemoveRunner":
-            wait_for(lambda: not client.get_status().runners, "the runner to be gone")
+            wait_for(lambda: not client.get_status().runners, "the removal of the runner")
             assert not (service.state / "rt_runner.json").exists()
         else:
             wait_for(lambda: status(service).pid not in (0, before), "another executor")
             assert status(service).state == STOPPED
 
 
-def test_a_refused_graph_leaves_no_runner_behind_whoever_waits(
-    service: DaemonUnderTest, held: Held
-) -> None:
+def test_a_rejected_graph_leaves_no_runner_behind(service: DaemonUnderTest, held: Held) -> None:
     spec = rtcf.component("demo", "Refused")
     request = control_pb2.ApplyRequest(runner="arm", components=[spec])
     with held.back("apply"):
         ask_and_leave(service, "Apply", request, held.waits("apply"))
     with service.client() as client:
-        wait_for(lambda: len(client.get_status().runners) == 1, "the new runner to be gone")
+        wait_for(lambda: len(client.get_status().runners) == 1, "the removal of the new runner")
     assert not (service.state / "arm.json").exists()
 
 
-# -- what was stopped in order stays stopped ------------------------------------------
+# -- a loop stopped in order stays stopped ----------------------------------------------
 
 
 def started(service: DaemonUnderTest, on_boot: "runner_pb2.OnBoot") -> None:
@@ -271,7 +271,7 @@ def started(service: DaemonUnderTest, on_boot: "runner_pb2.OnBoot") -> None:
 
 
 @pytest.mark.parametrize("on_boot", [runner_pb2.ON_BOOT_RESUME, runner_pb2.ON_BOOT_START])
-def test_what_an_administrator_ended_stays_stopped(
+def test_a_loop_ended_by_an_administrator_stays_stopped(
     service: DaemonUnderTest, on_boot: "runner_pb2.OnBoot"
 ) -> None:
     started(service, on_boot)
@@ -281,7 +281,7 @@ def test_what_an_administrator_ended_stays_stopped(
     assert status(service).state == STOPPED
 
 
-def test_what_ran_until_the_machine_went_down_runs_again(
+def test_a_loop_that_ran_until_the_shutdown_runs_again(
     service: DaemonUnderTest, tmp_path: Path
 ) -> None:
     folder = tmp_path / "bin"
@@ -317,10 +317,10 @@ def test_a_fresh_image_starts_its_loop(held: Held, stopped_daemon: DaemonUnderTe
     assert status(stopped_daemon).state == RUNNING
 
 
-# -- the daemon's own ------------------------------------------------------------------
+# -- the daemon itself ------------------------------------------------------------------
 
 
-def test_an_obstacle_to_one_executor_is_said_and_the_rest_is_served(
+def test_an_obstacle_to_one_executor_is_reported_and_others_run(
     held: Held, stopped_daemon: DaemonUnderTest
 ) -> None:
     obstacle = stopped_daemon.folder / "run" / "executors" / "rt_runner.sock"
@@ -356,14 +356,14 @@ def reload(service: DaemonUnderTest) -> str:
     ).stdout  # fmt: skip
 
 
-def test_a_reload_finds_its_daemon_and_says_what_ros_may_now(service: DaemonUnderTest) -> None:
+def test_a_reload_reports_the_rights_of_ros_peers(service: DaemonUnderTest) -> None:
     service.settings.write_text(
         f'[daemon]\nsocket = "{service.socket}"\n[runner.ros]\npeers = "tune"\n'
     )
     assert "defaults of runners changed" in reload(service)
 
 
-def test_a_graph_that_a_reload_refused_is_tried_again(service: DaemonUnderTest) -> None:
+def test_a_graph_rejected_by_a_reload_is_tried_again(service: DaemonUnderTest) -> None:
     service.settings.write_text(f'[daemon]\nsocket = "{service.socket}"\n')
     (service.graphs / "rt.yaml").write_text(
         "runner: rt_runner\ncomponents:\n  - {package: late, type: Fine}\n"
@@ -373,7 +373,7 @@ def test_a_graph_that_a_reload_refused_is_tried_again(service: DaemonUnderTest) 
     assert "2 differences applied" in reload(service)
 
 
-def test_of_two_removals_at_once_neither_is_answered_before_the_executor_is_gone(
+def test_simultaneous_removals_wait_for_the_end_of_the_executor(
     rtcfd: Callable[[], Rtcfd],
 ) -> None:
     async def play() -> None:
@@ -403,7 +403,7 @@ def test_of_two_removals_at_once_neither_is_answered_before_the_executor_is_gone
     asyncio.run(play())
 
 
-def test_a_runner_that_is_being_forgotten_gets_no_new_executor(
+def test_a_runner_being_removed_gets_no_new_executor(
     rtcfd: Callable[[], Rtcfd], machine: Machine
 ) -> None:
     async def play() -> None:
@@ -411,7 +411,7 @@ def test_a_runner_that_is_being_forgotten_gets_no_new_executor(
         await daemon.start()
         await daemon.call("AddRunner", control_pb2.AddRunnerRequest(runner="arm"))
         runner = daemon.runners.get("arm")
-        await runner.shut_down()  # as a removal begins; then what is on disk goes
+        await runner.shut_down()  # the first step of a removal; the state on disk follows
         restart = asyncio.create_task(runner.restart())
         while not restart.done():
             assert not [path for path in machine.peers if "arm" in path]

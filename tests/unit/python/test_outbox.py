@@ -1,4 +1,4 @@
-"""What a slow holder of a lease costs: counted log records, nothing else."""
+"""A slow lease holder loses counted log records, and nothing else."""
 
 import asyncio
 from typing import Any
@@ -14,7 +14,7 @@ def collect(outbox: Outbox) -> list[Any]:
     return asyncio.run(run())
 
 
-def test_a_slow_holder_loses_the_oldest_records_only_and_they_are_counted() -> None:
+def test_a_slow_holder_loses_only_the_oldest_records_counted() -> None:
     outbox = Outbox(control_pb2.LeaseComponentResponse)
     outbox.say(loaded=control_pb2.ChangeResult(component="/a"))
     for i in range(MOST_RECORDS + 5):
@@ -37,7 +37,7 @@ def test_a_slow_holder_gets_the_newest_report_only() -> None:
     assert [message.report.components for message in collect(outbox)[:-1]] == [99]
 
 
-def test_the_first_reason_of_an_end_counts() -> None:
+def test_the_first_reason_of_an_end_is_kept() -> None:
     outbox = Outbox(control_pb2.HoldRunnerResponse)
     outbox.end(control_pb2.LeaseEnded.WHY_FAILED, "first")
     outbox.end(control_pb2.LeaseEnded.WHY_DAEMON_ENDED, "second")

@@ -1,4 +1,4 @@
-"""What our packages depend on: what they run, and nothing of the size of a compiler besides."""
+"""Dependencies of the packages: exactly the needed programs, and no compiler without need."""
 
 import re
 import subprocess
@@ -8,10 +8,10 @@ import pytest
 from daemon_under_test import BUILD_TREE
 from pages import TREE
 
-# With what is run of each.
+# With the compilers that each package calls.
 COMPILERS = {
-    "librtcf-dev": {"cmake", "g++"},  # components are built with them
-    "rtcf-python": {"g++"},  # rtcf-compile calls it
+    "librtcf-dev": {"cmake", "g++"},  # to build components
+    "rtcf-python": {"g++"},  # called by rtcf-compile
 }
 _COMPILER = re.compile(
     r"cmake|make|ninja-build|g\+\+.*|gcc.*|cpp.*|build-essential|lld.*|rustc|ccache"
@@ -38,7 +38,7 @@ SOURCE, *BINARIES = _paragraphs()
 
 
 @pytest.mark.parametrize("package", BINARIES, ids=[each["Package"].strip() for each in BINARIES])
-def test_a_package_pulls_no_compiler_that_it_does_not_run(package: dict[str, str]) -> None:
+def test_a_package_depends_on_no_compiler_that_it_does_not_run(package: dict[str, str]) -> None:
     name = package["Package"].strip()
     pulled = [*_names(package["Depends"]), *_names(package.get("Recommends", ""))]
     assert pulled
@@ -52,13 +52,13 @@ def test_the_checker_needs_no_more_than_an_executor_and_a_symbolizer() -> None:
         "binutils", "rtcfctl", "rtcfd", "${misc", "${shlibs",
     ]  # fmt: skip
     assert "Recommends" not in checker
-    # addr2line is binutils'.
+    # addr2line is a part of binutils.
     assert '"addr2line"' in (TREE / "client" / "rtcf" / "checking.py").read_text()
 
 
 @pytest.mark.parametrize("paragraph", [SOURCE, *BINARIES])
 @pytest.mark.parametrize("field", ["Build-Depends", "Depends", "Recommends", "Suggests"])
-def test_nothing_is_named_twice(paragraph: dict[str, str], field: str) -> None:
+def test_no_dependency_is_listed_twice(paragraph: dict[str, str], field: str) -> None:
     names = [each for each in _names(paragraph.get(field, "")) if not each.startswith("$")]
     assert len(names) == len(set(names)), sorted(names)
 
@@ -70,7 +70,7 @@ def test_nothing_is_named_twice(paragraph: dict[str, str], field: str) -> None:
         (("--python",), ["rtcf-python", "python3-pytest"]),
     ],
 )
-def test_a_new_package_builds_and_tests_with_what_comes_along(
+def test_a_new_package_builds_and_tests_with_the_dependencies(
     tmp_path: Path, language: tuple[str, ...], needed: list[str]
 ) -> None:
     done = subprocess.run(

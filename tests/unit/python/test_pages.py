@@ -1,4 +1,4 @@
-"""Lists in pages: whole, in order, never too large, and never of two different lists."""
+"""Paged lists: complete, in order, of limited size, and never mixed from two lists."""
 
 import pytest
 from hypothesis import given, seed, settings
@@ -12,7 +12,7 @@ Request = control_pb2.ListComponentsRequest
 
 
 def whole(names: list[str], size: int) -> tuple[list[str], int]:
-    """Return a list as a client gets it, and in how many pages."""
+    """Return a list as a client gets it, and the number of its pages."""
     found: list[str] = []
     request = Request(page_size=size)
     for count in range(1, len(names) + 2):
@@ -34,7 +34,7 @@ def test_pages_make_up_the_list(names: list[str], size: int) -> None:
     assert count == (max(-(-len(names) // size), 1) if size else 1)
 
 
-def test_a_page_ends_where_a_message_of_any_client_would() -> None:
+def test_a_page_fits_any_clients_message_limit() -> None:
     entries = [graph_pb2.ComponentInfo(full_name=f"/{n}", doc="x" * 300_000) for n in range(20)]
     request = Request()
     found = 0
@@ -48,7 +48,7 @@ def test_a_page_ends_where_a_message_of_any_client_would() -> None:
     assert found == 20
 
 
-def test_an_entry_larger_than_a_page_is_a_page_of_its_own() -> None:
+def test_an_entry_larger_than_a_page_is_a_separate_page() -> None:
     entries = ["a", "x" * (pages.LARGEST + 1), "b"]
     first, token = page(entries, Request(), str)
     second, token = page(entries, Request(page_token=token), str)
@@ -56,20 +56,20 @@ def test_an_entry_larger_than_a_page_is_a_page_of_its_own() -> None:
     assert (first, second, third, token) == (entries[:1], entries[1:2], entries[2:], "")
 
 
-def test_a_list_that_changed_is_not_taken_for_whole() -> None:
+def test_a_list_that_changed_is_reported() -> None:
     _, token = page(["a", "b", "c"], Request(page_size=1), str)
     with pytest.raises(FailedPrecondition, match="has changed"):
         page(["a", "c"], Request(page_token=token), str)
 
 
 @pytest.mark.parametrize("token", ["1", "-1-00000000", "x" * 500, "9999999999-00000000", "1-zz"])
-def test_a_token_that_is_none_is_refused(token: str) -> None:
+def test_an_invalid_token_is_rejected(token: str) -> None:
     with pytest.raises(InvalidArgument, match="does not belong to this list"):
         page(["a", "b"], Request(page_token=token), str)
 
 
 @pytest.mark.parametrize("begin", [0, 2, 3])
-def test_a_token_that_points_outside_is_refused(begin: int) -> None:
+def test_a_token_out_of_range_is_rejected(begin: int) -> None:
     _, token = page(["a", "b"], Request(page_size=1), str)
     with pytest.raises(InvalidArgument, match="does not belong to this list"):
         page(["a", "b"], Request(page_token=f"{begin}-{token.partition('-')[2]}"), str)

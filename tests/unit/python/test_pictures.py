@@ -1,4 +1,4 @@
-"""Numbers as pictures of characters."""
+"""Numbers drawn with characters."""
 
 import math
 
@@ -15,7 +15,7 @@ def test_a_row_of_blocks_begins_at_zero() -> None:
     assert spark([], 5) == ""
 
 
-def test_the_corners_of_a_field_are_its_ends() -> None:
+def test_the_corners_of_a_plot_are_its_ends() -> None:
     curves = Curves(2, 2, -1.0, 1.0)
     curves.column(0, -1.0, -1.0, 0)
     curves.column(3, 1.0, 1.0, 1)

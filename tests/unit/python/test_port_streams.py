@@ -1,4 +1,4 @@
-"""Values of ports on their way to one caller who reads late: what waits is bounded."""
+"""Port values on their way to a slow reader: the queue is bounded."""
 
 import asyncio
 from collections.abc import Callable, Sequence
@@ -13,7 +13,7 @@ Response = ports_pb2.WatchPortsResponse
 
 
 class Teller:
-    """A runner that tells all at once, and then ends."""
+    """A runner that sends everything at once, and then ends."""
 
     def __init__(self, responses: Sequence[Response]) -> None:
         self._responses = responses
@@ -26,7 +26,7 @@ class Teller:
 
 
 def read(responses: Sequence[Response], selection: Sequence[str] = ()) -> list[Response]:
-    """Return what a caller reads who begins when all has been told."""
+    """Return the messages read by a caller that starts after all of them were sent."""
 
     async def run() -> list[Response]:
         runner: Any = Teller(responses)
@@ -47,17 +47,17 @@ def batch(first: int, cycles: int, columns: int = 1) -> Response:
     return Response(batch=ports_pb2.PortBatch(first_cycle=first, stamps_ns=stamps, values=values))
 
 
-def test_who_reads_in_time_reads_all() -> None:
+def test_a_fast_reader_gets_everything() -> None:
     told = [schema("a"), batch(0, 2), schema("b"), batch(2, 3)]
     assert read(told) == told
 
 
-def test_of_graphs_of_which_nothing_is_told_only_the_last_waits() -> None:
+def test_only_the_last_of_several_empty_graphs_is_queued() -> None:
     told = [schema("x" * 1000, columns) for columns in range(1, 50)]
     assert read(told) == told[-1:]
 
 
-def test_what_is_lost_is_counted_over_graphs_of_which_nothing_waits(
+def test_dropped_cycles_are_counted_across_dropped_graphs(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     first, kept = schema("a"), batch(0, 2)
@@ -73,7 +73,7 @@ def test_what_is_lost_is_counted_over_graphs_of_which_nothing_waits(
     assert list(lost.batch.values) == [b""] * 20
 
 
-def test_more_patterns_or_names_than_are_compared_are_refused() -> None:
+def test_too_many_patterns_or_names_are_rejected() -> None:
     components = [f"/c{number}" for number in range(257)]
     assert read([schema("a")], components[:-1])
     with pytest.raises(InvalidArgument, match="257 components and patterns .*, 256 at most"):

@@ -1,4 +1,4 @@
-"""Columns of values, as streams tell them and recordings keep them, without a loop."""
+"""Columns of values in streams and recordings, without a loop."""
 
 import json
 from collections.abc import Callable
@@ -71,7 +71,7 @@ def test_arrays_of_bytes_are_read_byte_by_byte(tmp_path: Path) -> None:
             assert as_list(recording["/c.s"]) == expected.reshape(2, -1).tolist(), type_name
 
 
-def test_a_matrix_that_lies_row_by_row_is_not_transposed(tmp_path: Path) -> None:
+def test_a_row_major_matrix_is_not_transposed(tmp_path: Path) -> None:
     expected = np.arange(12, dtype="u1").reshape(2, 2, 3)
     told = batch(schema(state("uint8[2x3,RowMajor]", 6)), 0, expected.tobytes())
     assert as_list(told["/c.s"]) == expected.tolist()
@@ -79,7 +79,7 @@ def test_a_matrix_that_lies_row_by_row_is_not_transposed(tmp_path: Path) -> None
         assert as_list(recording["/c.s"]) == expected.reshape(2, -1).tolist()
 
 
-def test_an_output_and_a_state_of_one_name_are_both_there(tmp_path: Path) -> None:
+def test_an_output_and_a_state_of_the_same_name_are_separate(tmp_path: Path) -> None:
     made = output("float64 data\n", "1", bytes(8), name="s")
     for columns in ((made, state("double", 8)), (state("double", 8), made)):
         values = [
@@ -93,7 +93,7 @@ def test_an_output_and_a_state_of_one_name_are_both_there(tmp_path: Path) -> Non
             assert as_list(recording["/c.s[state]"]) == [3.0, 4.0]
 
 
-def test_numbers_of_cycles_are_whole_however_long_a_loop_runs(tmp_path: Path) -> None:
+def test_cycle_numbers_are_exact_for_long_runs(tmp_path: Path) -> None:
     of = schema(state("double", 8))
     batches = [batch(of, first, bytes(16)) for first in (2**32 - 2, 2**32, 5 * 2**32 + 7, 0)]
     expected = [first + i for first in (2**32 - 2, 2**32, 5 * 2**32 + 7, 0) for i in (0, 1)]
@@ -105,7 +105,7 @@ def test_numbers_of_cycles_are_whole_however_long_a_loop_runs(tmp_path: Path) ->
         assert recording.read("/c.s").cycles.tolist() == expected[:2] + expected[4:]
 
 
-def test_a_type_that_is_rebuilt_while_it_is_recorded_has_a_topic_of_its_own(
+def test_a_type_rebuilt_during_a_recording_gets_a_new_topic(
     tmp_path: Path,
 ) -> None:
     before = batch(schema(output("float64 x\n", "1", bytes(8))), 0, bytes(16))
@@ -118,7 +118,7 @@ def test_a_type_that_is_rebuilt_while_it_is_recorded_has_a_topic_of_its_own(
         assert recording.read("/c.o.w").cycles.tolist() == [2, 3]
 
 
-def test_a_recording_that_is_damaged_is_said_to_be(tmp_path: Path) -> None:
+def test_a_damaged_recording_is_reported(tmp_path: Path) -> None:
     file = tmp_path / "x.mcap"
     recorded(file, batch(schema(state("double", 8)), 0, bytes(16))).close()
     whole = file.read_bytes()
@@ -135,7 +135,7 @@ def test_a_recording_that_is_damaged_is_said_to_be(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("kind", "read"), [("json", json.loads), ("yaml", yaml.safe_load)])
-def test_what_is_no_finite_number_is_a_word_for_machines(
+def test_non_finite_numbers_are_words_in_json(
     capsys: pytest.CaptureFixture[str], kind: str, read: Callable[[str], Any]
 ) -> None:
     told = batch(schema(state("double[3]", 24)), 0, np.array([1, np.nan, -np.inf] * 2).tobytes())

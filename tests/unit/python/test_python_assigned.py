@@ -1,4 +1,4 @@
-"""A variable that may have no value where it is used is found, at its line; others are not."""
+"""A use of a possibly unassigned variable is reported with its line; other uses are accepted."""
 
 import ast
 from typing import Any
@@ -56,12 +56,12 @@ def source(body: str) -> Source:
 
 
 @pytest.mark.parametrize("name", ALWAYS)
-def test_what_has_a_value_on_every_way_is_accepted(name: str) -> None:
+def test_variables_assigned_on_every_path_are_accepted(name: str) -> None:
     check_assigned(source(ALWAYS[name]))
 
 
 @pytest.mark.parametrize("name", NOT_ALWAYS)
-def test_what_may_have_none_is_refused_at_its_line(name: str) -> None:
+def test_possibly_unassigned_variables_are_rejected_with_their_line(name: str) -> None:
     body, line = NOT_ALWAYS[name]
     with pytest.raises(Mistake, match="has no value on every way here") as refused:
         check_assigned(source(body))

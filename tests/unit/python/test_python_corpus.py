@@ -1,4 +1,4 @@
-"""Each mistake of the corpus is refused in one line: file, line, the expression, the way out."""
+"""Each mistake of the corpus is one line of error: file, line, expression, and advice."""
 
 import re
 import textwrap
@@ -8,7 +8,7 @@ import mistakes
 import pytest
 from rtcf_compile.main import main
 
-# Words of numba, LLVM, NumPy's inside and of the compiler itself.
+# Words of numba, LLVM, NumPy's internals and the compiler's own internals.
 _INTERNAL = re.compile(
     r"numba|llvm|reflected|UniTuple|Tuple\(|array\(\w+, \d|OptionalType|gufunc|core dimension|\$|"
     r"unknown location|Literal|[Dd]ispatcher|rtcf_|constant_|overload|lowering|[Rr]esolv|"
@@ -16,7 +16,7 @@ _INTERNAL = re.compile(
     r"<(?:function|class|built-in|module|numba)|0x[0-9a-f]{6}|NRT_|Invalid use|"
     r"Internal error|implementation|'object'|Traceback|<string>"
 )
-# A way out begins with one of these.
+# Advice starts with one of these words.
 _VERBS = (
     *(
         "add",
@@ -37,7 +37,7 @@ _VERBS = (
 
 
 def source(kind: str, text: str) -> str:
-    """Return a module that has a mistake in the head, in the class, or in update."""
+    """Return a module with a mistake at its head, in the class, or in update."""
     parts = {"HEAD": "", "CLASS": "", "UPDATE": "", kind: text}
     if "\n---\n" in text:
         parts["HEAD"], parts[kind] = text.split("\n---\n")
@@ -51,7 +51,7 @@ def source(kind: str, text: str) -> str:
 
 
 def line_of(text: str, whole: str) -> int:
-    """Return the line that is marked, or the first one of the mistake."""
+    """Return the marked line, or the first line of the mistake."""
     lines = whole.splitlines()
     marked = [number for number, line in enumerate(lines, 1) if line.endswith("# here")]
     if marked:
@@ -62,7 +62,7 @@ def line_of(text: str, whole: str) -> int:
 
 
 def cases() -> list[tuple[str, str]]:
-    """Return each mistake by the place where it stands and its name."""
+    """Return each mistake by its place and its name."""
     return [
         (kind, name) for kind in ("UPDATE", "CLASS", "HEAD") for name in getattr(mistakes, kind)
     ]
@@ -73,7 +73,7 @@ def test_the_corpus_is_large() -> None:
 
 
 @pytest.mark.parametrize(("kind", "name"), cases())
-def test_a_mistake_is_one_line_with_place_expression_and_way_out(
+def test_a_mistake_is_one_line_with_place_expression_and_advice(
     kind: str, name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text, words = getattr(mistakes, kind)[name]

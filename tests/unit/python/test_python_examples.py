@@ -1,5 +1,5 @@
-"""The examples of components in Python: each is accepted as it stands, and does compiled the same
-as in the interpreter.
+"""The example components in Python: each is accepted unchanged, and gives the same results compiled
+and interpreted.
 """
 
 from pathlib import Path
@@ -15,13 +15,13 @@ EXAMPLES = sorted(each.stem for each in FOLDER.glob("*.py"))
 
 
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_an_example_does_the_same_compiled_and_in_the_interpreter(name: str) -> None:
+def test_an_example_gives_the_same_results_compiled_and_interpreted(name: str) -> None:
     assert main([str(FOLDER / f"{name}.py"), "--verify", "400"]) == 0
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", EXAMPLES)
-def test_it_does_so_over_20000_cycles(name: str) -> None:
+def test_an_example_gives_the_same_results_over_20000_cycles(name: str) -> None:
     assert main([str(FOLDER / f"{name}.py"), "--verify", "20000"]) == 0
 
 

@@ -1,4 +1,4 @@
-"""Mistakes that show when the component runs: the machine code names line, index and sizes."""
+"""Run-time faults of components: the machine code reports line, index and sizes."""
 
 from pathlib import Path
 
@@ -77,7 +77,7 @@ FAULTS = {
 
 @pytest.fixture(scope="module")
 def component(tmp_path_factory: pytest.TempPathFactory) -> tuple[Inside, np.dtype[np.void], str]:
-    """One component that makes all mistakes, one by one."""
+    """One component that contains all faults, selected one by one."""
     source = HEAD
     for number, (text, _) in enumerate(FAULTS.values(), 100):
         source += f"        if n == {number}:\n            {text}\n"
@@ -106,7 +106,7 @@ def test_a_fault_names_line_and_sizes(
     assert rest == words.format(n=number)
 
 
-def test_a_text_of_the_component_with_braces_stays_as_it_is(tmp_path: Path) -> None:
+def test_a_text_with_braces_stays_unchanged(tmp_path: Path) -> None:
     file = tmp_path / "faulty.py"
     file.write_text(
         f"{HEAD}        if n == 100:\n            raise IndexError('index {{}} of {{}}')\n"
@@ -153,7 +153,7 @@ class Inheriting(_Base):
 
 
 @pytest.mark.parametrize(("text", "line"), [(CALLING, 7), (INHERITING, 4)])
-def test_a_line_is_of_the_file_of_the_class(
+def test_a_line_refers_to_the_file_of_the_class(
     text: str, line: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.syspath_prepend(tmp_path)

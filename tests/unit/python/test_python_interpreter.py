@@ -1,4 +1,4 @@
-"""Components in Python as the interpreter runs them, and the examples of their documentation."""
+"""Python components in the interpreter, and the examples of their documentation."""
 
 import math
 import re
@@ -40,7 +40,7 @@ def made(name: str, **parameters: object) -> Any:
     return CLASSES[name](**parameters)
 
 
-def test_the_client_librarys_function_of_that_name_is_there_too() -> None:
+def test_the_client_librarys_function_component_still_works() -> None:
     spec = rtcf.component("rtcf_examples", "Mimo", name="H1")
     assert (spec.package, spec.type, spec.name) == ("rtcf_examples", "Mimo", "H1")
 
@@ -63,7 +63,7 @@ def test_an_input_is_new_for_one_cycle() -> None:
     assert observer.seconds.valid
 
 
-def test_what_is_not_declared_is_refused() -> None:
+def test_undeclared_members_are_rejected() -> None:
     ramp = made("Ramp")
     with pytest.raises(AttributeError, match="is not declared"):
         ramp.other = 1.0
@@ -79,7 +79,7 @@ def test_what_is_not_declared_is_refused() -> None:
         made("Ramp", steps=2)
 
 
-def test_a_queue_keeps_messages_in_order_and_counts_those_it_has_no_room_for() -> None:
+def test_a_queue_keeps_the_order_and_counts_dropped_messages() -> None:
     trajectory: Any = FILTERS["Trajectory"]()
     queue = trajectory.waypoints
     assert (queue.size, queue.age, queue.connected) == (0, -1, False)
@@ -98,7 +98,7 @@ def test_a_queue_keeps_messages_in_order_and_counts_those_it_has_no_room_for() -
         queue.put([1.0, 2.0])
 
 
-def test_the_age_of_a_queue_is_that_of_its_oldest_message() -> None:
+def test_the_age_of_a_queue_is_its_oldest_messages_age() -> None:
     trajectory: Any = FILTERS["Trajectory"]()
     trajectory.hold.put(True)
     for number in range(3):
@@ -107,7 +107,7 @@ def test_the_age_of_a_queue_is_that_of_its_oldest_message() -> None:
     assert (trajectory.skipped, trajectory.waypoints.age) == (1, 2_000_000)
 
 
-def test_what_derives_from_parameters_is_there_from_the_beginning() -> None:
+def test_derived_values_exist_from_the_start() -> None:
     short, long = made("Pendulum", length=0.2), made("Pendulum", length=1.5)
     assert (short.slow, long.slow) == (False, True)
     assert short.ad[1, 0] < long.ad[1, 0] < 0.0
@@ -115,7 +115,7 @@ def test_what_derives_from_parameters_is_there_from_the_beginning() -> None:
         made("Pendulum", gains=[99.5, 1.0])
 
 
-def test_messages_are_read_and_filled_by_their_names() -> None:
+def test_message_fields_are_read_and_written_by_name() -> None:
     arm = ARM()
     arm.joints.put(JointState(position=[0.1, 0.2, 0.3]))
     arm.torques.put(Float64MultiArray(data=[1.0, 2.0]))
@@ -132,7 +132,7 @@ def test_messages_are_read_and_filled_by_their_names() -> None:
     assert list(arm.joints.value.velocity) == []
 
 
-def test_a_message_with_more_than_is_declared_is_not_taken() -> None:
+def test_a_message_longer_than_declared_is_rejected() -> None:
     arm = ARM()
     arm.joints.put(JointState(position=[0.1, 0.2, 0.3, 0.4]))
     assert not arm.joints.new and not arm.joints.valid
@@ -140,7 +140,7 @@ def test_a_message_with_more_than_is_declared_is_not_taken() -> None:
     assert arm.incomplete == 1
 
 
-def test_what_a_message_has_not_is_refused() -> None:
+def test_unknown_message_fields_are_rejected() -> None:
     arm = ARM()
     with pytest.raises(AttributeError, match="TwistStamped has no number twist.linear.w"):
         _ = arm.wanted.value.twist.linear.w
@@ -161,29 +161,29 @@ def test_readers_of_a_finite_output_keep_its_last_finite_value() -> None:
         guarded.cycle()
     assert (guarded.y.value, list(guarded.pair.value)) == (2.0, [2.0, -2.0])
     assert not guarded.y.written and not guarded.pair.written
-    # The component has its own.
+    # The component itself reads its own value.
     assert math.isnan(guarded.last) and math.isnan(guarded.unchecked.value)
     said = "output {} is not finite: readers keep its last value"
     assert guarded.log == [("error", said.format("y")), ("error", said.format("pair"))]
     guarded.quiet = True
     guarded.cycle()
-    assert guarded.y.value == 2.0 and len(guarded.log) == 2, "nothing was written"
+    assert guarded.y.value == 2.0 and len(guarded.log) == 2, "the cycle wrote nothing"
     guarded.quiet = False
     guarded.u.put(3.0)
     guarded.cycle()
     assert (guarded.y.value, guarded.y.written) == (3.0, True)
-    # What it wrote the cycle before.
+    # The value written in the previous cycle.
     assert math.isnan(guarded.before)
 
 
-def test_nothing_finite_was_ever_written() -> None:
+def test_a_finite_output_without_finite_values_has_none() -> None:
     guarded: Any = CHECKED.Guarded()
     guarded.u.put(math.inf)
     guarded.cycle()
     assert (guarded.y.value, guarded.y.written) == (0.0, False)
 
 
-def test_an_enum_is_given_by_name_too() -> None:
+def test_an_enum_can_be_given_by_name() -> None:
     switched: Any = CHECKED.Switched(mode="RUN")
     assert switched.mode is CHECKED.Mode.RUN
     switched.wanted.put("IDLE")
@@ -211,7 +211,7 @@ def test_a_state_is_none_until_it_is_set() -> None:
     assert unknown.last is None
 
 
-def test_an_enum_takes_its_values_alone() -> None:
+def test_an_enum_accepts_only_its_values() -> None:
     unknown: Any = WRITTEN["Unknown"]()
     unknown.mode = 4
     assert repr(unknown.mode) == "<Mode.HOLD: 4>"
@@ -219,7 +219,7 @@ def test_an_enum_takes_its_values_alone() -> None:
         unknown.mode = 3
 
 
-def test_bases_and_mixins_are_python_s() -> None:
+def test_bases_and_mixins_work_as_in_python() -> None:
     inherited = WRITTEN["InheritedAgain"](bound=0.5)
     inherited.start()
     assert (inherited.z, inherited.turns, inherited.wide) == (1.0, 3, False)
@@ -228,7 +228,7 @@ def test_bases_and_mixins_are_python_s() -> None:
     assert (inherited.turns, inherited.count.value) == (4, 1)
 
 
-def test_a_message_is_copied_as_a_whole_or_in_parts() -> None:
+def test_a_message_is_copied_whole_or_in_parts() -> None:
     relay: Any = MESSAGES["Relay"]()
     message = TwistStamped()
     message.twist.linear.x, message.twist.angular.z = 1.0, 2.0
@@ -240,13 +240,13 @@ def test_a_message_is_copied_as_a_whole_or_in_parts() -> None:
         relay.stamped.write(relay.wanted.value)
 
 
-def test_instances_have_state_of_their_own() -> None:
+def test_instances_have_separate_state() -> None:
     first, second = made("Ramp"), made("Ramp")
     first.cycle()
     assert (first.total, second.total) == (1, 0)
 
 
-def test_the_pages_example_runs_as_it_stands(tmp_path: Path) -> None:
+def test_the_docs_example_runs_unchanged(tmp_path: Path) -> None:
     page = (TREE / "docs" / "python-components.md").read_text()
     source, *others = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
     (trial,) = (each for each in others if "import Observer" in each)

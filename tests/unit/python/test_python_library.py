@@ -1,4 +1,4 @@
-"""What rtcf-compile calls to make a library: no compiler for a component, one for a new message."""
+"""C++ compilation by rtcf-compile: none for a component, one for a new message."""
 
 import re
 import subprocess
@@ -51,7 +51,7 @@ class {name}(Component):
 
 
 class Cache:
-    """A user's cache, and a compiler that tells what it was called for."""
+    """A user's cache, and a compiler that records its calls."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -61,7 +61,7 @@ class Cache:
         self._compiler.chmod(0o755)
 
     def start(self, source: str, name: str = "source") -> "subprocess.Popen[str]":
-        """Begin to compile a source."""
+        """Start to compile a source."""
         file = self.folder / f"{name}.py"
         file.write_text(source)
         environment = {
@@ -85,13 +85,13 @@ class Cache:
         return said
 
     def compiled(self) -> list[str]:
-        """Return the C++ sources that were compiled since the last time."""
+        """Return the C++ sources compiled since the last call."""
         calls = self._calls.read_text()
         self._calls.unlink()
         return [Path(each).name for each in re.findall(r"\S+\.cpp", calls)]
 
     def kept(self) -> list[Path]:
-        """Return what the cache has of messages."""
+        """Return the messages in the cache."""
         return sorted((self.folder / "cache/rtcf-components/.messages").iterdir())
 
 
@@ -114,7 +114,7 @@ def test_no_cpp_is_compiled_for_a_component(cache: Cache) -> None:
     }
 
 
-def test_a_message_is_compiled_once_and_kept(cache: Cache) -> None:
+def test_a_message_is_compiled_once_and_cached(cache: Cache) -> None:
     said = cache.compile(RELAY.format(name="First"))
     assert said == "rtcf-compile: compiling std_msgs/Float32 once\n"
     assert len(cache.compiled()) == 1
@@ -125,7 +125,7 @@ def test_a_message_is_compiled_once_and_kept(cache: Cache) -> None:
     assert cache.kept() == [kept]
 
 
-def test_what_others_may_have_written_is_compiled_again(cache: Cache) -> None:
+def test_files_that_others_can_write_are_recompiled(cache: Cache) -> None:
     cache.compile(RELAY.format(name="First"))
     (kept,) = cache.kept()
     kept.write_bytes(b"no object file")
@@ -134,7 +134,7 @@ def test_what_others_may_have_written_is_compiled_again(cache: Cache) -> None:
     assert kept.read_bytes().startswith(b"\x7fELF") and kept.stat().st_mode & 0o777 == 0o644
 
 
-def test_two_compilers_may_need_a_message_at_once(cache: Cache) -> None:
+def test_two_compilers_can_compile_a_message_at_once(cache: Cache) -> None:
     both = [cache.start(RELAY.format(name=each), each) for each in ("One", "Other")]
     for each in both:
         said = each.communicate(timeout=DEADLINE_S)[1]
@@ -152,7 +152,7 @@ def test_two_compilers_may_need_a_message_at_once(cache: Cache) -> None:
         ),
     ],
 )
-def test_a_message_without_its_header_is_refused(cache: Cache, change: str, said: str) -> None:
+def test_a_message_without_its_header_is_rejected(cache: Cache, change: str, said: str) -> None:
     source = RELAY.format(name="Odd").replace("\n\n\nclass", f"\n\n{change}\n\n\nclass")
     process = cache.start(source)
     lines = process.communicate(timeout=DEADLINE_S)[1].splitlines()
@@ -161,7 +161,7 @@ def test_a_message_without_its_header_is_refused(cache: Cache, change: str, said
     assert cache.kept() == []
 
 
-def test_a_runtime_that_is_missing_is_named(
+def test_a_missing_runtime_is_named(
     cache: Cache, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     from rtcf_compile.library import toolchain
@@ -171,7 +171,7 @@ def test_a_runtime_that_is_missing_is_named(
         toolchain.runtime()
 
 
-def test_code_is_for_any_processor_whatever_is_imported_first() -> None:
+def test_code_runs_on_any_processor_with_any_import_order() -> None:
     program = textwrap.dedent("""
         import rtcf_compile.library.build
         import numba
@@ -186,7 +186,7 @@ def test_code_is_for_any_processor_whatever_is_imported_first() -> None:
     assert done.stdout == "generic ''\n"
 
 
-def test_a_message_s_name_is_a_symbol() -> None:
+def test_a_messages_name_becomes_a_symbol() -> None:
     message: Any = type("Message", (), {"name": "sensor_msgs/JointState"})
     assert messages.symbol(message) == "rtcf_message_sensor_msgs__JointState"
 
@@ -204,7 +204,7 @@ def _call(text: str, *types: str) -> LogCall:
         ("{:.1f} {:g}", ("int64", "bool"), ["float64", "float64"]),
     ],
 )
-def test_a_log_text_says_how_arguments_are_stored(
+def test_a_log_text_determines_how_arguments_are_stored(
     text: str, types: tuple[str, ...], stored: list[str]
 ) -> None:
     assert log_text.checked(_call(text, *types)) == (text, stored)
@@ -224,9 +224,7 @@ def test_a_log_text_says_how_arguments_are_stored(
         ("{0} {0:.1f}", ("int64",), "as an int and as a float"),
     ],
 )
-def test_a_log_text_that_cannot_be_made_is_refused(
-    text: str, types: tuple[str, ...], said: str
-) -> None:
+def test_an_impossible_log_text_is_rejected(text: str, types: tuple[str, ...], said: str) -> None:
     with pytest.raises(Mistake, match=said) as raised:
         log_text.checked(_call(text, *types))
     assert str(raised.value).startswith("x.py:3: ")

@@ -1,4 +1,4 @@
-"""Debug information of components written in Python: their files and lines, no other code."""
+"""Debug information of Python components: their files and lines, and unchanged code."""
 
 import contextlib
 import ctypes
@@ -80,7 +80,7 @@ def run(*command: str | Path, **environment: str) -> str:
 
 @pytest.fixture(scope="module")
 def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A component, and a module beside it."""
+    """A component, and a module next to it."""
     return written(tmp_path_factory.mktemp("ordner_ü"))
 
 
@@ -104,14 +104,14 @@ def line(text: str, source: str = SOURCE) -> int:
 
 
 def places(library: Path, function: str) -> str:
-    """Return addr2line's answer for all instructions of a function, inlined ones too."""
+    """Return addr2line's output for all instructions of a function, with inlined functions."""
     listing = run("objdump", "-d", f"--disassemble={function}", library)
     addresses = re.findall(r"^ +([0-9a-f]+):\t", listing, re.M)
     assert addresses
     return run("addr2line", "-f", "-i", "-p", "-e", library, *addresses)
 
 
-def test_each_instruction_is_of_a_line_of_the_source(source: Path, library: Path) -> None:
+def test_each_instruction_belongs_to_a_source_line(source: Path, library: Path) -> None:
     found = places(library, "rtcf_Regler_update")
     named = set(re.findall(r"(\S+) at (\S+):(\d+)$", re.sub(r" \(discr.*", "", found), re.M))
     functions = {(name, file) for name, file, _ in named}
@@ -129,12 +129,12 @@ def test_each_instruction_is_of_a_line_of_the_source(source: Path, library: Path
     assert re.search(inlined.format(line("größe(self")), found), found
 
 
-def test_a_crash_in_it_is_told_by_its_line(library: Path) -> None:
+def test_a_crash_is_reported_with_its_line(library: Path) -> None:
     (told,) = find(trace_of(library, str(library), ("rtcf_Regler_start",)), library).lines
     assert told == f"Regler.start at regler.py:{line('self.total = 3.0')}"
 
 
-def test_gdb_stops_at_its_lines_and_knows_them(source: Path, library: Path) -> None:
+def test_gdb_stops_at_source_lines(source: Path, library: Path) -> None:
     number = line("größe(self")
     found = run(
         "gdb", "-nx", "-q", "-batch",
@@ -154,7 +154,7 @@ def test_gdb_stops_at_its_lines_and_knows_them(source: Path, library: Path) -> N
     assert re.search(outer, found, re.M), found
 
 
-def test_a_stack_leads_through_it(source: Path, tmp_path: Path) -> None:
+def test_a_stack_trace_includes_the_component(source: Path, tmp_path: Path) -> None:
     cls = modules.components(modules.load(source))[-1]
     files = [tmp_path / f"{i}.o" for i in range(2)]
     compiled = lowering.compile_component(cls)
@@ -194,7 +194,7 @@ def test_the_machine_code_is_the_same_as_without_lines(source: Path, tmp_path: P
         assert listings() == with_lines
 
 
-def test_it_can_be_stripped(library: Path, tmp_path: Path) -> None:
+def test_a_library_can_be_stripped(library: Path, tmp_path: Path) -> None:
     stripped, debug = tmp_path / "regler.so", tmp_path / "regler.debug"
     run("objcopy", "--only-keep-debug", "--compress-debug-sections", library, debug)
     run("strip", "--strip-unneeded", "-o", stripped, library)
@@ -205,7 +205,7 @@ def test_it_can_be_stripped(library: Path, tmp_path: Path) -> None:
     assert told == f"Regler.start at regler.py:{line('self.total = 3.0')}"
 
 
-def test_libraries_do_not_name_the_folder_that_they_are_built_in(tmp_path: Path) -> None:
+def test_libraries_do_not_contain_their_build_folder(tmp_path: Path) -> None:
     contents = []
     for folder in (tmp_path / "one", tmp_path / "other_folder"):
         source = written(folder)
@@ -218,7 +218,7 @@ def test_libraries_do_not_name_the_folder_that_they_are_built_in(tmp_path: Path)
     assert contents[0] == contents[1]
 
 
-def test_lines_of_faults_are_known_where_paths_are_mapped(
+def test_lines_of_faults_are_correct_with_mapped_paths(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     source = tmp_path / "faulty.py"
@@ -239,7 +239,7 @@ def test_lines_of_faults_are_known_where_paths_are_mapped(
     assert faults() == plain
 
 
-def test_two_bases_of_one_name_are_told_apart_by_their_lines(tmp_path: Path) -> None:
+def test_two_bases_of_the_same_name_have_distinct_lines(tmp_path: Path) -> None:
     declared = "(Component):\n    n: State[float]\n    out: Output[float]\n\n"
     imported = "from rtcf.component import Component, Output, State\n"
     (tmp_path / "older.py").write_text(

@@ -1,4 +1,4 @@
-"""Mistakes in components written in Python: each is one line that says where, what, the way out."""
+"""Mistakes in Python components: each is one line with place, problem and advice."""
 
 import re
 from pathlib import Path
@@ -64,7 +64,7 @@ class Faulty(Component):
         return 0.5 * self.kp
 """
 
-# What is written in update (a mark {} is where the line is expected), what is said of it.
+# Statements of update (a mark {} is at the expected line), and the expected message.
 IN_UPDATE = {
     "list growth": ("values = []", "a list that grows allocates"),
     "element of a list set": ("a = [1.0]\n        a[0] = 2.0", "a list that changes allocates"),
@@ -254,7 +254,7 @@ IN_CLASS = {
 
 
 def compiled(tmp_path: Path, source: str, capsys: pytest.CaptureFixture[str]) -> str:
-    """Compile a source that is refused; return what was said."""
+    """Compile a source that must fail; return the message."""
     file = tmp_path / "faulty.py"
     file.write_text(source)
     assert main([str(file), "-o", str(tmp_path / "faulty.so")]) == 1
@@ -265,7 +265,7 @@ def compiled(tmp_path: Path, source: str, capsys: pytest.CaptureFixture[str]) ->
 
 
 @pytest.mark.parametrize("name", IN_UPDATE)
-def test_it_is_one_line_with_the_way_out(
+def test_a_mistake_in_update_is_one_line_with_advice(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text, expected = IN_UPDATE[name]
@@ -280,7 +280,7 @@ def test_it_is_one_line_with_the_way_out(
 
 
 @pytest.mark.parametrize("name", [name for name, (_, said) in IN_CLASS.items() if said])
-def test_a_declaration_is_refused_at_its_line(
+def test_a_bad_declaration_is_rejected_with_its_line(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text, expected = IN_CLASS[name]
@@ -291,7 +291,7 @@ def test_a_declaration_is_refused_at_its_line(
 
 
 @pytest.mark.parametrize("name", IN_PREPARE)
-def test_prepare_knows_parameters_alone(
+def test_prepare_can_use_only_parameters(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text, expected = IN_PREPARE[name]
@@ -304,7 +304,7 @@ def test_prepare_knows_parameters_alone(
     assert f"faulty.py:{source.split(wanted)[0].count(chr(10)) + 1}: " in said
 
 
-def test_an_array_larger_than_the_arena_is_refused_where_the_real_time_thread_makes_it(
+def test_an_array_larger_than_the_arena_is_rejected_in_real_time_hooks(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     head = HEAD.replace("class Faulty", "def large():\n    return np.zeros(9000)\n\n\nclass Faulty")
@@ -320,7 +320,7 @@ def test_an_array_larger_than_the_arena_is_refused_where_the_real_time_thread_ma
     assert main([str(file), "--verify", "1"]) == 0
 
 
-def test_a_class_without_update_is_refused(
+def test_a_class_without_update_is_rejected(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert "write `def update(self):`" in compiled(tmp_path, HEAD, capsys)

@@ -1,4 +1,4 @@
-"""Names that are not ASCII, that are alike, or that are long, in components written in Python."""
+"""Non-ASCII, similar and long names in Python components."""
 
 import os
 import subprocess
@@ -131,7 +131,7 @@ def compile_to(library: Path, file: Path) -> "subprocess.CompletedProcess[str]":
     )  # fmt: skip
 
 
-def test_what_ros_does_not_see_has_any_letters(tmp_path: Path) -> None:
+def test_names_invisible_to_ros_can_have_any_letters(tmp_path: Path) -> None:
     (tmp_path / "größen.py").write_text("def mal(ä, Δ):\n    return ä * Δ\n")
     file = written(tmp_path, WRITTEN_FREELY, "θ-регулятор")
     (cls,) = modules.components(modules.load(file))
@@ -155,11 +155,11 @@ def test_what_ros_does_not_see_has_any_letters(tmp_path: Path) -> None:
         ("Δt: Output[float]", "Δt", "write Deltat"),
         ("é_1: Parameter[float] = Parameter(1.0)", "é_1", "write e_1"),
         ("速度: State[float]", "速度", "take another name"),
-        # The sign of micro, which is the Greek letter to Python.
+        # The micro sign, which Python normalises to the Greek letter.
         ("\u00b5: State[float]", "\u03bc", "write mu"),
     ],
 )
-def test_a_name_that_ros_forbids_is_refused_with_another(
+def test_a_name_invalid_in_ros_is_rejected_with_a_suggestion(
     tmp_path: Path, declared: str, name: str, advice: str
 ) -> None:
     file = written(tmp_path, DECLARING.format(name="Plain", declared=declared))
@@ -179,7 +179,7 @@ def test_a_name_that_ros_forbids_is_refused_with_another(
         ("R" * 100, "has 100 characters: choose a name of at most 64"),
     ],
 )
-def test_a_class_that_no_daemon_would_load_is_refused(tmp_path: Path, name: str, what: str) -> None:
+def test_a_class_name_that_rtcfd_rejects_is_rejected(tmp_path: Path, name: str, what: str) -> None:
     file = written(tmp_path, DECLARING.format(name=name, declared="u: Input[float]"))
     with pytest.raises(Mistake) as refused:
         compiled(file)
@@ -193,7 +193,7 @@ def test_a_class_with_an_underscore_is_a_base(tmp_path: Path) -> None:
     assert [each.description.name for each in compiled(written(tmp_path, source))] == ["Plain"]
 
 
-def test_names_of_100_characters(tmp_path: Path) -> None:
+def test_names_may_have_100_characters(tmp_path: Path) -> None:
     names = [f"{each * 99}{digit}" for each in "pq" for digit in (1, 2)]
     state, other, method, function = names
     source = (
@@ -211,7 +211,7 @@ def test_names_of_100_characters(tmp_path: Path) -> None:
     assert compile_to(tmp_path / "lib.so", file).stderr == ""
 
 
-def test_classes_and_methods_that_are_alike_are_different_ones(tmp_path: Path) -> None:
+def test_similar_names_of_classes_and_methods_do_not_collide(tmp_path: Path) -> None:
     file = written(tmp_path, ALIKE)
     classes = modules.components(modules.load(file))
     assert [each.__name__ for each in classes] == ["A", "A_update", "log_A"]
@@ -221,7 +221,7 @@ def test_classes_and_methods_that_are_alike_are_different_ones(tmp_path: Path) -
     assert compile_to(tmp_path / "lib.so", file).stderr == ""
 
 
-def test_a_file_whose_name_is_no_utf_8_is_refused_in_one_line(tmp_path: Path) -> None:
+def test_a_file_name_that_is_not_utf_8_is_rejected_in_one_line(tmp_path: Path) -> None:
     file = Path(os.fsdecode(os.fsencode(tmp_path) + b"/gr\xf6sse.py"))
     file.write_text(DECLARING.format(name="Plain", declared="u: Input[float]"))
     done = compile_to(tmp_path / "lib.so", file)

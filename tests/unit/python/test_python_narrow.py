@@ -1,5 +1,5 @@
-"""Numbers of other types than Python's: arrays of float32 and of small ints have NumPy's type where
-both of its releases agree, and are refused where these do not.
+"""Numbers of other types than Python's: arrays of float32 and of small ints have NumPy's type if
+its two releases agree, and are rejected otherwise.
 """
 
 import sys
@@ -54,7 +54,7 @@ class Tried(Component):
 """
 TOGETHER = 20
 INPUTS = "fgmuwijldkbstxn"
-# Values of inputs, which have these names.
+# Values of inputs, by name.
 VALUES = [
     *("f * 0.1", "0.1 * f", "f + 1", "f / 3", "f - x", "f * self.gain", "f / n", "f * HALF"),
     *("f + g", "f * g / 3.0", "f * d", "f + k", "f * b", "f + u", "f + i", "f + j", "-f * 0.1"),
@@ -171,7 +171,7 @@ FAULTS = {
 
 
 def _component(folder: Path, ways: list[str]) -> Any:
-    """Return a component that does one of several things."""
+    """Return a component that runs one of several statements."""
     lines = HEAD.splitlines()
     for number, way in enumerate(ways):
         lines += ["", f"    def way_{number}(self):"]
@@ -215,7 +215,7 @@ def _set(value: str, folder: Path) -> str:
 
 
 @pytest.mark.parametrize("begin", range(0, len(VALUES) + len(STEPS), TOGETHER))
-def test_numbers_of_other_types_are_those_of_numpy(begin: int, tmp_path: Path) -> None:
+def test_numbers_of_other_types_match_numpy(begin: int, tmp_path: Path) -> None:
     ways = [*VALUES, *STEPS][begin : begin + TOGETHER]
     ways = [_set(each, tmp_path) if each in VALUES else each for each in ways]
     cls = _component(tmp_path, ways)
@@ -232,12 +232,12 @@ def test_numbers_of_other_types_are_those_of_numpy(begin: int, tmp_path: Path) -
         for name in set(record.dtype.names) - {"_line"}:
             theirs = component._record[name]
             assert np.array_equal(record[name], theirs, equal_nan=True), ways[which]
-    # With special values, in the comparison.
+    # The comparison uses special values, too.
     assert verify.compare(cls, compiled, 40 * len(ways)).differences == []
 
 
 @pytest.mark.parametrize("text", REFUSED)
-def test_what_the_releases_of_numpy_do_otherwise_is_refused(text: str, tmp_path: Path) -> None:
+def test_expressions_on_which_numpy_releases_differ_are_rejected(text: str, tmp_path: Path) -> None:
     cls = _component(tmp_path, [f"value = {text}"])
     with pytest.raises(Mistake, match=REFUSED[text]) as raised:
         lowering.compile_component(cls)
@@ -245,7 +245,7 @@ def test_what_the_releases_of_numpy_do_otherwise_is_refused(text: str, tmp_path:
 
 
 @pytest.mark.parametrize("text", REFUSED_STEPS)
-def test_a_change_that_numpy_refuses_is_refused(text: str, tmp_path: Path) -> None:
+def test_an_assignment_that_numpy_rejects_is_rejected(text: str, tmp_path: Path) -> None:
     cls = _component(tmp_path, [text])
     with pytest.raises(Mistake, match=REFUSED_STEPS[text]) as raised:
         lowering.compile_component(cls)
@@ -316,7 +316,7 @@ class Sums(Component):
 """
 
 
-def test_sums_of_any_length_are_those_of_numpy(tmp_path: Path) -> None:
+def test_sums_of_any_length_match_numpy(tmp_path: Path) -> None:
     file = tmp_path / "sums.py"
     file.write_text(SUMS)
     (cls,) = modules.components(modules.load(file))

@@ -1,4 +1,4 @@
-"""Where Python's numbers have no value it raises; compiled code raises there, too."""
+"""Where an operation of Python raises, compiled code raises, too."""
 
 import math
 from pathlib import Path
@@ -58,7 +58,7 @@ def inside(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 
 def by_python(text: str, x: float, y: float, n: int) -> Any:
-    """Return the value, or None where Python raises, makes a complex number or no int64."""
+    """Return the value, or None if Python raises or gives a complex number or no int64."""
     try:
         value = eval(text, {"math": math, "x": x, "y": y, "n": n})
     except (ValueError, OverflowError, ZeroDivisionError):
@@ -68,7 +68,7 @@ def by_python(text: str, x: float, y: float, n: int) -> Any:
 
 
 @pytest.mark.parametrize("text", ONE + TWO)
-def test_it_has_a_value_where_python_has_one(text: str, inside: Any) -> None:
+def test_compiled_code_has_a_value_where_python_has_one(text: str, inside: Any) -> None:
     cls, compiled = inside
     for x in FLOATS:
         for y in FLOATS if text in TWO else (0.0,):
@@ -89,7 +89,7 @@ def test_it_has_a_value_where_python_has_one(text: str, inside: Any) -> None:
 
 
 @pytest.mark.parametrize("text", ["int(x)", "round(x)", "math.floor(x)"])
-def test_it_says_so(text: str, inside: Any) -> None:
+def test_compiled_code_raises_with_a_message(text: str, inside: Any) -> None:
     cls, compiled = inside
     record = cls()._record
     record["which"], record["x"] = ONE.index(text), math.nan
@@ -118,7 +118,7 @@ OF_ARRAYS = [
 ]
 
 
-def test_powers_of_arrays_are_those_of_numpy(tmp_path: Path) -> None:
+def test_powers_of_arrays_match_numpy(tmp_path: Path) -> None:
     lines = ARRAYS.splitlines()
     for number, text in enumerate(OF_ARRAYS):
         lines += [f"        if self.which == {number}:", f"            self.out[:] = {text}"]
@@ -142,7 +142,7 @@ def test_powers_of_arrays_are_those_of_numpy(tmp_path: Path) -> None:
             assert np.array_equal(found["out"], record["out"], equal_nan=True), text
 
 
-def test_a_bound_that_is_nan_gives_nan_in_the_comparison_too(tmp_path: Path) -> None:
+def test_a_bound_of_nan_gives_nan_compiled_and_interpreted(tmp_path: Path) -> None:
     file = tmp_path / "bounds.py"
     file.write_text(ARRAYS + "        self.out[:] = np.clip(self.a, self.low.value, 1.0)\n"
                     "        self.out[0] = np.clip(0.5, -1.0, self.high.value)\n")  # fmt: skip
@@ -200,14 +200,14 @@ class Shifts(Component):
     def update(self):
         x, n, k, b, c = self.x, self.n, self.k, self.b, self.c
 """
-# What sets `whole`, of ints of Python.
+# Statements that set `whole` from Python ints.
 OF_INTS = [
     *("x << n", "x >> n", "halved(x, n)", "1 << n", "x >> 70", "x << 64", "self.small >> n"),
     *("x << (n & 63)", "x << True", "x >> (n & 7) << 1"),
 ]
-# Statements, what they leave in `whole`.
+# Statements, and the value that they leave in `whole`.
 OF_NAMES = ["x <<= n", "x >>= n", "self.x <<= n", "self.x >>= n"]
-# What sets `out`, of arrays of NumPy.
+# Statements that set `out` from NumPy arrays.
 OF_VECTORS = [
     *("k << n", "k >> n", "k << c", "k >> c", "1 << c", "x >> c", "k[::-1] >> 64", "b << 1"),
     *("b >> b", "b << b", "np.left_shift(k, c)", "np.right_shift(k, n)", "k << -1", "k >> -1"),
@@ -260,7 +260,7 @@ def test_ints_are_shifted_as_in_python(text: str, shifts: Any) -> None:
 
 
 @pytest.mark.parametrize("text", OF_VECTORS)
-def test_arrays_are_shifted_as_by_numpy(text: str, shifts: Any) -> None:
+def test_arrays_are_shifted_as_in_numpy(text: str, shifts: Any) -> None:
     cls, compiled, steps = shifts
     names = {
         "k": np.array([1, -1, 77, -(2**63), 2**62]),
@@ -381,7 +381,7 @@ LARGE = {
 
 
 def _class(folder: Path, ways: list[str]) -> Any:
-    """Return a component that does one of several things."""
+    """Return a component that runs one of several statements."""
     lines = MEMBERS.splitlines()
     for number, way in enumerate(ways):
         lines += ["", f"    def way_{number}(self):", *NAMES.splitlines()]
@@ -396,7 +396,7 @@ def _class(folder: Path, ways: list[str]) -> Any:
 
 
 @pytest.mark.parametrize("ways", [WITH_BOOLS, SMALL], ids=["bools", "small ints"])
-def test_numbers_are_those_of_python(ways: list[str], tmp_path: Path) -> None:
+def test_numbers_match_python(ways: list[str], tmp_path: Path) -> None:
     cls = _class(tmp_path, ways)
     compiled = Inside(lowering.compile_component(cls))
     draw = np.random.default_rng(1)
@@ -418,7 +418,7 @@ def test_numbers_are_those_of_python(ways: list[str], tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("way", [*REFUSED_BOOLS, *LARGE])
-def test_other_numbers_than_pythons_are_refused(way: str, tmp_path: Path) -> None:
+def test_results_that_differ_from_python_are_rejected(way: str, tmp_path: Path) -> None:
     cls = _class(tmp_path, [way])
     with pytest.raises(Mistake, match={**REFUSED_BOOLS, **LARGE}[way]) as raised:
         lowering.compile_component(cls)

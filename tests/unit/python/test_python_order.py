@@ -1,4 +1,4 @@
-"""Compiled code computes the parts of a statement once, and in Python's order, where methods and
+"""Compiled code evaluates the parts of a statement once, in Python's order, even if methods and
 properties change values that other parts read.
 """
 
@@ -91,7 +91,7 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Any]:
 
 
 @pytest.mark.parametrize("text", STATEMENTS)
-def test_a_statement_does_what_it_does_in_python(text: str, both: tuple[Any, Any]) -> None:
+def test_a_statement_has_the_same_effect_as_in_python(text: str, both: tuple[Any, Any]) -> None:
     cls, compiled = both
     component, inside = cls(), Inside(compiled)
     component._record["which"] = STATEMENTS.index(text)
@@ -103,7 +103,7 @@ def test_a_statement_does_what_it_does_in_python(text: str, both: tuple[Any, Any
             assert (record[name] == component._record[name]).all(), name
 
 
-def test_the_comparison_runs_them_as_python_does(both: tuple[Any, Any]) -> None:
+def test_the_comparison_evaluates_in_pythons_order(both: tuple[Any, Any]) -> None:
     component, changed = both[0](), verify._interpreted(both[0], ())()
     for which in range(len(STATEMENTS)):
         for _ in range(5):
@@ -120,7 +120,9 @@ def test_the_comparison_runs_them_as_python_does(both: tuple[Any, Any]) -> None:
         ("self.counts[:] = np.array([self.next] * 4)", "give their values names before"),
     ],
 )
-def test_another_order_is_refused(text: str, way_out: str, tmp_path: Path) -> None:
+def test_statements_needing_another_order_are_rejected(
+    text: str, way_out: str, tmp_path: Path
+) -> None:
     file = tmp_path / "order.py"
     file.write_text(f"{HEAD}        {text}\n")
     (cls,) = modules.components(modules.load(file))
@@ -135,7 +137,7 @@ def test_another_order_is_refused(text: str, way_out: str, tmp_path: Path) -> No
         "self.counts[:] = np.array([self.head] * 4)",
     ],
 )
-def test_members_that_stay_are_read_in_any_order(text: str, tmp_path: Path) -> None:
+def test_unchanged_members_may_be_read_in_any_order(text: str, tmp_path: Path) -> None:
     file = tmp_path / "order.py"
     file.write_text(f"{HEAD}        {text}\n")
     (cls,) = modules.components(modules.load(file))

@@ -1,5 +1,5 @@
-"""Parts of a vector that are set from other parts of it: compiled code has NumPy's result, also
-where that depends on the order in which it copies.
+"""Overlapping assignments within a vector: compiled code gives NumPy's result, even where it
+depends on NumPy's copying order.
 """
 
 from pathlib import Path
@@ -54,14 +54,14 @@ class Rows(Component):
 """
 
 
-def test_rows_are_set_from_columns_as_numpy_does(tmp_path: Path) -> None:
+def test_rows_are_assigned_from_columns_as_in_numpy(tmp_path: Path) -> None:
     file = tmp_path / "rows.py"
     file.write_text(ROWS)
     (cls,) = modules.components(modules.load(file))
     assert verify.compare(cls, lowering.compile_component(cls), 300).differences == []
 
 
-def test_a_part_is_set_from_another_as_numpy_does(tmp_path: Path) -> None:
+def test_overlapping_slices_are_assigned_as_in_numpy(tmp_path: Path) -> None:
     file = tmp_path / "overlap.py"
     file.write_text(SOURCE)
     (cls,) = modules.components(modules.load(file))

@@ -9,7 +9,7 @@ from rtcf_compile.comparison.inside import Inside
 from rtcf_compile.machine_code import lowering
 from rtcf_compile.source import modules
 
-# Sizes that are copied by element, and sizes that are not.
+# Sizes copied element by element, and sizes copied as a whole.
 KINDS = {
     "number": "float",
     "flag": "bool",
@@ -58,7 +58,7 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Inside]:
     return cls(), Inside(lowering.compile_component(cls))
 
 
-def test_elements_keep_their_places(both: tuple[Any, Inside]) -> None:
+def test_elements_keep_their_positions(both: tuple[Any, Inside]) -> None:
     component, inside = both
     draw = np.random.default_rng(1)
     record = component._record.copy()
@@ -82,7 +82,7 @@ def test_an_input_has_its_status(both: tuple[Any, Inside], is_new: bool, is_vali
     assert not record["matrix_out__written"]
 
 
-def test_safe_writes_also_if_it_raises(both: tuple[Any, Inside]) -> None:
+def test_safe_writes_even_if_it_raises(both: tuple[Any, Inside]) -> None:
     component, inside = both
     record = component._record.copy()
     record["flag"] = record["flag__valid"] = True

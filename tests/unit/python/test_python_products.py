@@ -1,4 +1,4 @@
-"""`@` sums each element from the first product to the last, however its arrays lie in memory."""
+"""`@` sums each element from the first product to the last, for any memory layout of its arrays."""
 
 from typing import Any
 
@@ -9,7 +9,7 @@ from rtcf_compile.machine_code import lowering
 from rtcf_compile.rewriting.helpers import rtcf_matmul
 from rtcf_compile.source import modules
 
-# Of a (15 x 11), b (11 x 15), v (11), w (15), all floats of 64 bits, and others.
+# Products of a (15 x 11), b (11 x 15), v (11), w (15), all of float64, and of other types.
 PRODUCTS = [
     *("a @ v", "w @ a", "a @ b", "a.T @ w", "v @ a.T", "a @ a.T", "b.T @ b", "b.T @ a.T"),
     *("a[:, ::2] @ v[::2]", "w[::-1] @ a[:, 1:8]", "a[2:9] @ b[:, 3:8]", "a @ b[:, ::3]"),
@@ -49,7 +49,7 @@ def filled(cls: Any) -> tuple[Any, dict[str, Any]]:
     draw = np.random.default_rng(1)
     record = cls()._record
     for name in ("a", "b", "v", "w", "narrow"):
-        # Of very different sizes: another order of the sum shows.
+        # Of very different magnitudes, so that another order of the sum shows.
         exponents = draw.uniform(-9.0, 9.0, record[name].shape)
         record[name] = draw.normal(size=record[name].shape) * 10.0**exponents
     record["whole"] = draw.integers(-1000, 1000, 11)
@@ -91,7 +91,7 @@ def test_a_product_sums_from_first_to_last(text: str, inside: Any) -> None:
 
 
 @pytest.mark.parametrize("text", WRONG)
-def test_shapes_that_do_not_fit_are_a_fault(text: str, inside: Any) -> None:
+def test_mismatched_shapes_are_a_fault(text: str, inside: Any) -> None:
     cls, compiled = inside
     record, _ = filled(cls)
     record["which"] = len(PRODUCTS) + WRONG.index(text)

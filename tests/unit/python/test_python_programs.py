@@ -1,5 +1,5 @@
-"""Random programs do compiled what they do in the interpreter, bit by bit but for the last places
-of functions of the C library and NumPy's own.
+"""Random programs give the same results compiled and interpreted, bit by bit except for the last
+places of functions of the C library and NumPy.
 """
 
 import os
@@ -14,8 +14,8 @@ from rtcf_compile.comparison import verify
 from rtcf_compile.machine_code import lowering
 from rtcf_compile.source import modules
 
-TOGETHER = 25  # programs of one component
-TIMES = 12  # that each runs, on average
+TOGETHER = 25  # programs per component
+TIMES = 12  # runs of each program, on average
 
 
 def same(seed: int, folder: Path) -> None:
@@ -29,17 +29,17 @@ def same(seed: int, folder: Path) -> None:
     assert found.differences == [], f"seed {seed}: {found}"
 
 
-# A seed has no simpler one.
+# A seed cannot be shrunk.
 @settings(max_examples=3, phases=[Phase.explicit, Phase.reuse, Phase.generate])
 @given(seed=st.integers(0, 2**32 - 1))
-def test_programs_do_compiled_what_they_do_in_the_interpreter(
+def test_random_programs_give_the_same_results_compiled_and_interpreted(
     tmp_path_factory: pytest.TempPathFactory, seed: int
 ) -> None:
     same(seed, tmp_path_factory.mktemp("programs"))
 
 
 @pytest.mark.long
-def test_a_hundred_thousand_programs(tmp_path: Path) -> None:
+def test_a_hundred_thousand_random_programs(tmp_path: Path) -> None:
     begin = int(os.environ.get("RTCF_SEED", "26"))
     for seed in range(begin, begin + 100_000 // TOGETHER):
         same(seed, tmp_path)

@@ -1,4 +1,4 @@
-"""What is read of the places that raise, out of code as LLVM writes it."""
+"""Extraction of the places that raise from LLVM's assembly."""
 
 import pickle
 
@@ -10,7 +10,7 @@ FILE = "/some/where/controller.py"
 
 
 def assembly(**constants: bytes) -> str:
-    """Return a module with such constants, as numba's are printed."""
+    """Return a module with such constants, in numba's format."""
     module = ir.Module()
     for name, data in constants.items():
         kind = ir.ArrayType(ir.IntType(8), len(data))
@@ -25,8 +25,8 @@ def place(text: str, line: int = 7) -> bytes:
 
 
 @pytest.mark.parametrize("length", range(0, 256, 5))
-def test_any_text_is_read_as_it_is(length: int) -> None:
-    # Lengths stand in the bytes, too, and some of them are what LLVM writes in another way.
+def test_any_text_is_read_exactly(length: int) -> None:
+    # Lengths occur in the bytes, too, and LLVM escapes some of them.
     text = "".join(chr(32 + (each + length) % 95) for each in range(length)) + "\\ \\5c \\\\"
     data = place(text)
     (found,) = raises_in(assembly(x1=data).replace("x1", "1"), FILE).items()
@@ -35,8 +35,8 @@ def test_any_text_is_read_as_it_is(length: int) -> None:
 
 
 @pytest.mark.parametrize("first", [0x95, 0x80, 0x2E, 0x8A, 0x94, 0x68])
-def test_a_hash_is_no_place(first: int) -> None:
-    # Beside each constant is its hash, whose bytes may be any.
+def test_a_hash_is_not_read_as_a_place(first: int) -> None:
+    # Next to each constant is its hash, whose bytes are arbitrary.
     data, other = place("too much"), bytes([first]) + b"\xff" * 19
     text = assembly(x1=data, x2=other).replace("pickledata.x1", "pickledata.1")
     found = raises_in(text.replace("pickledata.x2", "pickledata.1.sha1"), FILE)

@@ -1,4 +1,4 @@
-"""rtcf.signal: against what is known in closed form."""
+"""rtcf.signal against closed-form solutions."""
 
 import math
 
@@ -14,7 +14,7 @@ def test_the_exponential_of_a_rotation(angle: float) -> None:
     assert found == pytest.approx(np.array([[cosine, -sine], [sine, cosine]]), abs=1e-13)
 
 
-def test_the_exponential_of_what_is_diagonal_or_nilpotent() -> None:
+def test_the_exponential_of_a_diagonal_or_nilpotent_matrix() -> None:
     assert expm(np.diag([1.0, -3.0, 20.0])) == pytest.approx(
         np.diag(np.exp([1.0, -3.0, 20.0])), rel=1e-12
     )
@@ -42,7 +42,7 @@ def test_the_trapezoidal_rule_on_a_lag() -> None:
     assert (a[0, 0], b[0, 0]) == pytest.approx((0.9 / 1.1, 0.3 / 1.1))
 
 
-def test_what_has_no_exponential_is_refused() -> None:
+def test_a_matrix_without_exponential_is_rejected() -> None:
     with pytest.raises(ValueError, match="not square"):
         expm(np.zeros((2, 3)))
     with pytest.raises(ValueError, match="not finite"):

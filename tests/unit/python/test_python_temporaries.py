@@ -1,4 +1,4 @@
-"""Temporary arrays have the values that NumPy gives them, wherever they are kept."""
+"""Temporary arrays have the values that NumPy gives them, on the stack and in the arena."""
 
 from pathlib import Path
 from typing import Any
@@ -98,13 +98,13 @@ def component(folder: Path, body: str) -> Any:
 
 
 @pytest.mark.parametrize("body", BODIES.values(), ids=BODIES)
-def test_temporaries_are_as_in_the_interpreter(body: str, tmp_path: Path) -> None:
+def test_temporaries_match_the_interpreter(body: str, tmp_path: Path) -> None:
     cls = component(tmp_path, body)
     found = verify.compare(cls, lowering.compile_component(cls), 2000)
     assert found.differences == []
 
 
-def test_arrays_of_constant_size_take_no_room_in_the_arena(tmp_path: Path) -> None:
+def test_arrays_of_constant_size_do_not_use_the_arena(tmp_path: Path) -> None:
     cls = component(tmp_path, BODIES["parts of others"])
     inside = Inside(lowering.compile_component(cls, arena_bytes=128))
     record = cls()._record

@@ -1,4 +1,4 @@
-"""Compiled components do what the interpreter does, to the last places; what does not is found."""
+"""Compiled components match the interpreter to the last places; differences are found."""
 
 import os
 import re
@@ -18,7 +18,7 @@ from rtcf_compile.source import modules as source
 FOLDER = Path(__file__).parents[2] / "components" / "python"
 NAMES = ("controllers", "filters", "messages", "written")
 FILES = [source.load(FOLDER / f"{name}.py") for name in NAMES]
-# One way of Failing fills the arena, which the interpreter does not have.
+# One branch of Failing fills the arena, which the interpreter does not have.
 CLASSES = {
     each.__name__: each
     for file in FILES
@@ -29,7 +29,7 @@ CLASSES = {
 
 @pytest.fixture(scope="module")
 def compiled() -> dict[str, lowering.Compiled]:
-    """Keep what has been compiled."""
+    """Cache compiled components."""
     return {}
 
 
@@ -69,9 +69,9 @@ class {name}(Component):
 
 {body}
 """
-# Python's ints have no bound, those of the loop 64 bits.
+# Python's ints are unbounded, the loop's have 64 bits.
 OVERFLOW = "    def update(self):\n        self.out.write(self.a.value * 10**18 % 7)"
-# Python goes on to 2**64, which is 0 in 64 bits.
+# Python continues to 2**64, which is 0 in 64 bits.
 ENDLESS_COMPILED = """\
     def update(self):
         x = self.a.value * 0 + 2**32
@@ -86,7 +86,7 @@ WRAP = """\
             x -= 2 * np.pi
         self.out.write(x)
 """
-# Compiled, 2**64 is 0; the array divides to infinity in both.
+# Compiled, 2**64 is 0; both divide the array to infinity.
 DIVISIONS = """\
     def update(self):
         whole = self.a.value * 2**32 * 2**32
@@ -112,7 +112,7 @@ def written(folder: Path, body: str, a: str = "float", out: str = "", name: str 
 
 
 @pytest.mark.parametrize("amount", ["1000", "0.2s"])
-def test_a_difference_is_told_with_hook_cycle_member_and_both_values(
+def test_a_difference_is_reported_with_hook_cycle_member_and_both_values(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], amount: str
 ) -> None:
     library = tmp_path / "lib" / "tried.so"
@@ -128,7 +128,7 @@ def test_a_difference_is_told_with_hook_cycle_member_and_both_values(
     assert not library.exists()
 
 
-def test_a_division_by_zero_of_the_machine_alone_is_told(
+def test_a_division_by_zero_only_in_machine_code_is_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = written(tmp_path, DIVISIONS, "int", "float")
@@ -149,7 +149,7 @@ def test_another_fault_is_a_difference(
     )
 
 
-def test_single_numbers_divide_as_compiled_ones(tmp_path: Path) -> None:
+def test_numpy_scalars_divide_as_in_compiled_code(tmp_path: Path) -> None:
     body = """\
     def update(self):
         v = self.a.value
@@ -163,9 +163,7 @@ def test_single_numbers_divide_as_compiled_ones(tmp_path: Path) -> None:
     assert main.main([file, "--verify", "2000"]) == main.DONE
 
 
-def test_an_element_that_differs_is_named(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_differing_element_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     body = """\
     def update(self):
         pair = np.zeros(2, np.int64)
@@ -177,10 +175,10 @@ def test_an_element_that_differs_is_named(
     assert "out[1] is " in capsys.readouterr().err
 
 
-def test_other_rounding_of_a_sum_is_no_difference(
+def test_different_rounding_of_a_sum_is_no_difference(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # In another order than that of compiled code.
+    # In another order than in compiled code.
     backwards = {name: lambda a, *_: np.sum(a[::-1]) for name in HELPERS if "sum" in name}
     monkeypatch.setattr(verify, "HELPERS", HELPERS | backwards)
     assert main.main([written(tmp_path, SUM, "np.float64, 64", "float"), "--verify", "1000"]) == 0
@@ -196,7 +194,7 @@ def test_an_error_larger_than_rounding_is_a_difference() -> None:
     assert not verify._is_rounding(np.float64(2.0), np.float64(1.0), [])
 
 
-def test_an_infinite_element_says_nothing_about_the_others() -> None:
+def test_an_infinite_element_does_not_hide_other_differences() -> None:
     theirs = np.array([1.0, np.inf, np.nan, 5.0])
     nearby = [np.array([1.0 + 4e-16, np.inf, np.nan, 5.0]), theirs]
     assert verify._is_rounding(theirs + np.array([2e-15, 0.0, 0.0, 1e-15]), theirs, nearby)
@@ -206,7 +204,7 @@ def test_an_infinite_element_says_nothing_about_the_others() -> None:
 
 
 @pytest.mark.parametrize("value", ["self.a.value * 0.1", "np.std(self.a.value)", "SMOOTHED"])
-def test_float32_is_rounded_as_by_numpy(
+def test_float32_is_rounded_as_in_numpy(
     value: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     body = f"    def update(self):\n        self.out.write({value} * np.ones(8))"
@@ -246,20 +244,20 @@ def test_float32_is_rounded_as_by_numpy(
     ],
     ids=["interpreter", "prepare", "compiled"],
 )
-def test_a_hook_that_does_not_end_is_told_with_its_loop(
+def test_an_endless_hook_is_reported_with_its_loop(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], body: str, kind: str, said: str
 ) -> None:
     assert main.main([written(tmp_path, body, kind), "--verify", "1000"]) == main.DIFFERENT
     assert re.fullmatch(rf"rtcf-compile: \S*tried\.py{said}\n", capsys.readouterr().err)
 
 
-def test_a_loop_without_end_does_not_hold_up_compiling(tmp_path: Path) -> None:
-    # It runs some cycles in the interpreter, too.
+def test_an_endless_loop_does_not_block_compiling(tmp_path: Path) -> None:
+    # Compiling runs some cycles in the interpreter, too.
     (tried,) = source.components(source.load(Path(written(tmp_path, ENDLESS_PREPARE))))
     assert lowering.compile_component(tried).hooks == ["prepare", "update"]
 
 
-def test_seconds_are_of_processor_time_and_least_cycles_come_first(
+def test_seconds_are_processor_time_after_the_minimum_of_cycles(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     now = 5.0
@@ -271,14 +269,14 @@ def test_seconds_are_of_processor_time_and_least_cycles_come_first(
 
 
 @pytest.mark.parametrize("amount", ["0", "-3", "1.5", "0s", "0.0s", "s", "1m", "1e9"])
-def test_an_amount_that_is_none_is_refused(capsys: pytest.CaptureFixture[str], amount: str) -> None:
+def test_an_invalid_amount_is_rejected(capsys: pytest.CaptureFixture[str], amount: str) -> None:
     with pytest.raises(SystemExit):
         main.main(["none.py", f"--verify={amount}"])
     said = f"--verify {amount}: cycles, as 10000, or seconds, as 1s"
     assert said in capsys.readouterr().err
 
 
-def test_the_death_of_compiled_code_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_crash_of_compiled_code_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     def die(self: inside.Inside, hook: str, record: Any) -> None:
         os.kill(os.getpid(), signal.SIGKILL)
 

@@ -1,4 +1,4 @@
-"""Settings that are numbers: units on the command line, and one table for all who tell of them."""
+"""Numeric settings: units on the command line, and one table for all their descriptions."""
 
 import re
 from pathlib import Path
@@ -36,7 +36,7 @@ def given(*words: str) -> runner_pb2.RunnerSettings:
         ("--heap-kb 8MiB", "heap_kb", 8192),
     ],
 )
-def test_units_are_the_same_with_every_option(words: str, field: str, value: float) -> None:
+def test_every_option_accepts_the_same_units(words: str, field: str, value: float) -> None:
     assert getattr(given(*words.split()), field) == value
 
 
@@ -53,7 +53,7 @@ def test_units_are_the_same_with_every_option(words: str, field: str, value: flo
         ("--frequency fast", "argument --frequency: fast: give a number with one of Hz, kHz"),
     ],
 )
-def test_what_is_no_such_number_is_a_usage_error(
+def test_an_invalid_number_is_a_usage_error(
     words: str, said: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as left:
@@ -63,7 +63,7 @@ def test_what_is_no_such_number_is_a_usage_error(
 
 
 @pytest.mark.parametrize(("name", "message", "quantity"), EVERY)
-def test_rtcfd_takes_what_is_in_range_and_nothing_else(
+def test_rtcfd_accepts_exactly_the_values_in_range(
     name: str, message: str, quantity: Quantity
 ) -> None:
     def check(value: float) -> None:
@@ -80,7 +80,7 @@ def test_rtcfd_takes_what_is_in_range_and_nothing_else(
 
 
 @pytest.mark.parametrize(("name", "message", "quantity"), EVERY)
-def test_what_is_written_of_a_setting_is_what_the_table_says(
+def test_descriptions_of_settings_match_the_table(
     name: str, message: str, quantity: Quantity
 ) -> None:
     default = f"{quantity.default:g}"

@@ -1,11 +1,9 @@
-"""Random sequences of what people do to rtcfd, compared with what they may rely on.
+"""Random sequences of operations on rtcfd, compared with its guarantees.
 
-After an answered stop no cycle runs until somebody asks for a start, whatever the
-disk and the clock do meanwhile; nothing is held by the dead; and the disk says what
-was answered.  A few dozen sequences are
-drawn by each run; `--long` draws 10 000, or as many as RTCF_SEQUENCES says.
-Sequences depend on the seed alone (RTCF_SEED, 1 if there is none), besides those that failed before
-and are kept.
+After an answered stop no cycle runs until a start is requested, for any state of the disk and
+the clock; no lease of a dead client remains; and the disk matches the answers. Each run draws
+a few dozen sequences; `--long` draws 10 000, or RTCF_SEQUENCES. Sequences depend only on the
+seed (RTCF_SEED, 1 by default), besides stored sequences that failed before.
 """
 
 import asyncio
@@ -40,24 +38,24 @@ actions = st.one_of(
         st.sampled_from(["Load", "Unload", "LeaseComponent"]), runners, st.sampled_from(NAMES)
     ),
     st.tuples(st.sampled_from(["Apply", "HoldRunner"]), runners),
-    # SIGKILL is of rtcfd and all executors at once.
+    # SIGKILL kills rtcfd and all executors at once.
     st.tuples(st.sampled_from(["SIGTERM", "SIGUSR1", "SIGKILL"])),
     st.tuples(st.just("disk"), st.sampled_from(MODES)),
     st.tuples(st.just("clock"), st.sampled_from([-3600.0, 3600.0, 1e9])),
 )
-# What the caller does: waits for the answer, goes on meanwhile, or leaves so many steps later.
+# The caller waits for the answer, continues meanwhile, or disconnects after some steps.
 callers = st.one_of(st.just("waits"), st.just("goes on"), st.integers(0, 30))
 steps = st.tuples(actions, callers, st.integers(0, 5))
 
 
 class Sequence:
-    """One sequence: rtcfd, those who call it, and what they may rely on."""
+    """One sequence: rtcfd, its clients, and the guarantees."""
 
     def __init__(self, folder: Path, packages: Path, machine: Machine, world: "World") -> None:
         self._folder, self._packages, self._machine = folder, packages, machine
         self._world = world
         self._callers: set[asyncio.Task[None]] = set()
-        # Runners whose last word was an answered stop.
+        # Runners whose last answered call was a stop.
         self._stopped: set[str] = set(RUNNERS)
         self._starts = dict.fromkeys(RUNNERS, 0)
         self.rtcfd = Rtcfd(folder, packages, machine)
@@ -145,12 +143,12 @@ class Sequence:
                 await rtcfd.call(method, kind(runner=runner))
 
     async def _restart(self, number: str) -> None:
-        """End rtcfd and start the next; connections end with it."""
+        """End rtcfd and start its successor; connections end with it."""
         if number == "SIGTERM":
             await self.rtcfd.runners.close(in_order=True)
             self._stopped |= set(RUNNERS)
         elif number == "SIGKILL":
-            self._world.disk.become("dead")  # what is not on disk never will be
+            self._world.disk.become("dead")  # pending writes are lost
             await self.rtcfd.runners.leave()
             await self._machine.kill_all()
         else:
@@ -161,7 +159,7 @@ class Sequence:
         await self.rtcfd.start()
 
     async def _watch(self) -> None:
-        """No cycle runs after an answered stop."""
+        """Check that no cycle runs after an answered stop."""
         while True:
             for runner in self._stopped:
                 peer = self.rtcfd.peer(runner)
@@ -179,7 +177,7 @@ class Sequence:
                 raise result
 
     async def _quiet(self) -> None:
-        """Wait until rtcfd has nothing to do."""
+        """Wait until rtcfd is idle."""
         async with asyncio.timeout(DEADLINE_S):
             for _ in range(3):
                 await self.rtcfd.runners.operations.drain()
@@ -191,12 +189,12 @@ class Sequence:
             saved, peer = self.rtcfd.saved(name), self.rtcfd.peer(name)
             known = name in [runner.name for runner in self.rtcfd.runners.all()]
             assert (peer is not None) == known
-            # What a bad disk did not remove comes back with the next rtcfd, held.
+            # A runner that a bad disk did not remove returns with the next rtcfd, held.
             if name == "arm" and not self._world.disk.ever_bad:
-                assert (saved is not None) == known, "a runner is on disk, or is not there"
+                assert (saved is not None) == known, "runners match the state"
             if saved is None or peer is None:
                 continue
-            assert saved["hold"] is None and saved["leased"] == {}, "nothing is held by the dead"
+            assert saved["hold"] is None and saved["leased"] == {}, "no lease of the dead"
             assert saved["running"] == peer.running
             assert sorted(f"/{each['name']}" for each in saved["components"]) == sorted(
                 peer.components
@@ -205,7 +203,7 @@ class Sequence:
 
 @pytest.fixture(scope="module")
 def place() -> Any:
-    # In memory: each save is forced out to the disk.
+    # In memory: each save is synced to the disk.
     memory = Path("/dev/shm")
     folder = Path(tempfile.mkdtemp(dir=memory if memory.is_dir() else None))
     library = folder / "lib" / "demo" / "main.so"
@@ -216,7 +214,7 @@ def place() -> Any:
 
 
 class World:
-    """What is below rtcfd: a disk that may fail, and a clock that may jump."""
+    """The environment of rtcfd: a disk that may fail, and a clock that may jump."""
 
     def __init__(self) -> None:
         self.disk = FailingDisk()
@@ -234,7 +232,7 @@ def world() -> Any:
     world = World()
     with pytest.MonkeyPatch.context() as patch:
         world.install(patch)
-        # A disk that hangs is soon taken for one.
+        # Hanging disks are detected quickly.
         patch.setattr(saver, "PATIENCE_S", 0.02)
         patch.setattr("rtcfd.runners.runner.LEAVE_TIMEOUT_S", 0.1)
         yield world
@@ -271,7 +269,7 @@ def play(sequence: list[Any], place: Path, machine: Machine, world: World) -> No
 
 
 def drawn(number: int) -> Any:
-    """Let a test have so many sequences, drawn by the seed."""
+    """Give a test this many sequences, drawn from the seed."""
 
     def decorate(test: Any) -> Any:
         health = [HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
@@ -286,9 +284,9 @@ def drawn(number: int) -> Any:
     return decorate
 
 
-# A start that comes while a launch's runner is being given back.
+# A start during the release of a launch's runner.
 @example(sequence=[(("HoldRunner", "rt_runner"), 3, 0), (("Start", "rt_runner"), "waits", 0)])
-# A stop that a disk which hangs does not take, and the end of everything.
+# A stop that a hanging disk does not store, and the end of everything.
 @example(
     sequence=[
         (("AddRunner", "arm"), "waits", 0),
@@ -299,7 +297,7 @@ def drawn(number: int) -> Any:
     ]
 )
 @drawn(40)  # type: ignore[misc]
-def test_random_sequences_keep_what_is_promised(
+def test_random_sequences_keep_the_guarantees(
     place: Path, machine: Machine, world: World, sequence: list[Any]
 ) -> None:
     play(sequence, place, machine, world)
@@ -309,7 +307,7 @@ def test_random_sequences_keep_what_is_promised(
 @drawn(  # type: ignore[misc]
     int(os.environ.get("RTCF_SEQUENCES", "10000"))
 )
-def test_ten_thousand_random_sequences_keep_what_is_promised(
+def test_ten_thousand_random_sequences_keep_the_guarantees(
     place: Path, machine: Machine, world: World, sequence: list[Any]
 ) -> None:
     play(sequence, place, machine, world)

@@ -1,5 +1,5 @@
-"""What refusals tell programs: one list of reasons, each used, each with an exception, readable
-by whoever reads google.rpc.Status."""
+"""Errors for programs: one list of reasons, each of them used, each with an exception, readable
+as google.rpc.Status."""
 
 import re
 from pathlib import Path
@@ -23,7 +23,7 @@ ON_STANDARD_ERROR = {"REASON_DAEMON_FAILED"}
 
 
 class _Failed(grpc.RpcError):  # type: ignore[misc]
-    """What gRPC raises in a client."""
+    """gRPC's exception in a client."""
 
     def __init__(self, refusal: Refusal) -> None:
         self._refusal = refusal
@@ -38,7 +38,7 @@ class _Failed(grpc.RpcError):  # type: ignore[misc]
         return [(status_codes.DETAILS_KEY, status_codes.details(self._refusal))]
 
 
-def test_each_reason_has_an_exception_of_its_name_that_says_what_the_protocol_says() -> None:
+def test_each_reason_has_an_exception_documented_as_in_the_protocol() -> None:
     text = (TREE / "proto/rtcf/v1/errors.proto").read_text(encoding="utf-8")
     said = dict(re.findall(r"^  (REASON_\w+) = \d+; *// (.*)$", text, re.M))
     assert set(said) == set(REASONS)
@@ -49,11 +49,11 @@ def test_each_reason_has_an_exception_of_its_name_that_says_what_the_protocol_sa
         assert document.lower() == said[f"REASON_{reason}"].lower() + "."
 
 
-def test_numbers_of_reasons_are_dense() -> None:
+def test_reason_numbers_are_dense() -> None:
     assert sorted(errors_pb2.Reason.values()) == list(range(len(REASONS) + 1))
 
 
-def test_a_client_gets_the_exception_of_the_reason_with_what_it_is_about() -> None:
+def test_a_client_gets_the_exception_of_the_reason_with_its_subject() -> None:
     refusal = refusals.NotFound(
         "no runner", errors_pb2.REASON_RUNNER_NOT_FOUND, runner="arm", suggestion="arms", field=""
     )
@@ -64,16 +64,14 @@ def test_a_client_gets_the_exception_of_the_reason_with_what_it_is_about() -> No
     assert found.about == {"runner": "arm", "suggestion": "arms"}
 
 
-def test_a_reason_of_a_newer_rtcfd_is_a_refusal_all_the_same() -> None:
+def test_an_unknown_reason_of_a_newer_rtcfd_is_still_an_error() -> None:
     found = failures.refused("because", "ABORTED", "MOON_IS_FULL")
     assert type(found) is errors.RefusedError
     assert found.reason == "MOON_IS_FULL"
 
 
 @pytest.mark.parametrize("garbage", [b"\xff\xff", b"\x1a\x04\x12\x02ab", b"\x1a"])
-def test_details_that_are_damaged_leave_the_line(
-    garbage: bytes, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_damaged_details_keep_the_message(garbage: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
     failed = _Failed(refusals.NotFound("no such thing", errors_pb2.REASON_PORT_NOT_FOUND))
     monkeypatch.setattr(failed, "trailing_metadata", lambda: [(status_codes.DETAILS_KEY, garbage)])
     found = failures.from_grpc(failed, "/nowhere")
@@ -90,19 +88,17 @@ def test_details_that_are_damaged_leave_the_line(
         st.text(max_size=5000),
     ),
 )
-def test_a_refusal_fits_into_the_metadata_that_any_client_takes(
-    text: str, about: dict[str, str]
-) -> None:
+def test_an_error_fits_into_any_clients_metadata(text: str, about: dict[str, str]) -> None:
     refusal = refusals.NotFound(text, errors_pb2.REASON_PORT_NOT_FOUND, **about)
     line = quote(status_codes.bounded(refusal))
     details = status_codes.details(refusal)
-    assert len(line) + (len(details) + 2) // 3 * 4 < 8 * 1024 - 512  # other headers
+    assert len(line) + (len(details) + 2) // 3 * 4 < 8 * 1024 - 512  # for other headers
     status = errors_pb2.ErrorStatus.FromString(details)
     assert quote(status.message) == line
 
 
 def _googles_messages() -> Any:
-    """Return google.rpc's Status and ErrorInfo, as a process with googleapis has them."""
+    """Return google.rpc's Status and ErrorInfo, as in a process with googleapis."""
     file = descriptor_pb2.FileDescriptorProto(name="google/rpc/test.proto", package="google.rpc")
     file.syntax = "proto3"
     file.dependency.append("google/protobuf/any.proto")
@@ -126,7 +122,7 @@ def _googles_messages() -> Any:
     entry.options.map_entry = True
     entry.field.add(name="key", number=1, type=kind.TYPE_STRING, label=one)
     entry.field.add(name="value", number=2, type=kind.TYPE_STRING, label=one)
-    # The pool of all modules: two definitions of one name would fail here.
+    # The pool of all modules: two definitions of the same name would fail here.
     pool = descriptor_pool.Default()
     pool.Add(file)
     make = message_factory.MessageFactory(pool).GetPrototype
@@ -136,7 +132,7 @@ def _googles_messages() -> Any:
     )
 
 
-def test_others_libraries_read_the_details_beside_ours_in_one_process() -> None:
+def test_googleapis_can_read_the_details_in_the_same_process() -> None:
     refusal = refusals.AlreadyExists(
         "there already", errors_pb2.REASON_COMPONENT_EXISTS, runner="arm", component="/pid"
     )
@@ -145,6 +141,6 @@ def test_others_libraries_read_the_details_beside_ours_in_one_process() -> None:
     assert (status.code, status.message) == (6, "there already")
     (detail,) = status.details
     info = info_type()
-    assert detail.Unpack(info)  # checks the type's full name
+    assert detail.Unpack(info)  # this checks the type's full name
     assert (info.reason, info.domain) == ("COMPONENT_EXISTS", "rtcf")
     assert dict(info.metadata) == {"runner": "arm", "component": "/pid"}

@@ -1,4 +1,4 @@
-"""A library that changes on disk: said wherever one looks, and taken when it is asked for."""
+"""A library that changes on disk: reported in every view, and loaded on request."""
 
 import asyncio
 import os
@@ -16,13 +16,13 @@ from rtcfd_in_process import Rtcfd, spec
 
 
 def rebuild(library: Path) -> None:
-    """Put another file with the same content there, as a package manager does."""
+    """Replace the file with another one of the same content, as a package manager does."""
     new = library.with_suffix(".new")
     new.write_text(library.read_text())
     os.replace(new, library)
 
 
-def test_a_library_that_changed_is_said_by_list_info_and_status_and_taken_by_replace(
+def test_a_changed_library_is_reported_and_loaded_by_replace(
     daemon: DaemonUnderTest, client: rtcf.Client
 ) -> None:
     library = daemon.package("late", types={"Late": "fine"})
@@ -41,14 +41,14 @@ def test_a_library_that_changed_is_said_by_list_info_and_status_and_taken_by_rep
     assert not client.get_component("a").library_changed
 
 
-def test_replace_wants_a_type_or_the_rebuilt_library(daemon: DaemonUnderTest) -> None:
+def test_replace_needs_a_type_or_a_rebuilt_library(daemon: DaemonUnderTest) -> None:
     for words in (["a"], ["a", "demo"], ["a", "demo", "Fine", "--rebuilt"]):
         done = daemon.ctl("replace", *words)
         assert done.returncode == 2, words
         assert "specify PKG COMPONENT or --rebuilt" in done.stderr
 
 
-def test_apply_says_that_it_left_old_code_running(
+def test_apply_reports_that_old_code_keeps_running(
     daemon: DaemonUnderTest, client: rtcf.Client, tmp_path: Path
 ) -> None:
     library = daemon.package("late", types={"Late": "fine"})
@@ -61,7 +61,7 @@ def test_apply_says_that_it_left_old_code_running(
     assert said.endswith("--rebuilt loads the new one\n")
 
 
-def test_what_changed_while_rtcfd_was_restarted_is_said_by_the_next(
+def test_a_library_changed_during_a_restart_of_rtcfd_is_reported(
     stopped_daemon: DaemonUnderTest,
 ) -> None:
     daemon = stopped_daemon.start_service()
@@ -72,10 +72,10 @@ def test_what_changed_while_rtcfd_was_restarted_is_said_by_the_next(
     rebuild(library)
     daemon.start_service()
     with daemon.client() as client:
-        wait_for(lambda: client.get_status().runners[0].libraries_changed, "what has changed")
+        wait_for(lambda: client.get_status().runners[0].libraries_changed, "the change")
 
 
-def test_a_folder_that_hangs_keeps_no_stop_from_the_disk(
+def test_a_hanging_folder_does_not_delay_saving_a_stop(
     rtcfd: Callable[[], Rtcfd], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     answers = threading.Event()
@@ -86,7 +86,7 @@ def test_a_folder_that_hangs_keeps_no_stop_from_the_disk(
         await daemon.call("Load", control_pb2.LoadRequest(component=spec("a")))
         await daemon.call("Start", control_pb2.StartRequest())
         monkeypatch.setattr(loaded_code, "_identity", lambda _: answers.wait())
-        # More than all threads that asyncio has by itself.
+        # More than the default threads of asyncio.
         looks = [
             asyncio.create_task(daemon.call("GetStatus", control_pb2.GetStatusRequest()))
             for _ in range(40)
@@ -96,7 +96,7 @@ def test_a_folder_that_hangs_keeps_no_stop_from_the_disk(
                 await daemon.call("Stop", control_pb2.StopRequest())
                 saved = daemon.saved("rt_runner")
                 assert saved is not None and saved["running"] is False
-                await asyncio.gather(*looks)  # nothing is known of the library
+                await asyncio.gather(*looks)  # no data on the library
                 await daemon.call("Load", control_pb2.LoadRequest(component=spec("b")))
         finally:
             answers.set()

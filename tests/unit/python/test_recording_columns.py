@@ -20,7 +20,7 @@ from rtcf.v1 import ports_pb2
 _KINDS = {"double": "<f8", "bool": "?", "uint16[3]": "<u2", "float[2x2]": "<f4"}
 _COUNTS = {"double": (), "bool": (), "uint16[3]": (3,), "float[2x2]": (2, 2)}
 
-# A batch: the states that are there, how many cycles, how many are lost before, flush behind it.
+# A batch: its states, its cycles, the dropped cycles before it, and whether a flush follows.
 _BATCHES = st.lists(
     st.tuples(
         st.sets(st.sampled_from(sorted(_KINDS))),
@@ -33,7 +33,7 @@ _BATCHES = st.lists(
 
 
 class _Disk(io.BytesIO):
-    """A file that keeps how it was after each write."""
+    """A file that stores its content after each write."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -46,7 +46,7 @@ class _Disk(io.BytesIO):
 
 
 class _Model:
-    """The values that a recording has."""
+    """The expected values of a recording."""
 
     def __init__(self, first_cycle: int, seed: int) -> None:
         self.cycles: list[int] = []
@@ -56,7 +56,7 @@ class _Model:
         self._random = np.random.default_rng(seed)
 
     def batch(self, kinds: set[str], count: int, lost: int) -> PortBatch:
-        """Return a batch, which the model has too."""
+        """Return a batch and add it to the model."""
         first = self._next + lost
         self._next = first + count
         cycles = range(first, first + count)
@@ -80,7 +80,7 @@ class _Model:
                     size=size,
                 )
             )
-            # A matrix lies in memory column by column.
+            # A matrix is stored column by column.
             data.append((values.swapaxes(1, 2) if values.ndim == 3 else values).tobytes())
             flat = [value.reshape(-1) if _COUNTS[kind] else value for value in values]
             rows = zip(cycles, flat, strict=True)
@@ -96,7 +96,7 @@ class _Model:
         return PortBatch(schema, 1, first, lost, False, message)
 
     def check(self, recording: Recording) -> None:
-        """Check that a recording has all of it."""
+        """Check that a recording contains everything."""
         columns = recording.read_cycles() if self.cycles else {}
         expected = {
             "iteration": self.cycles,
@@ -129,7 +129,7 @@ def _record(disk: io.BytesIO, batches: Any, first_cycle: int) -> _Model:
 
 @settings(max_examples=60)
 @given(batches=_BATCHES, first_cycle=st.sampled_from([1, 2**32 - 30, 2**40]))
-def test_each_value_is_read_as_it_was_recorded(
+def test_each_value_is_read_as_recorded(
     tmp_path_factory: pytest.TempPathFactory, batches: Any, first_cycle: int
 ) -> None:
     disk = _Disk()
@@ -153,7 +153,7 @@ def test_each_value_is_read_as_it_was_recorded(
 
 
 def _ends_in_a_footer(data: bytes) -> bool:
-    """Tell whether readers that begin at the end of a file find their way."""
+    """Return whether readers can find the summary from the end of a file."""
     end = data[-mcap.FOOTER_SIZE - len(mcap.MAGIC) :]
     opcode, _, summary, offsets, _ = struct.unpack_from("<BQQQI", end)
     first = data[summary : summary + 1]
@@ -166,14 +166,14 @@ def _ends_in_a_footer(data: bytes) -> bool:
 
 @settings(max_examples=30)
 @given(batches=_BATCHES)
-def test_the_file_is_valid_after_each_write_and_has_all_chunks_before(
+def test_the_file_is_valid_after_each_write_with_all_earlier_chunks(
     tmp_path_factory: pytest.TempPathFactory, batches: Any
 ) -> None:
     disk = _Disk()
     model = _record(disk, batches, 1)
     folder = tmp_path_factory.mktemp("recording")
     cycles = 0
-    # The last but one has the begin of its summary still to come.
+    # In the last state but one the start of the summary is not written yet.
     for number, state in enumerate([*disk.states[:-2], disk.states[-1]]):
         assert _ends_in_a_footer(state), number
         file = folder / f"{number}.mcap"
@@ -188,7 +188,7 @@ def test_the_file_is_valid_after_each_write_and_has_all_chunks_before(
 
 
 class _Full(io.BytesIO):
-    """A disk with room for so many bytes."""
+    """A disk with limited space."""
 
     room = 0
 
@@ -230,11 +230,11 @@ def _some_chunks(file: Path) -> _Model:
     disk = _Disk()
     batches = [({"double", "bool"}, 30, 0, True)] * 4
     model = _record(disk, batches, 1)
-    file.write_bytes(disk.states[-3])  # before it was closed
+    file.write_bytes(disk.states[-3])  # the state before it was closed
     return model
 
 
-def test_a_repaired_recording_is_whole_and_has_all_cycles(tmp_path: Path) -> None:
+def test_a_repaired_recording_is_complete(tmp_path: Path) -> None:
     killed, whole = tmp_path / "killed.mcap", tmp_path / "whole.mcap"
     model = _some_chunks(killed)
     with killed.open("ab") as file:
@@ -248,7 +248,7 @@ def test_a_repaired_recording_is_whole_and_has_all_cycles(tmp_path: Path) -> Non
     assert _ends_in_a_footer(whole.read_bytes())
 
 
-def test_a_damaged_chunk_is_left_out_by_a_repair(tmp_path: Path) -> None:
+def test_a_repair_leaves_out_a_damaged_chunk(tmp_path: Path) -> None:
     killed, whole = tmp_path / "killed.mcap", tmp_path / "whole.mcap"
     _some_chunks(killed)
     data = bytearray(killed.read_bytes())
@@ -262,7 +262,7 @@ def test_a_damaged_chunk_is_left_out_by_a_repair(tmp_path: Path) -> None:
         assert recording.cycles.tolist() == [*range(1, 61), *range(91, 121)]
 
 
-def test_a_repair_writes_over_nothing(tmp_path: Path) -> None:
+def test_a_repair_overwrites_no_file(tmp_path: Path) -> None:
     killed, whole = tmp_path / "killed.mcap", tmp_path / "whole.mcap"
     _some_chunks(killed)
     whole.write_text("mine")
@@ -279,7 +279,7 @@ def test_a_repair_writes_over_nothing(tmp_path: Path) -> None:
 
 
 def test_a_file_of_another_writer_is_read_message_by_message(tmp_path: Path) -> None:
-    """Messages of two channels by turns, with an index behind the chunk."""
+    """Messages of two channels alternate, with an index after the chunk."""
     file = tmp_path / "other.mcap"
     rows = []
     for cycle in range(5):
@@ -307,7 +307,7 @@ def test_a_file_of_another_writer_is_read_message_by_message(tmp_path: Path) -> 
         ]
 
 
-def test_nonsense_in_a_chunk_is_damage(tmp_path: Path) -> None:
+def test_invalid_data_in_a_chunk_is_damage(tmp_path: Path) -> None:
     file = tmp_path / "x.mcap"
     for records in (mcap.record(mcap.MESSAGE, b"")[:-1] + b"\xff" * 40, b"\x05" + b"\xff" * 60):
         with file.open("wb", buffering=0) as out:

@@ -1,4 +1,4 @@
-"""The beginning of a recording's file, which Ctrl-C may interrupt at any point."""
+"""The start of a recording's file, which Ctrl-C may interrupt at any time."""
 
 from pathlib import Path
 from unittest import mock
@@ -8,7 +8,7 @@ from rtcf.recording import files
 from rtcf.recording.reader import read_recording
 
 
-def test_a_file_has_its_name_once_it_can_be_read(tmp_path: Path) -> None:
+def test_a_file_gets_its_name_once_it_is_readable(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     with (
         mock.patch.object(files, "McapWriter", side_effect=KeyboardInterrupt),
@@ -21,7 +21,7 @@ def test_a_file_has_its_name_once_it_can_be_read(tmp_path: Path) -> None:
     begun.close()
 
 
-def test_a_file_is_as_before_where_the_one_over_it_has_not_begun(tmp_path: Path) -> None:
+def test_an_existing_file_is_kept_until_its_replacement_is_readable(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     files.Files(path, "runner").close()
     before = path.read_bytes()

@@ -1,4 +1,4 @@
-"""Reloads of the settings: asked for by several at once."""
+"""Concurrent reloads of the settings."""
 
 from pathlib import Path
 
@@ -10,8 +10,8 @@ from rtcf.v1 import control_pb2, control_pb2_grpc
 
 @pytest.fixture
 def judged(stopped_daemon: DaemonUnderTest) -> Path:
-    """A file to which is written when the executor begins and ends to judge settings; it does not
-    end while there is another one beside it, `held`."""
+    """A file with a line for each start and end of a settings check by the executor; a check does
+    not end while a file `held` exists next to it."""
     notes = stopped_daemon.folder / "judged"
     notes.touch()
     held = stopped_daemon.folder / "held"
@@ -20,13 +20,13 @@ def judged(stopped_daemon: DaemonUnderTest) -> Path:
         "#!/bin/sh\n"
         f'if [ "$1" = --check-settings ]; then echo begin >> {notes}\n'
         f"while [ -e {held} ]; do sleep 0.1; done\n"
-        # Whoever begins beside it does so meanwhile.
+        # A concurrent check would start during this time.
         f"sleep 0.5; echo end >> {notes}; fi\n" + peer
     )
     return notes
 
 
-def test_reloads_at_once_take_turns(stopped_daemon: DaemonUnderTest, judged: Path) -> None:
+def test_concurrent_reloads_are_serialised(stopped_daemon: DaemonUnderTest, judged: Path) -> None:
     daemon = stopped_daemon.start_service()
     held = judged.with_name("held")
     held.touch()
@@ -35,7 +35,7 @@ def test_reloads_at_once_take_turns(stopped_daemon: DaemonUnderTest, judged: Pat
     with grpc.insecure_channel(f"unix:{daemon.socket}") as channel:
         stub = control_pb2_grpc.ControlStub(channel)  # type: ignore[no-untyped-call]
         for frequency in (300, 400, 500):
-            # Each is asked for while the first one is under way.
+            # Each is requested while the first one runs.
             daemon.settings.write_text(f"[runner]\nfrequency_hz = {frequency}.0\n")
             call = stub.Reload(control_pb2.ReloadRequest(), timeout=DEADLINE_S)
             assert next(call).progress
@@ -45,7 +45,7 @@ def test_reloads_at_once_take_turns(stopped_daemon: DaemonUnderTest, judged: Pat
         held.unlink()
         results = [list(call)[-1].result for call in calls]
     assert judged.read_text() == "begin\nend\n" * 3
-    # Each finds what the one before it left: the third reads what the second has.
+    # Each starts from the result of the previous one: the third reads the same as the second.
     changed = ["defaults of runners changed" in result.notes for result in results]
     assert changed == [True, True, False]
     with daemon.client() as client:

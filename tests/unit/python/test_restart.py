@@ -1,4 +1,4 @@
-"""A restart of rtcfd, as systemd asks for it: loops go on, and settings are those of now."""
+"""A restart of rtcfd by systemd: loops continue, and the present settings apply."""
 
 import asyncio
 import signal
@@ -21,7 +21,7 @@ components:
 
 @pytest.fixture
 def service(stopped_daemon: DaemonUnderTest) -> DaemonUnderTest:
-    """A loop with one component, in rtcfd as systemd runs it."""
+    """A loop with one component, in an rtcfd run like systemd does."""
     stopped_daemon.start_service()
     with stopped_daemon.client() as client:
         client.load(rtcf.component("demo", "Fine", name="a"))
@@ -30,7 +30,7 @@ def service(stopped_daemon: DaemonUnderTest) -> DaemonUnderTest:
 
 
 class SlowLoad:
-    """A client whose load takes until there is a file."""
+    """A client whose load takes until a file exists."""
 
     def __init__(self, service: DaemonUnderTest, until: Path) -> None:
         self._service = service
@@ -42,7 +42,7 @@ class SlowLoad:
         assert self._under_way.wait(DEADLINE_S)
 
     def outcome(self) -> list[str]:
-        """Wait for the component that was loaded, or the refusal."""
+        """Return the loaded component, or the error."""
         self._thread.join(DEADLINE_S)
         return self._outcome
 
@@ -73,7 +73,7 @@ def test_the_next_rtcfd_adopts_the_loop(service: DaemonUnderTest) -> None:
     assert "the executor's is kept" not in service.log()
 
 
-def test_a_stop_still_ends_it(service: DaemonUnderTest) -> None:
+def test_a_stop_still_ends_the_loop(service: DaemonUnderTest) -> None:
     pid = service.executor_pid()
     restart(service)
     assert service.end() == 0
@@ -81,7 +81,7 @@ def test_a_stop_still_ends_it(service: DaemonUnderTest) -> None:
     assert list((service.folder / "run").iterdir()) == []
 
 
-def test_defaults_that_have_changed_meanwhile_are_followed_and_what_was_chosen_stays(
+def test_changed_defaults_apply_but_chosen_settings_stay(
     service: DaemonUnderTest,
 ) -> None:
     with service.client() as client:
@@ -98,7 +98,7 @@ def test_defaults_that_have_changed_meanwhile_are_followed_and_what_was_chosen_s
     assert "changed while rtcfd was away: rt_runner: frequency_hz 1000 -> 500" in service.log()
 
 
-def test_a_priority_that_is_set_meanwhile_takes_the_place_of_the_one_by_the_frequency(
+def test_a_newly_set_priority_replaces_the_derived_one(
     service: DaemonUnderTest,
 ) -> None:
     with service.client() as client:
@@ -110,12 +110,12 @@ def test_a_priority_that_is_set_meanwhile_takes_the_place_of_the_one_by_the_freq
         status = client.get_status().runners[0]
         assert (status.state, status.settings.priority) == (RUNNING, 60)
         assert not status.chosen.HasField("priority")
-        # And what was chosen for a runner alone wins over the file.
+        # A value set for this runner wins over the file.
         client.set_runner(runner_pb2.RunnerSettings(priority=70, frequency_hz=4000.0))
         assert client.get_status().runners[0].settings.priority == 70
 
 
-def test_graphs_that_have_changed_meanwhile_are_applied_and_others_are_not(
+def test_only_changed_graphs_are_applied(
     stopped_daemon: DaemonUnderTest,
 ) -> None:
     service = stopped_daemon
@@ -136,7 +136,7 @@ def test_graphs_that_have_changed_meanwhile_are_applied_and_others_are_not(
         assert client.get_status().runners[0].state == RUNNING
 
 
-def test_a_change_that_is_under_way_is_finished_first(service: DaemonUnderTest) -> None:
+def test_a_change_in_progress_finishes_first(service: DaemonUnderTest) -> None:
     until = service.folder / "until"
     slow = SlowLoad(service, until)
     assert service.process is not None
@@ -151,7 +151,7 @@ def test_a_change_that_is_under_way_is_finished_first(service: DaemonUnderTest) 
     assert "the executor's is kept" not in service.log()
 
 
-def test_holders_have_not_died_and_come_back(service: DaemonUnderTest) -> None:
+def test_holders_keep_their_leases_and_return(service: DaemonUnderTest) -> None:
     opening = control_pb2.OpenLease(
         component=rtcf.component("demo", "Fine", name="held"), run_id="run", holder="test",
     )  # fmt: skip
@@ -178,7 +178,7 @@ def test_holders_have_not_died_and_come_back(service: DaemonUnderTest) -> None:
     assert "has died" not in service.log()
 
 
-def test_a_fresh_executor_frees_a_runner_whose_change_hangs(service: DaemonUnderTest) -> None:
+def test_a_new_executor_frees_a_runner_with_a_hanging_change(service: DaemonUnderTest) -> None:
     pid = service.executor_pid()
     slow = SlowLoad(service, service.folder / "never")
     done = service.ctl("runner", "restart", "rt_runner")
@@ -194,7 +194,7 @@ def test_a_fresh_executor_frees_a_runner_whose_change_hangs(service: DaemonUnder
         assert state == graph_pb2.COMPONENT_STATE_CONFIGURED
 
 
-def test_a_stop_that_finds_its_executor_left_to_the_next_rtcfd_is_refused(
+def test_a_stop_after_the_handover_to_the_next_rtcfd_is_rejected(
     rtcfd: Callable[[], Rtcfd],
 ) -> None:
     async def play() -> None:
@@ -205,7 +205,7 @@ def test_a_stop_that_finds_its_executor_left_to_the_next_rtcfd_is_refused(
         with pytest.raises(Refused, match="rtcfd is being restarted"):
             await first.call("Stop", control_pb2.StopRequest())
         saved = second.saved("rt_runner")
-        assert saved is not None and saved["running"] is True  # the disk is the next one's
+        assert saved is not None and saved["running"] is True  # the disk belongs to the next rtcfd
         await second.start()
         assert second.runners.get("rt_runner").loop.running
         await second.call("Stop", control_pb2.StopRequest())

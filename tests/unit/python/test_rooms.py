@@ -1,4 +1,4 @@
-"""Imports and includes among rooms run down, and `make lint` says where they do not."""
+"""Imports and includes between layers point down, and `make lint` reports exceptions."""
 
 import subprocess
 from pathlib import Path
@@ -16,7 +16,7 @@ def check(*arguments: Path) -> subprocess.CompletedProcess[str]:
 
 @pytest.fixture
 def house(tmp_path: Path) -> Path:
-    """A package of two rooms, as it should be."""
+    """A package of two correct layers."""
     (tmp_path / "rooms").write_text("house.attic\nhouse.cellar\nhouse\n")
     for room in ("attic", "cellar"):
         (tmp_path / "src" / "house" / room).mkdir(parents=True)
@@ -27,7 +27,7 @@ def house(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_the_rooms_of_this_tree_are_in_order() -> None:
+def test_the_layers_of_this_tree_are_correct() -> None:
     found = check()
     assert (found.returncode, found.stderr) == (0, "")
 
@@ -36,7 +36,7 @@ def test_lint_checks_them() -> None:
     assert "tools/check-arrows" in (TREE / "tools" / "lint").read_text()
 
 
-def test_an_arrow_that_runs_down_is_in_order(house: Path) -> None:
+def test_an_import_of_a_lower_layer_is_accepted(house: Path) -> None:
     assert check(house / "rooms", house).returncode == 0
 
 
@@ -48,7 +48,7 @@ def test_an_arrow_that_runs_down_is_in_order(house: Path) -> None:
         "import typing\nif typing.TYPE_CHECKING:\n    from house.attic import box",
     ],
 )
-def test_an_arrow_that_runs_up_is_refused(house: Path, text: str) -> None:
+def test_an_import_of_a_higher_layer_is_rejected(house: Path, text: str) -> None:
     (house / "src" / "house" / "attic" / "box.py").touch()
     (house / "src" / "house" / "cellar" / "wine.py").write_text(text)
     found = check(house / "rooms", house)
@@ -56,7 +56,7 @@ def test_an_arrow_that_runs_up_is_refused(house: Path, text: str) -> None:
     assert "house.cellar must not import house.attic" in found.stderr
 
 
-def test_a_circle_within_a_room_is_refused(house: Path) -> None:
+def test_a_circle_within_a_package_is_rejected(house: Path) -> None:
     cellar = house / "src" / "house" / "cellar"
     (cellar / "wine.py").write_text("from house.cellar.rack import Rack")
     (cellar / "rack.py").write_text(
@@ -67,14 +67,14 @@ def test_a_circle_within_a_room_is_refused(house: Path) -> None:
     assert "in a circle" in found.stderr
 
 
-def test_a_module_without_a_room_is_refused(house: Path) -> None:
+def test_a_module_without_a_layer_is_rejected(house: Path) -> None:
     (house / "rooms").write_text("house.attic\nhouse.cellar\n")
     assert "has no package for it" in check(house / "rooms", house).stderr
 
 
 @pytest.fixture
 def hall(tmp_path: Path) -> Path:
-    """A house of C++ with two rooms, as it should be."""
+    """A C++ package of two correct layers."""
     (tmp_path / "rooms").write_text("hall.main\nhall.gallery\nhall.vault\n")
     for room in ("gallery", "vault"):
         (tmp_path / "src" / "hall" / room).mkdir(parents=True)
@@ -89,7 +89,7 @@ def hall(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_includes_that_run_down_are_in_order(hall: Path) -> None:
+def test_includes_of_a_lower_layer_are_accepted(hall: Path) -> None:
     found = check(hall / "rooms", hall)
     assert (found.returncode, found.stderr) == (0, "")
 
@@ -98,14 +98,14 @@ def test_includes_that_run_down_are_in_order(hall: Path) -> None:
 @pytest.mark.parametrize(
     "text", ['#include "gallery/view.hpp"', '# include "hall/gallery/view.hpp"']
 )
-def test_an_include_that_runs_up_is_refused(hall: Path, file: str, text: str) -> None:
+def test_an_include_of_a_higher_layer_is_rejected(hall: Path, file: str, text: str) -> None:
     (hall / "src" / "hall" / "vault" / file).write_text(f"#pragma once\n{text}\n")
     found = check(hall / "rooms", hall)
     assert found.returncode == 1
     assert f"vault/{file}:2: hall.vault must not import hall.gallery" in found.stderr
 
 
-def test_includes_in_a_circle_are_refused_in_a_room_too(hall: Path) -> None:
+def test_a_circle_of_includes_within_a_package_is_rejected(hall: Path) -> None:
     vault = hall / "src" / "hall" / "vault"
     (vault / "coin.hpp").write_text('#include "vault/bar.hpp"\n')
     (vault / "bar.hpp").touch()
@@ -115,7 +115,7 @@ def test_includes_in_a_circle_are_refused_in_a_room_too(hall: Path) -> None:
     assert "in a circle" in found.stderr
 
 
-def test_a_folder_without_a_room_is_refused(hall: Path) -> None:
+def test_a_folder_without_a_layer_is_rejected(hall: Path) -> None:
     (hall / "src" / "hall" / "attic").mkdir()
     (hall / "src" / "hall" / "attic" / "box.hpp").touch()
     assert "attic/box.hpp: tools/rooms has no package for it" in check(hall / "rooms", hall).stderr

@@ -1,4 +1,4 @@
-"""Where numbers lie in ROS messages, compared with what genpy reads there."""
+"""Positions of numbers in serialised ROS messages, compared with genpy."""
 
 import io
 import struct
@@ -60,7 +60,7 @@ def test_arrays_of_a_fixed_length_are_found() -> None:
     assert values["pose.orientation.w"] == 1.0
 
 
-def test_arrays_are_as_long_as_in_the_sample() -> None:
+def test_arrays_have_the_length_of_the_sample() -> None:
     message = JointState(name=["a", "elbow"], position=[1.0, 2.0], effort=[0.5])
     values = found(message)
     assert values["position"] == [1.0, 2.0]
@@ -68,7 +68,7 @@ def test_arrays_are_as_long_as_in_the_sample() -> None:
     assert values["effort"] == [0.5]
 
 
-def test_of_an_array_with_a_layout_the_data_is_the_value() -> None:
+def test_the_value_of_a_multi_array_is_its_data() -> None:
     message = Float64MultiArray(data=[1.0, 2.0, 3.0])
     message.layout.dim = [MultiArrayDimension("rows", 3, 3)]
     assert found(message) == {"": [1.0, 2.0, 3.0]}

@@ -1,4 +1,4 @@
-"""Values as text become the messages that genpy would make of them, or a line that says why not."""
+"""Values as text become the same messages as with genpy, or an error line."""
 
 import io
 from typing import Any
@@ -22,13 +22,13 @@ from std_msgs.msg import (
 
 
 def read(kind: Any, text: str) -> Any:
-    """Return the message, as genpy reads it."""
+    """Return the message as genpy reads it."""
     data = encode(kind._full_text, text)
     message = kind()
     message.deserialize(data)
     stream = io.BytesIO()
     message.serialize(stream)
-    assert stream.getvalue() == data  # nothing was left over
+    assert stream.getvalue() == data  # no bytes are left
     return message
 
 
@@ -64,7 +64,7 @@ def test_a_text_is_a_message(kind: Any, text: str, expected: Any) -> None:
     assert read(kind, text) == expected
 
 
-def test_messages_in_messages_are_made() -> None:
+def test_nested_messages_are_created() -> None:
     text = "{header: {frame_id: base, stamp: 3.5}, twist: {linear: {x: 1}}}"
     message = read(TwistStamped, text)
     assert (message.header.frame_id, message.header.stamp) == ("base", genpy.Time(3, 500_000_000))
@@ -97,7 +97,7 @@ def test_messages_in_messages_are_made() -> None:
         (PoseArray, "{poses: [&a {}, *a]}", "invalid YAML: an alias (*)"),
     ],
 )
-def test_what_does_not_fit_is_refused_with_its_place(kind: Any, text: str, said: str) -> None:
+def test_unsuitable_values_are_rejected_with_their_place(kind: Any, text: str, said: str) -> None:
     with pytest.raises(ValueError) as error:
         encode(kind._full_text, text)
     assert str(error.value).startswith(said)

@@ -1,4 +1,4 @@
-"""rtcfctl: its words, its formats, its exit codes."""
+"""rtcfctl: its messages, its formats, its exit codes."""
 
 import json
 import os
@@ -19,7 +19,7 @@ from rtcfctl.main import parser, verb_of
 from rtcfctl.terminal.plain import plain
 
 
-def test_a_session_in_words(daemon: DaemonUnderTest) -> None:
+def test_a_session_with_text_output(daemon: DaemonUnderTest) -> None:
     steps = [
         ("runner set --frequency 2000 --no-ros", "runner rt_runner set\n"),
         ("load demo Fine --name a --remap in1:=/x", "loaded /a\n"),
@@ -39,13 +39,13 @@ def test_a_session_in_words(daemon: DaemonUnderTest) -> None:
         assert (done.stdout, done.stderr, done.returncode) == (answer, "", 0), command
 
 
-def test_status_says_loudly_what_is_not_real_time(daemon: DaemonUnderTest) -> None:
+def test_status_warns_of_loops_without_real_time(daemon: DaemonUnderTest) -> None:
     lines = daemon.ctl("status").stdout.splitlines()
     assert "!! rt_runner IS NOT REAL TIME:" in lines
     assert "!!   no permission for SCHED_FIFO" in lines
 
 
-def test_tables_are_not_folded_where_there_is_no_terminal(daemon: DaemonUnderTest) -> None:
+def test_tables_are_not_wrapped_without_a_terminal(daemon: DaemonUnderTest) -> None:
     name = "a" * 60
     daemon.ctl("load", "demo", "Fine", "--name", name, "--ignore", "[a-z]" * 30)
     table = daemon.ctl("list").stdout
@@ -59,7 +59,7 @@ def test_tables_are_not_folded_where_there_is_no_terminal(daemon: DaemonUnderTes
 @pytest.mark.parametrize(
     "command", ["status", "runner list", "list", "info a", "order", "connections", "types", "stats"]
 )
-def test_every_query_speaks_json_and_yaml(daemon: DaemonUnderTest, command: str) -> None:
+def test_every_query_has_json_and_yaml_output(daemon: DaemonUnderTest, command: str) -> None:
     daemon.ctl("load", "demo", "Fine", "--name", "a")
     as_json = json.loads(daemon.ctl(*command.split(), "-o", "json").stdout)
     as_yaml = yaml.safe_load(daemon.ctl("-o", "yaml", *command.split()).stdout)
@@ -67,13 +67,13 @@ def test_every_query_speaks_json_and_yaml(daemon: DaemonUnderTest, command: str)
     assert daemon.ctl(*command.split()).stdout
 
 
-def test_refusal_is_one_line_and_exit_code_1(daemon: DaemonUnderTest) -> None:
+def test_an_error_is_one_line_and_exit_code_1(daemon: DaemonUnderTest) -> None:
     done = daemon.ctl("load", "demo", "Refused")
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr == "rtcfctl: Refused.configure failed\n"
 
 
-def test_ctrl_c_is_exit_code_1_and_what_had_begun_goes_on(
+def test_ctrl_c_is_exit_code_1_and_the_operation_continues(
     daemon: DaemonUnderTest, client: rtcf.Client, tmp_path: Path
 ) -> None:
     go_on = tmp_path / "go on"
@@ -108,7 +108,7 @@ def test_no_daemon_is_exit_code_3(stopped_daemon: DaemonUnderTest) -> None:
     assert done.stderr.count("\n") == 1
 
 
-def test_a_socket_whose_path_no_socket_can_have_is_said_in_a_line() -> None:
+def test_a_too_long_socket_path_is_reported_in_one_line() -> None:
     path = f"/tmp/{'x' * 120}"
     done = subprocess.run(
         [str(BUILD_TREE / "bin" / "rtcfctl"), "--socket", path, "status"],
@@ -118,12 +118,12 @@ def test_a_socket_whose_path_no_socket_can_have_is_said_in_a_line() -> None:
     assert (done.returncode, done.stdout, done.stderr) == (3, "", said)
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="takes root to become somebody else")
+@pytest.mark.skipif(os.geteuid() != 0, reason="requires root to act as another user")
 @pytest.mark.parametrize(
     ("mode", "group", "advice"),
     [
         (0o660, "daemon", "join its group (`sudo adduser nobody daemon`) and log in again"),
-        # No group that gives more than this socket, or nothing.
+        # No group grants access to more than this socket, or to nothing.
         (0o660, "root", "it belongs to the private rtcfd of user root"),
         (0o600, "daemon", "it belongs to the private rtcfd of user root"),
     ],
@@ -131,7 +131,7 @@ def test_a_socket_whose_path_no_socket_can_have_is_said_in_a_line() -> None:
 def test_no_permission_is_exit_code_3_and_names_the_group(
     stopped_daemon: DaemonUnderTest, mode: int, group: str, advice: str
 ) -> None:
-    # Somebody who may look into all folders, also those above the build tree and the socket.
+    # A user who can enter all folders, including those above the build tree and the socket.
     nobody = ["--reuid=65534", "--regid=65534", "--clear-groups"]
     looks = ["--inh-caps=+dac_read_search", "--ambient-caps=+dac_read_search"]
     with socket.socket(socket.AF_UNIX) as listening:
@@ -144,7 +144,7 @@ def test_no_permission_is_exit_code_3_and_names_the_group(
     assert done.returncode == 3
 
 
-def test_ctrl_c_before_all_is_imported_ends_it_without_a_word(tmp_path: Path) -> None:
+def test_ctrl_c_during_imports_ends_it_silently(tmp_path: Path) -> None:
     script = tmp_path / "bin" / "rtcfctl"
     module = tmp_path / "python" / "rtcfctl" / "main.py"
     for file in (script, module):
@@ -155,8 +155,8 @@ def test_ctrl_c_before_all_is_imported_ends_it_without_a_word(tmp_path: Path) ->
     assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
 
 
-# A second Ctrl-C while the first is being minded, and one between the end of all work and that of
-# Python.
+# A second Ctrl-C while the first one is handled, and one between the end of rtcfctl and the end
+# of Python.
 LATE = {
     "the second": "main._fail = main.rtcf.Client = interrupt\n",
     "the last moment": "atexit.register(interrupt)\n",
@@ -164,7 +164,7 @@ LATE = {
 
 
 @pytest.mark.parametrize("when", LATE)
-def test_ctrl_c_while_it_ends_ends_it_without_a_trace(tmp_path: Path, when: str) -> None:
+def test_ctrl_c_at_the_end_prints_no_traceback(tmp_path: Path, when: str) -> None:
     command = str(BUILD_TREE / "bin" / "rtcfctl")
     program = (
         "import atexit, os, runpy, signal, sys\n"
@@ -182,8 +182,8 @@ def test_ctrl_c_while_it_ends_ends_it_without_a_trace(tmp_path: Path, when: str)
     assert "Traceback" not in done.stderr and "KeyboardInterrupt" not in done.stderr
 
 
-def test_ctrl_c_in_an_import_waits_for_its_end(tmp_path: Path) -> None:
-    """What is raised there is lost, or said to be a module that is missing."""
+def test_ctrl_c_in_an_import_takes_effect_after_the_import(tmp_path: Path) -> None:
+    """An exception raised there would be lost, or reported as a missing module."""
     command = str(BUILD_TREE / "bin" / "rtcfctl")
     program = (
         "import os, runpy, signal, sys\n"
@@ -212,10 +212,10 @@ def test_ctrl_c_in_an_import_waits_for_its_end(tmp_path: Path) -> None:
     )
     assert "lost" not in done.stderr and "Traceback" not in done.stderr, done.stderr
     assert done.stderr.startswith("rtcfctl: ")
-    assert done.returncode in (1, 3)  # interrupted, or too late for that: no daemon is there
+    assert done.returncode in (1, 3)  # interrupted, or after the error: no daemon
 
 
-def test_options_become_settings_and_nothing_else() -> None:
+def test_options_set_exactly_their_settings() -> None:
     line = "runner set --cpu -1 --spin 5 --overrun catch_up --no-lock-memory --whitelist a"
     args = parser().parse_args(line.split())
     expected = runner_pb2.RunnerSettings(
@@ -228,7 +228,7 @@ def test_options_become_settings_and_nothing_else() -> None:
     assert settings_of(args) == expected
 
 
-def test_global_options_stand_before_or_after_the_verb() -> None:
+def test_global_options_can_precede_or_follow_the_verb() -> None:
     before = parser().parse_args(["-r", "arm", "-o", "json", "order"])
     after = parser().parse_args(["order", "-r", "arm", "-o", "json"])
     assert (before.runner, before.output) == (after.runner, after.output) == ("arm", "json")
@@ -245,7 +245,7 @@ def test_global_options_stand_before_or_after_the_verb() -> None:
     ],
     ids=["float", "integer", "infinite", "infinite in a list", "too many digits"],
 )
-def test_what_a_port_holds_is_valid_json(text: str, value: object) -> None:
+def test_port_values_are_valid_json(text: str, value: object) -> None:
     found = plain(graph_pb2.PortInfo(value=text))["value"]
     assert found == value
     json.dumps(found, allow_nan=False)
@@ -264,7 +264,7 @@ def test_plain_has_numbers_short_words_and_nulls() -> None:
     assert plain(rtcf.parse_value(".nan")) == "nan"
 
 
-def test_figures_are_watched(daemon: DaemonUnderTest, client: rtcf.Client) -> None:
+def test_statistics_can_be_watched_as_text(daemon: DaemonUnderTest, client: rtcf.Client) -> None:
     figures = client.watch_statistics(interval_s=0.1)
     assert [next(figures).iterations for _ in range(3)] == [10, 10, 10]
     with pytest.raises(rtcf.RefusedError, match='no runner "nobody"'):
@@ -272,7 +272,7 @@ def test_figures_are_watched(daemon: DaemonUnderTest, client: rtcf.Client) -> No
     assert daemon.ctl("stats", "--watch", "0").returncode == 2
 
 
-def test_watched_figures_are_documents_until_ctrl_c(daemon: DaemonUnderTest) -> None:
+def test_watched_statistics_are_documents_until_ctrl_c(daemon: DaemonUnderTest) -> None:
     with daemon.ctl_process("stats", "--watch", "0.1", "-o", "yaml") as process:
         assert process.stdout is not None
         text = ""
@@ -284,7 +284,7 @@ def test_watched_figures_are_documents_until_ctrl_c(daemon: DaemonUnderTest) -> 
     assert [each["iterations"] for each in yaml.safe_load_all(text)][:2] == [10, 10]
 
 
-def test_a_call_imports_what_its_verb_takes_and_no_more(tmp_path: Path) -> None:
+def test_a_call_imports_only_the_modules_of_its_verb(tmp_path: Path) -> None:
     script = (
         "import sys; from rtcfctl.main import main;"
         f"main(['--socket', {str(tmp_path / 'none')!r}, 'status']); print(*sys.modules)"
@@ -309,7 +309,7 @@ def test_the_verb_is_found_among_global_options(line: str) -> None:
     assert vars(parser(verb_of(words)).parse_args(words)) == vars(whole)
 
 
-def test_each_verb_is_found_in_the_module_that_is_said_to_have_it() -> None:
+def test_each_verb_is_in_its_listed_module() -> None:
     (whole,) = (each for each in parser()._actions if isinstance(each.choices, dict))
     assert isinstance(whole.choices, dict)
     for verb in whole.choices:
@@ -329,7 +329,7 @@ def test_each_verb_is_found_in_the_module_that_is_said_to_have_it() -> None:
         ("stats --watch inf", "--watch inf: at least 0.1 s, at most 86400"),
     ],
 )
-def test_a_number_that_is_out_of_range_is_said_with_its_option(
+def test_a_number_out_of_range_is_reported_with_its_option(
     daemon: DaemonUnderTest, words: str, said: str
 ) -> None:
     done = daemon.ctl(*words.split())
@@ -338,7 +338,7 @@ def test_a_number_that_is_out_of_range_is_said_with_its_option(
 
 
 @pytest.mark.parametrize("words", ["status", "-o json status", "stats --watch 0.1", "save"])
-def test_output_that_finds_no_room_is_said_in_a_line(daemon: DaemonUnderTest, words: str) -> None:
+def test_output_to_a_full_disk_is_reported_in_one_line(daemon: DaemonUnderTest, words: str) -> None:
     with open("/dev/full", "w") as full:
         done = subprocess.run(
             [BUILD_TREE / "bin" / "rtcfctl", "--socket", daemon.socket, *words.split()],

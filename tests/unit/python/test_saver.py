@@ -1,4 +1,4 @@
-"""Saving on a disk that does not answer."""
+"""Saves to a disk that does not answer."""
 
 import asyncio
 import contextlib
@@ -21,7 +21,7 @@ NOT_YET = ["not saved yet: the disk of the state folder does not answer"]
 
 
 class HangingStore(Store):
-    """A store whose folder is on a disk that may hang; where stops are noted does not."""
+    """A store whose folder is on a disk that may hang; the folder of stop notes is not on it."""
 
     def __init__(self, folder: Path) -> None:
         self.state, self.boot = folder / "state", folder / "boot"
@@ -29,8 +29,8 @@ class HangingStore(Store):
         super().__init__(self.state, self.boot)
         self.prepare()
         self.saves: list[bool] = []
-        self.begun = 0  # saves
-        self.takes_one = False  # the disk answers once more, then it hangs again
+        self.begun = 0  # number of saves started
+        self.takes_one = False  # whether the disk completes one more save before it hangs
         self._answers = threading.Event()
         self._answers.set()
 
@@ -52,7 +52,7 @@ class HangingStore(Store):
             self._answers.clear()
 
     def take_one(self) -> None:
-        """Let one save of those that hang pass."""
+        """Complete one of the hanging saves."""
         self.takes_one = True
         self._answers.set()
 
@@ -67,7 +67,7 @@ def store(tmp_path: Path) -> HangingStore:
 
 
 def loaded(store: HangingStore) -> Desired:
-    """Return what the next rtcfd finds."""
+    """Return the state that the next rtcfd loads."""
     (state,) = Store(store.state, store.boot).load()
     return state
 
@@ -76,7 +76,7 @@ def saver_of(desired: Desired, store: Store) -> Saver:
     return Saver(desired, Disk(store), log)
 
 
-def test_whoever_saves_on_a_disk_that_hangs_is_told_so_and_does_not_wait(
+def test_a_save_to_a_hanging_disk_returns_with_a_note(
     store: HangingStore,
 ) -> None:
     async def run() -> None:
@@ -91,7 +91,7 @@ def test_whoever_saves_on_a_disk_that_hangs_is_told_so_and_does_not_wait(
     asyncio.run(run())
 
 
-def test_what_was_desired_last_is_on_disk_once_it_answers_however_often_it_was_saved(
+def test_the_last_state_is_on_disk_once_a_hanging_disk_answers(
     store: HangingStore,
 ) -> None:
     async def run() -> None:
@@ -101,17 +101,17 @@ def test_what_was_desired_last_is_on_disk_once_it_answers_however_often_it_was_s
             for count in range(20):
                 desired.running = count % 2 == 0
                 saver.begin()
-                await asyncio.sleep(0)  # the first is on its way to the disk
+                await asyncio.sleep(0)  # the first save is in progress
             desired.running = True
             saver.begin()
         await saver.finish(DEADLINE_S)
 
     asyncio.run(run())
     assert loaded(store).running
-    assert len(store.saves) == 2, "what waits is one save"
+    assert len(store.saves) == 2, "queued saves are merged"
 
 
-def test_a_stop_that_a_hanging_disk_does_not_take_is_known_to_the_next_rtcfd(
+def test_a_stop_during_a_disk_hang_is_known_to_the_next_rtcfd(
     store: HangingStore,
 ) -> None:
     async def run() -> None:
@@ -122,7 +122,7 @@ def test_a_stop_that_a_hanging_disk_does_not_take_is_known_to_the_next_rtcfd(
         with store.hanging():
             desired.running = False
             assert await saver.save() == NOT_YET
-            # What is on disk says that it runs.
+            # The disk says that it runs.
             assert json.loads((store.state / "arm.json").read_text())["running"] is True
             assert not loaded(store).running
             desired.running = True
@@ -130,10 +130,10 @@ def test_a_stop_that_a_hanging_disk_does_not_take_is_known_to_the_next_rtcfd(
         await saver.finish(DEADLINE_S)
 
     asyncio.run(run())
-    assert loaded(store).running, "the start came last"
+    assert loaded(store).running, "the start is the last operation"
 
 
-def test_a_save_that_is_older_than_a_stop_does_not_undo_its_note(store: HangingStore) -> None:
+def test_a_save_older_than_a_stop_keeps_the_stops_note(store: HangingStore) -> None:
     async def run() -> None:
         desired = Desired("arm")
         saver = saver_of(desired, store)
@@ -154,7 +154,7 @@ def test_a_save_that_is_older_than_a_stop_does_not_undo_its_note(store: HangingS
     assert not loaded(store).running
 
 
-def test_a_runner_that_is_added_again_is_not_removed_by_what_its_disk_did_not_do_in_time(
+def test_a_late_removal_does_not_remove_a_runner_added_again(
     store: HangingStore,
 ) -> None:
     async def run() -> None:
@@ -172,7 +172,7 @@ def test_a_runner_that_is_added_again_is_not_removed_by_what_its_disk_did_not_do
     assert loaded(store).runner == "arm"
 
 
-def test_a_runner_that_a_hanging_disk_still_has_is_not_resumed(store: HangingStore) -> None:
+def test_a_removed_runner_on_a_hanging_disk_is_not_resumed(store: HangingStore) -> None:
     async def run() -> None:
         desired = Desired("arm")
         desired.running = True
@@ -187,7 +187,7 @@ def test_a_runner_that_a_hanging_disk_still_has_is_not_resumed(store: HangingSto
     assert Store(store.state, store.boot).load() == []
 
 
-def test_what_goes_wrong_is_the_note_and_stays_until_it_goes_right(store: HangingStore) -> None:
+def test_a_failed_save_is_reported_until_one_succeeds(store: HangingStore) -> None:
     async def run() -> Any:
         saver = saver_of(Desired("arm"), store)
         store.state.rmdir()

@@ -1,4 +1,4 @@
-"""What tabs of a runner are told, and what is kept of it."""
+"""Messages to the pages of a runner, and the memory of cycles."""
 
 import asyncio
 from typing import Any
@@ -25,7 +25,7 @@ def _batch(first: int, count: int, lost: int = 0) -> PortBatch:
 
 
 class _Ear:
-    """A listener that remembers."""
+    """A listener that stores its messages."""
 
     wants = True
     columns: tuple[str, ...] = ("/a.b",)
@@ -58,7 +58,7 @@ class _Loop:
 
 
 class _Reader:
-    """A stream as the hub sees one."""
+    """A stream as the hub sees it."""
 
     loop = _Loop()
     schema = PortSchema()
@@ -86,7 +86,7 @@ def _hub(*ears: _Ear) -> Any:
 
 
 def _two(ear: _Ear) -> tuple[Any, Any, Any]:
-    """Return a hub, its stream, and one of another selection that has been opened."""
+    """Return a hub, its stream, and a newer stream with another selection."""
     hub = _hub(ear)
     hub._reader, hub._next = _Reader("/a.b"), _Reader("/a.b", "/a.c")
     return hub, hub._reader, hub._next
@@ -96,19 +96,19 @@ def _told(ear: _Ear) -> list[int]:
     return [int(cycle) for chunk in ear.chunks for cycle in chunk.cycles]
 
 
-def test_cycles_that_two_streams_told_are_told_once() -> None:
+def test_cycles_of_two_streams_are_sent_once() -> None:
     ear = _Ear()
     hub, old, new = _two(ear)
     hub.take(old, _batch(0, 10))
     hub.take(new, _batch(5, 10))
-    hub.take(old, _batch(10, 5))  # too late
+    hub.take(old, _batch(10, 5))  # after the switch
     hub.take(new, _batch(15, 5))
     assert _told(ear) == list(range(20))
     assert [each.at for each in ear.chunks] == [0, 10, 15]
     assert not any(each.lost for each in ear.chunks)
 
 
-def test_a_stream_takes_over_once_the_one_before_has_told_all_before_it() -> None:
+def test_a_stream_takes_over_once_the_previous_one_reaches_it() -> None:
     ear = _Ear()
     hub, old, new = _two(ear)
     hub.take(old, _batch(0, 10))
@@ -126,11 +126,11 @@ def test_cycles_between_two_streams_are_counted() -> None:
     hub, old, new = _two(ear)
     hub.take(old, _batch(0, 10))
     hub.take(new, _batch(12, 3))
-    hub.trouble(old, "it has ended")  # so that nothing comes of it any more
+    hub.trouble(old, "it has ended")  # so that no more cycles arrive
     assert ear.chunks[-1].lost == 2
 
 
-def test_cycles_that_a_stream_misses_are_counted() -> None:
+def test_cycles_dropped_by_a_stream_are_counted() -> None:
     ear = _Ear()
     hub, old, _ = _two(ear)
     hub.take(old, _batch(0, 10))
@@ -142,7 +142,7 @@ def test_cycles_that_a_stream_misses_are_counted() -> None:
     assert [each.lost for each in ear.chunks] == [0, 5, 7]
 
 
-def test_trouble_of_another_pages_signals_is_that_pages() -> None:
+def test_errors_go_only_to_the_page_of_their_signals() -> None:
     one, other = _Ear(), _Ear()
     other.columns = ("/a.b", "/a.c")
     hub = _hub(one, other)
@@ -153,7 +153,7 @@ def test_trouble_of_another_pages_signals_is_that_pages() -> None:
     assert (one.troubles[-1], other.troubles[-1]) == ("rtcfd is away", "rtcfd is away")
 
 
-def test_a_page_that_fails_keeps_nothing_from_the_others(
+def test_a_failing_page_does_not_affect_others(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     class Failing(_Ear):
@@ -170,7 +170,7 @@ def test_a_page_that_fails_keeps_nothing_from_the_others(
     )
 
 
-def test_cycles_before_a_page_was_opened_are_not_lost_to_it() -> None:
+def test_cycles_before_a_page_opens_do_not_count_as_lost() -> None:
     async def late() -> None:
         hub = _hub(_Ear())
         tab = Tab(hub)
@@ -184,7 +184,7 @@ def test_cycles_before_a_page_was_opened_are_not_lost_to_it() -> None:
     asyncio.run(late())
 
 
-def test_cycles_while_nothing_is_watched_are_not_lost() -> None:
+def test_cycles_without_watched_signals_do_not_count_as_lost() -> None:
     ear = _Ear()
     hub = _hub(ear)
     for first in (0, 5000):
@@ -195,7 +195,7 @@ def test_cycles_while_nothing_is_watched_are_not_lost() -> None:
     assert hub.since == 20
 
 
-def test_a_slow_tab_loses_the_oldest_cycles_and_is_told_how_many() -> None:
+def test_a_slow_page_loses_the_oldest_cycles_with_a_count() -> None:
     async def slow() -> None:
         hub = _hub(_Ear())
         tab = Tab(hub)
@@ -205,7 +205,7 @@ def test_a_slow_tab_loses_the_oldest_cycles_and_is_told_how_many() -> None:
             tab.take(Chunk(_batch(number * 1000, 1000), number * 1000, 0))
         waiting: Any = tab._waiting
         texts = [data for data, _ in waiting if isinstance(data, str)]
-        assert texts[0] == '{"kind": "first"}'  # words are never lost
+        assert texts[0] == '{"kind": "first"}'  # texts are never dropped
         cycles = [data for data, _ in waiting if isinstance(data, bytes)]
         assert sum(map(len, cycles)) <= 8 * 1024 * 1024
         told = lost = 0
@@ -217,7 +217,7 @@ def test_a_slow_tab_loses_the_oldest_cycles_and_is_told_how_many() -> None:
     asyncio.run(slow())
 
 
-def test_a_shot_waits_for_a_slow_tab_however_large_it_is() -> None:
+def test_a_shot_of_any_size_waits_for_a_slow_page() -> None:
     async def slow() -> None:
         tab = Tab(_hub(_Ear()))
         tab._shows = True
@@ -230,7 +230,7 @@ def test_a_shot_waits_for_a_slow_tab_however_large_it_is() -> None:
                 tab.take(Chunk(_batch(number * 1000, 1000), number * 1000, 0))
         waiting: Any = tab._waiting
         assert [data for data, cycles in waiting if isinstance(data, bytes) and not cycles] == [
-            shots[1]  # of several the newest
+            shots[1]  # only the newest of several
         ]
         words = [data for data, _ in waiting if isinstance(data, str)]
         assert words[0] == '{"kind": "first"}'
@@ -241,7 +241,7 @@ def test_a_shot_waits_for_a_slow_tab_however_large_it_is() -> None:
     asyncio.run(slow())
 
 
-def test_the_memory_is_bounded_and_finds_what_it_has() -> None:
+def test_the_memory_of_cycles_is_bounded_and_searchable() -> None:
     memory = Memory(200_000)
     for number in range(100):
         memory.add(Chunk(_batch(number * 100, 100), number * 100, 0))
@@ -254,7 +254,7 @@ def test_the_memory_is_bounded_and_finds_what_it_has() -> None:
     assert memory.between(0, 10) == []
 
 
-def test_a_trace_is_of_an_output_or_state_and_an_element() -> None:
+def test_a_trace_names_an_output_or_state_and_an_element() -> None:
     assert split_element("/arm.q[2]") == ("/arm.q", 2)
     assert split_element("/arm.q[x]") == ("/arm.q[x]", 0)
     assert column_of("/arm.cmd.twist.linear.x") == "/arm.cmd"
@@ -267,6 +267,6 @@ def test_a_trace_is_of_an_output_or_state_and_an_element() -> None:
     ["", "/", "arm.q", "/arm", "/arm.", "/*.q", "/arm.*", "**", "/a[bc].q", "/arm?.q", "/\ud800.q",
      "/arm.q" + "x" * 1000, "/ä.q", "/arm\n.q"],
 )  # fmt: skip
-def test_what_is_no_name_of_a_signal_is_not_asked_for(name: str) -> None:
+def test_invalid_signal_names_are_not_requested(name: str) -> None:
     assert column_of(name) == ""
     assert split_element(name + "[" + "9" * 5000 + "]") == (name + "[" + "9" * 5000 + "]", 0)

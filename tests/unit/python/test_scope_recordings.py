@@ -1,4 +1,4 @@
-"""Recordings as the scope's page gets them: each cycle, or minima and maxima of windows."""
+"""Recordings sent to the scope's page: each cycle, or minima and maxima of windows."""
 
 import struct
 from pathlib import Path
@@ -23,7 +23,7 @@ _BEGIN_NS = 10**18
 
 
 def _record(file: Path, values: NDArray[Any], lost: int) -> None:
-    """Record a state, with so many cycles lost in the middle."""
+    """Record a state, with `lost` cycles missing in the middle."""
     column = ports_pb2.PortColumn(
         component="/a", name="x", kind=ports_pb2.PortColumn.KIND_STATE, type="double", size=8
     )
@@ -48,7 +48,7 @@ def _record(file: Path, values: NDArray[Any], lost: int) -> None:
 
 
 def _told(file: Path, *span: float) -> tuple[NDArray[np.float64], int]:
-    """Return the columns that a page gets, and the length of a window."""
+    """Return the columns sent to a page, and the length of a window."""
     data = Recordings([file], None).columns(file.name, ["/a.x"], *span)
     count, width = struct.unpack_from("<II", data, 4)
     (each,) = struct.unpack_from("<d", data, 24)
@@ -75,7 +75,7 @@ def test_no_minimum_and_no_maximum_is_hidden(
         return
     assert columns.shape[1] <= most + 1
     assert np.nanmax(columns[4]) == 1e6
-    # With a gap of no value where cycles are missing.
+    # With a gap of NaN for the missing cycles.
     cell_values = np.insert(values, (count + 1) // 2, [np.nan] * (lost > 0))
     for number in range(0, columns.shape[1], 2):
         part = cell_values[number // 2 * each : (number // 2 + 1) * each]
@@ -86,7 +86,7 @@ def test_no_minimum_and_no_maximum_is_hidden(
     assert np.all(np.diff(columns[0]) >= 0)
 
 
-def test_a_part_is_told_closely_and_one_beyond_the_end_is_refused(tmp_path: Path) -> None:
+def test_a_part_has_full_resolution_and_one_beyond_the_end_is_rejected(tmp_path: Path) -> None:
     file = tmp_path / "run.mcap"
     _record(file, np.arange(2000.0), 0)
     columns, each = _told(file, 0.5, 0.6)

@@ -1,4 +1,4 @@
-"""Which cycle a trigger takes."""
+"""The cycles at which a trigger hits."""
 
 import numpy as np
 import pytest
@@ -27,14 +27,14 @@ def _hits(values: list[float], **told: object) -> list[int]:
         ({"kind": "nan"}, [0, _NAN, 1, float("inf")], [1, 3]),
     ],
 )
-def test_a_trigger_hits_the_cycles_that_it_is_for(
+def test_a_trigger_hits_the_expected_cycles(
     told: dict[str, object], values: list[float], hits: list[int]
 ) -> None:
     assert _hits(values, **told) == hits
 
 
 @pytest.mark.parametrize("kind", ["edge", "window", "level", "nan"])
-def test_it_hits_the_same_cycles_however_they_come(kind: str) -> None:
+def test_the_hits_do_not_depend_on_the_batches(kind: str) -> None:
     values = np.random.default_rng(12).normal(size=500)
     values[100:103] = np.nan
     trigger = parse(_BASE | {"kind": kind, "low": 0.5, "high": 1.0})
@@ -57,16 +57,16 @@ def test_a_condition_hits_where_it_becomes_true(size: int) -> None:
     found: list[int] = []
     for at in range(0, len(x), size):
         found += [int(hit) + at for hit in search.hits(x[at : at + size], y[at : at + size])]
-    # Not in the first cycle: nobody knows whether it was true before.
+    # Not in the first cycle, as its predecessor is unknown.
     assert found == [3, 5, 7]
 
 
-def test_a_condition_that_is_none_is_refused() -> None:
+def test_an_invalid_condition_is_rejected() -> None:
     with pytest.raises(TriggerError, match="is not a condition"):
         parse(_BASE | {"kind": "condition", "condition": "a.x >"})
 
 
-def test_a_slope_that_a_kind_has_not_is_refused() -> None:
+def test_an_unsupported_slope_is_rejected() -> None:
     with pytest.raises(TriggerError, match="edge 'above': must be one of rising, falling, either"):
         parse(_BASE | {"kind": "edge", "slope": "above"})
 
@@ -81,6 +81,6 @@ def test_a_slope_that_a_kind_has_not_is_refused() -> None:
         ({"holdoff": -1}, "after must be at least 1 cycle"),
     ],
 )
-def test_numbers_that_cannot_be_are_refused(told: dict[str, object], said: str) -> None:
+def test_impossible_numbers_are_rejected(told: dict[str, object], said: str) -> None:
     with pytest.raises(TriggerError, match=said):
         parse(_BASE | {"kind": "edge"} | told)

@@ -1,4 +1,4 @@
-"""What systemd and its journal are told."""
+"""Notifications to systemd, and detection of its journal."""
 
 import logging
 import os
@@ -11,12 +11,12 @@ from daemon_under_test import DaemonUnderTest, wait_for
 from rtcfd import journal
 
 
-def test_ready_status_and_watchdog_are_told(
+def test_ready_status_and_watchdog_are_sent(
     stopped_daemon: DaemonUnderTest, tmp_path: Path
 ) -> None:
     told: list[bytes] = []
 
-    # All the time: who is not listened to waits once there are ten messages.
+    # In a thread: a sender blocks once ten messages are unread.
     def listen() -> None:
         while message := manager.recv(4096):
             told.extend(message.splitlines())
@@ -58,7 +58,7 @@ def test_journal_fields_are_in_capitals() -> None:
     }
 
 
-def test_the_journal_is_known_by_its_stream(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_journal_is_detected_by_its_stream(monkeypatch: pytest.MonkeyPatch) -> None:
     found = os.fstat(2)
     monkeypatch.setenv("JOURNAL_STREAM", f"{found.st_dev}:{found.st_ino}")
     assert journal.stderr_is_journal()

@@ -1,4 +1,4 @@
-"""Settings and graphs of the service: checked, reloaded, and what stands in for bad ones."""
+"""Settings and graphs of the service: checked, reloaded, and replaced by the last good ones."""
 
 import asyncio
 import logging
@@ -33,7 +33,7 @@ def rtcfd(daemon: DaemonUnderTest, *arguments: str) -> subprocess.CompletedProce
     )  # fmt: skip
 
 
-def test_a_start_with_bad_settings_takes_the_last_good_ones_and_says_so(
+def test_a_start_with_bad_settings_uses_the_last_good_ones_with_a_note(
     stopped_daemon: DaemonUnderTest,
 ) -> None:
     daemon = stopped_daemon
@@ -49,7 +49,7 @@ def test_a_start_with_bad_settings_takes_the_last_good_ones_and_says_so(
     assert status.notes[0].startswith(said)
     assert status.notes[0].endswith("; the last good settings are used instead")
     assert said in daemon.log()
-    # Mended ones are read without a restart.
+    # Corrected settings are read without a restart.
     daemon.settings.write_text(GOOD.replace("250", "500"))
     assert rtcfd(daemon, "--reload").returncode == 0
     with daemon.client() as client:
@@ -57,7 +57,7 @@ def test_a_start_with_bad_settings_takes_the_last_good_ones_and_says_so(
     assert (status.runners[0].settings.frequency_hz, list(status.notes)) == (500.0, [])
 
 
-def test_a_restart_warns_of_settings_that_the_next_rtcfd_will_not_take(
+def test_a_restart_warns_of_settings_that_the_next_rtcfd_will_reject(
     stopped_daemon: DaemonUnderTest,
 ) -> None:
     daemon = stopped_daemon
@@ -78,13 +78,13 @@ def test_a_restart_warns_of_settings_that_the_next_rtcfd_will_not_take(
     assert (settings.frequency_hz, settings.priority) == (250.0, 70)
 
 
-def test_settings_that_cannot_be_read_hold_up_no_restart(
+def test_unreadable_settings_block_no_restart(
     stopped_daemon: DaemonUnderTest,
     caplog: pytest.LogCaptureFixture,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     daemon = stopped_daemon
-    # The lock would last as long as this process, which is not rtcfd's own.
+    # The lock would last as long as this test process.
     monkeypatch.setattr(store, "lock", lambda _: None)
     daemon.settings.touch()
     daemon.graphs.mkdir()
@@ -128,12 +128,12 @@ def test_settings_that_cannot_be_read_hold_up_no_restart(
         hangs.set()
     assert asked.is_set()
     assert "cannot check the settings for the next rtcfd" in caplog.text
-    # The executor was left in order to the next one.
+    # The executor was handed over to the next rtcfd.
     daemon.start_service()
     assert daemon.executor_pid() == pid
 
 
-def test_the_last_good_settings_are_on_disk_before_they_have_their_name(
+def test_the_last_good_settings_are_synced_before_the_rename(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     settings = tmp_path / "rtcfd.toml"
@@ -141,7 +141,7 @@ def test_the_last_good_settings_are_on_disk_before_they_have_their_name(
     state = tmp_path / "state"
     state.mkdir()
     copy = state / "rtcfd.toml.last-good"
-    synced: list[tuple[str, bool]] = []  # what, and whether the copy has its name by then
+    synced: list[tuple[str, bool]] = []  # kind, and whether the copy has its name by then
 
     def fsync(descriptor: int) -> None:
         file = Path(os.readlink(f"/proc/self/fd/{descriptor}"))
@@ -153,14 +153,14 @@ def test_the_last_good_settings_are_on_disk_before_they_have_their_name(
     assert [file.name for file in state.iterdir()] == [copy.name]
 
 
-def test_an_empty_copy_grants_nobody_anything(tmp_path: Path) -> None:
+def test_an_empty_copy_grants_no_rights(tmp_path: Path) -> None:
     settings = tmp_path / "rtcfd.toml"
     copy = tmp_path / "rtcfd.toml.last-good"
     settings.write_text(BAD)
     copy.touch()
     with pytest.raises(Refusal, match="frequency_hz must be a number"):
         Settings.read(settings, tmp_path, last_good=True)
-    # A file in which nothing is set has a copy too, which is none of those.
+    # A file without settings has a copy, too, which is not an empty file.
     settings.write_text("")
     Settings.read(settings, tmp_path, last_good=True).keep()
     settings.write_text(BAD)
@@ -168,7 +168,7 @@ def test_an_empty_copy_grants_nobody_anything(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("odd", [odd_files.pipe, odd_files.dangling, odd_files.plug])
-def test_what_is_in_the_place_of_the_copy_is_replaced(
+def test_anything_at_the_copys_path_is_replaced(
     tmp_path: Path, odd: Callable[[Path], None]
 ) -> None:
     settings = tmp_path / "rtcfd.toml"
@@ -181,7 +181,7 @@ def test_what_is_in_the_place_of_the_copy_is_replaced(
     assert not (tmp_path / "nowhere").exists()
 
 
-def test_pipes_in_the_place_of_files_keep_no_service_from_its_start(
+def test_pipes_in_place_of_files_block_no_start(
     stopped_daemon: DaemonUnderTest,
 ) -> None:
     daemon = stopped_daemon
@@ -203,14 +203,14 @@ def test_pipes_in_the_place_of_files_keep_no_service_from_its_start(
     assert "rt_runner.json is set aside as rt_runner.unreadable-" in notes
     assert f"cannot read {daemon.graphs}/a.yaml: it is a named pipe" in notes
     assert daemon.saved()["running"] is True
-    # Nor do they hold up what is left to the next one.
+    # Nor do they block the handover to the next rtcfd.
     daemon.end(signal.SIGUSR1)
     daemon.start_service()
     with daemon.client() as client:
         assert client.get_order() == ["/a"]
 
 
-def test_a_reload_fails_when_a_graph_is_refused(stopped_daemon: DaemonUnderTest) -> None:
+def test_a_reload_fails_if_a_graph_is_rejected(stopped_daemon: DaemonUnderTest) -> None:
     daemon = stopped_daemon.start_service()
     (daemon.graphs / "a.yaml").write_text(GRAPH)
     done = rtcfd(daemon, "--reload")
@@ -222,13 +222,13 @@ def test_a_reload_fails_when_a_graph_is_refused(stopped_daemon: DaemonUnderTest)
     assert done.stderr.startswith(f"rtcfd: not applied: {refused}: ")
     assert 'no type "Nothing"' in done.stderr
     assert str(refused) not in done.stdout
-    # Nor does the journal end in another word.
+    # The journal's last line agrees.
     ends = [line for line in daemon.log().splitlines() if "Reload by" in line]
     assert [line.endswith(": done") for line in ends] == [True, False]
     assert f"partly failed: {refused}: " in ends[1]
 
 
-def test_a_reload_that_was_refused_is_told_until_one_is_not(
+def test_a_failed_reload_is_reported_until_one_succeeds(
     stopped_daemon: DaemonUnderTest,
 ) -> None:
     daemon = stopped_daemon
@@ -249,7 +249,7 @@ def test_a_reload_that_was_refused_is_told_until_one_is_not(
         assert not client.get_status().notes
 
 
-def test_a_reload_closes_the_folders_that_systemd_has_opened(
+def test_a_reload_restores_folder_permissions_changed_by_systemd(
     stopped_daemon: DaemonUnderTest,
 ) -> None:
     daemon = stopped_daemon.start_service()
@@ -257,8 +257,8 @@ def test_a_reload_closes_the_folders_that_systemd_has_opened(
     modes = {name: folder.stat().st_mode & 0o777 for name, folder in folders.items()}
     assert modes == {"executors": 0o700, "stop": 0o750, "cpus": 0o700}
     for folder in folders.values():
-        folder.chmod(0o750)  # as RuntimeDirectoryMode= says, with each command that it runs
-    # What is in them is nobody else's in the moment before that, either.
+        folder.chmod(0o750)  # systemd does so with each command, for RuntimeDirectoryMode=
+    # Until then, other users cannot read the files inside, either.
     files = [each for each in folders["executors"].iterdir() if each.is_file()]
     assert "handover.json" in [each.name for each in files]
     assert {each.stat().st_mode & 0o777 for each in files} == {0o600}
@@ -302,7 +302,7 @@ def test_settings_and_graphs_are_checked_without_a_daemon(stopped_daemon: Daemon
     ],
     ids=lambda text: str(text)[:10],
 )
-def test_settings_that_an_executor_would_refuse_are_refused(
+def test_settings_that_an_executor_would_reject_are_rejected(
     stopped_daemon: DaemonUnderTest, line: str, said: str
 ) -> None:
     daemon = stopped_daemon
@@ -314,7 +314,7 @@ def test_settings_that_an_executor_would_refuse_are_refused(
     assert done.stderr.count("\n") == 1
 
 
-def test_an_expression_that_keeps_a_runner_down_passes_neither_reload_nor_start(
+def test_an_invalid_expression_fails_reload_and_start(
     stopped_daemon: DaemonUnderTest,
 ) -> None:
     daemon = stopped_daemon
@@ -335,7 +335,7 @@ def test_an_expression_that_keeps_a_runner_down_passes_neither_reload_nor_start(
     assert status.notes[0].startswith(said)
 
 
-def test_settings_of_a_graph_are_judged_with_those_they_come_on_top_of(
+def test_settings_of_a_graph_are_checked_together_with_the_defaults(
     stopped_daemon: DaemonUnderTest,
 ) -> None:
     daemon = stopped_daemon
@@ -346,7 +346,7 @@ def test_settings_of_a_graph_are_judged_with_those_they_come_on_top_of(
         *("--check-config", "--config", str(daemon.settings)),
         *("--graphs-dir", str(daemon.graphs), "--executor", str(daemon.executor)),
     )
-    # Half a period at most: of 10 ms, not of the 1 ms that is the default.
+    # At most half a period: of 10 ms, not of the default 1 ms.
     graph.write_text("settings: {spin_us: 5000}\n" + GRAPH)
     assert rtcfd(daemon, *check).returncode == 0
     graph.write_text("settings: {spin_us: 5001}\n" + GRAPH)
@@ -356,7 +356,7 @@ def test_settings_of_a_graph_are_judged_with_those_they_come_on_top_of(
     graph.write_text("settings: {ros: {latch: '('}}\n" + GRAPH)
     done = rtcfd(daemon, *check)
     assert done.stderr.startswith(f"rtcfd: {graph}: latch: bad regular expression '('")
-    # A start takes the others.
+    # A start applies the other graphs.
     (daemon.graphs / "b.yaml").write_text("runner: arm\n" + GRAPH)
     daemon.start_service()
     with daemon.client() as client:
@@ -365,7 +365,7 @@ def test_settings_of_a_graph_are_judged_with_those_they_come_on_top_of(
         assert not client.get_status("rt_runner").runners[0].status
 
 
-def test_where_there_is_no_executor_to_ask_settings_are_what_rtcfd_knows(
+def test_without_an_executor_rtcfd_checks_the_settings_itself(
     tmp_path: Path,
 ) -> None:
     (tmp_path / "rtcfd.toml").write_text("[runner.ros]\nlatch = '('\n")
@@ -373,7 +373,7 @@ def test_where_there_is_no_executor_to_ask_settings_are_what_rtcfd_knows(
     assert options.parse(nobody, None).defaults.ros.latch == "("
 
 
-def test_a_line_of_the_journal_stands_by_itself() -> None:
+def test_a_journal_line_is_complete_by_itself() -> None:
     def line(message: str, **fields: str) -> str:
         record = logging.makeLogRecord(fields)
         return standing_alone(record, message)
@@ -381,7 +381,7 @@ def test_a_line_of_the_journal_stands_by_itself() -> None:
     assert line("ready") == "ready"
     assert line("its executor is gone", runner="arm") == "arm: its executor is gone"
     assert line("no reply", runner="arm", component="/pid") == "arm /pid: no reply"
-    # Nothing is said twice.
+    # No text occurs twice.
     said = "/pid: iteration 5: output out is not finite"
     assert line(said, runner="arm", component="/pid") == f"arm {said}"
     assert line("arm: stuck", runner="arm") == "arm: stuck"

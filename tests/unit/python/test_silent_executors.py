@@ -1,4 +1,4 @@
-"""Executors that do not answer a rtcfd that begins, and are looked for again and again."""
+"""Executors that do not answer a starting rtcfd, which keeps looking for them."""
 
 import asyncio
 from collections.abc import Callable
@@ -15,8 +15,8 @@ from rtcfd_in_process import Rtcfd, until
 
 @pytest.fixture
 def looks(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """Have no executor answer two looks, and none be there at the third; note whose was looked
-    for."""
+    """Simulate executors that do not answer twice and are gone at the third attempt; return the
+    list of attempts."""
     looks: list[str] = []
 
     async def adopt(runner: str, *_: Any) -> None:
@@ -29,7 +29,7 @@ def looks(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return looks
 
 
-def test_the_runner_of_a_launch_goes_when_its_silent_executor_dies(
+def test_a_launchs_runner_is_removed_when_its_silent_executor_dies(
     rtcfd: Callable[[], Rtcfd], looks: list[str]
 ) -> None:
     async def play() -> None:
@@ -46,7 +46,7 @@ def test_the_runner_of_a_launch_goes_when_its_silent_executor_dies(
     asyncio.run(play())
 
 
-def test_the_silent_executor_of_an_unknown_runner_is_looked_for_until_it_dies(
+def test_the_silent_executor_of_an_unknown_runner_is_retried_until_it_dies(
     rtcfd: Callable[[], Rtcfd], looks: list[str]
 ) -> None:
     async def play() -> None:

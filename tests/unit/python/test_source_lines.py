@@ -1,4 +1,4 @@
-"""Where a crash was: by addresses and mappings, from a real library."""
+"""Source lines of a crash, from addresses and mappings of a real library."""
 
 import asyncio
 import subprocess
@@ -30,7 +30,7 @@ def library(tmp_path: Path) -> Path:
 
 
 def trace_of(library: Path, mapped: str, functions: tuple[str, ...]) -> Trace:
-    """A crash in the middle of functions, of a library that is mapped under a name."""
+    """Return a crash within functions of a library that is mapped under a name."""
     symbols = subprocess.run(["nm", "-S", str(library)], capture_output=True, text=True, check=True)
     places = []
     for name in functions:
@@ -71,11 +71,11 @@ def test_without_debug_information_the_function_is_named(library: Path) -> None:
     assert line.startswith("inner(int) in my_code.so+0x")
 
 
-def test_of_what_is_another_file_now_the_place_is_said(library: Path, tmp_path: Path) -> None:
-    # Not among those that are as they were loaded.
+def test_the_offset_is_named_for_a_replaced_file(library: Path, tmp_path: Path) -> None:
+    # Not among the libraries that are unchanged since they were loaded.
     trace = trace_of(library, "/memfd:my_code.so (deleted)", ("inner",))
     assert find(trace).place.startswith("my_code.so+0x")
-    # Nor is it known which of two it was.
+    # It is also unknown which of two libraries it was.
     other = tmp_path / "other" / "my_code.so"
     other.parent.mkdir()
     other.write_bytes(library.read_bytes())
@@ -83,18 +83,18 @@ def test_of_what_is_another_file_now_the_place_is_said(library: Path, tmp_path: 
 
 
 @pytest.mark.parametrize("damage", [b"", b"\x7fELF", b"\x7fELF\x02\x01" + b"\xff" * 100])
-def test_a_file_that_is_no_library_names_its_place(library: Path, damage: bytes) -> None:
+def test_the_offset_is_named_for_a_file_that_is_no_library(library: Path, damage: bytes) -> None:
     trace = trace_of(library, str(library), ("inner",))
     library.write_bytes(damage)
     assert find(trace, library).place.startswith("my_code.so+0x")
 
 
-def test_a_jump_to_nowhere_is_said_to_be_one(library: Path) -> None:
+def test_a_jump_to_an_unmapped_address_is_reported(library: Path) -> None:
     trace = trace_of(library, str(library), ("outer",))
     found = find(Trace((0, *trace.frames), trace.maps), library)
     assert found.lines == ("no code at 0x0", "outer(int) at code.cpp:4")
     assert found.place == "outer(int) at code.cpp:4"
 
 
-def test_mappings_that_make_no_sense_are_passed_over() -> None:
+def test_invalid_mappings_are_skipped() -> None:
     assert find(Trace((1, 2, 3), "nonsense\n\n1-2 r-xp\n")).lines == ("no code at 0x1",)

@@ -1,4 +1,4 @@
-"""Parameters, remaps and ports from the words of a command line."""
+"""Parameters, remaps and ports from command line words."""
 
 import math
 from collections.abc import Callable
@@ -44,7 +44,7 @@ def test_nan_is_a_number() -> None:
     assert math.isnan(rtcf.parse_value(".nan").double_value)
 
 
-def test_an_integer_of_more_than_64_bits_is_refused() -> None:
+def test_an_integer_of_more_than_64_bits_is_rejected() -> None:
     assert rtcf.parse_value(str(2**63 - 1)).int_value == 2**63 - 1
     with pytest.raises(ValueError, match="64 bits"):
         rtcf.parse_value(str(2**63))
@@ -54,25 +54,25 @@ def test_an_integer_of_more_than_64_bits_is_refused() -> None:
         assert len(str(refused.value)) < 100
 
 
-def test_a_parameter_keeps_signs_in_its_value() -> None:
+def test_a_parameter_value_may_contain_the_separator() -> None:
     setting = rtcf.parse_parameter("map := a:=b")
     assert (setting.name, setting.value.string_value) == ("map", "a:=b")
 
 
 @pytest.mark.parametrize("text", ["a", "a=b", ":=b"])
-def test_a_parameter_without_a_sign_is_refused(text: str) -> None:
+def test_a_parameter_without_separator_is_rejected(text: str) -> None:
     with pytest.raises(ValueError, match="a parameter is name:=value"):
         rtcf.parse_parameter(text)
 
 
 @pytest.mark.parametrize("text", ["a", "a:=", ":=b"])
-def test_half_a_remap_is_refused(text: str) -> None:
+def test_an_incomplete_remap_is_rejected(text: str) -> None:
     with pytest.raises(ValueError, match="a remap is from:=to"):
         rtcf.parse_remap(text)
 
 
 @pytest.mark.parametrize("name", ["remaps", "parameters", "breaks"])
-def test_a_text_is_not_taken_for_several_letters(name: str) -> None:
+def test_a_text_is_not_treated_as_a_list_of_letters(name: str) -> None:
     given: dict[str, Any] = {name: "in:=/x"}
     with pytest.raises(TypeError, match=rf"{name} must be a list: \['in:=/x'\], not 'in"):
         rtcf.component("p", "T", **given)
@@ -93,13 +93,13 @@ CALLS: dict[str, Callable[[rtcf.Client], object]] = {
 
 
 @pytest.mark.parametrize("call", CALLS)
-def test_a_text_is_not_taken_for_several_of_a_calls_names(tmp_path: Path, call: str) -> None:
+def test_a_text_is_not_treated_as_a_list_of_names(tmp_path: Path, call: str) -> None:
     said = rf"{call.split()[0]} must be a list: \['/x'\], not '/x'"
     with rtcf.Client(tmp_path / "none") as client, pytest.raises(TypeError, match=said):
         CALLS[call](client)
 
 
-def test_a_port_is_what_follows_the_last_dot() -> None:
+def test_a_port_is_the_part_after_the_last_dot() -> None:
     port = rtcf.parse_port("/arm/H1.in1")
     assert (port.component, port.port) == ("/arm/H1", "in1")
     with pytest.raises(ValueError, match=r"COMPONENT\.PORT"):

@@ -1,4 +1,4 @@
-"""rtcf.testing.step_response against systems whose response is known in closed form."""
+"""rtcf.testing.step_response against systems with closed-form responses."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_second_order_system_overshoots_by_its_damping(initial: float, target: f
     assert measured.overshoot == pytest.approx(math.exp(-math.pi * damping / root), abs=1e-5)
 
 
-def test_what_never_arrives_has_no_times() -> None:
+def test_a_response_that_never_settles_has_no_times() -> None:
     measured = step_response(TIME, 0.5 * (1 - np.exp(-TIME)), target=1.0)
     assert measured.rise_time == measured.settling_time == math.inf
     assert measured.final_error == pytest.approx(0.5)
@@ -45,7 +45,7 @@ def test_what_never_arrives_has_no_times() -> None:
         ([0, 1], [0, 1], 1.0, 0.0, "between 0 and 1"),
     ],
 )
-def test_what_cannot_be_measured_is_one_line(
+def test_impossible_measurements_are_one_line(
     time: list[float], value: list[float], target: float, tolerance: float, words: str
 ) -> None:
     with pytest.raises(ValueError, match=words):

@@ -1,4 +1,4 @@
-"""`stop --all`: whatever stands where the executors' sockets are looked for, rtcfd is asked."""
+"""`stop --all` asks rtcfd, whatever is at the path of the executors' sockets."""
 
 from pathlib import Path
 
@@ -12,14 +12,14 @@ from rtcfctl.main import main
 
 
 def make_unreadable(folder: Path) -> None:
-    """Also for root: a link that leads to itself."""
+    """Make it unreadable even for root: a link to itself."""
     if folder.exists():
         folder.rename(folder.with_name("before"))
     folder.parent.mkdir(exist_ok=True)
     folder.symlink_to(folder.name)
 
 
-def test_rtcfd_is_asked_where_the_executors_cannot_be(
+def test_rtcfd_is_asked_if_the_executors_are_unreachable(
     daemon: DaemonUnderTest,
     client: rtcf.Client,
     monkeypatch: pytest.MonkeyPatch,
@@ -40,14 +40,14 @@ def test_rtcfd_is_asked_where_the_executors_cannot_be(
     assert main(["--socket", str(daemon.socket), "stop", "--all"]) == 3
 
 
-def test_a_folder_that_cannot_be_read_keeps_none_from_the_other(tmp_path: Path) -> None:
+def test_an_unreadable_folder_does_not_hide_the_other(tmp_path: Path) -> None:
     socket = str(tmp_path / "s")
     ours, beside = direct_stop.folders(socket)
     make_unreadable(beside)
     with pytest.raises(rtcf.DaemonUnreachableError, match="cannot find the loops"):
         direct_stop.stop_all(socket)
     ours.mkdir(parents=True)
-    (ours / "arm").touch()  # nobody listens
+    (ours / "arm").touch()  # no process listens
     (failed,) = direct_stop.stop_all(socket)
     assert failed == Stopped("arm", failed.error)
     assert "no executor of runner arm found in " in str(failed.error)

@@ -1,4 +1,4 @@
-"""A replay that was stopped is over: its caller does not go on in that of somebody else."""
+"""A stopped replay is over: its client does not continue in another client's replay."""
 
 import asyncio
 from collections.abc import AsyncIterator, Callable
@@ -14,7 +14,7 @@ Request = control_pb2.ReplayRequest
 
 
 class Caller:
-    """A call that replays, piece by piece."""
+    """A client that replays piece by piece."""
 
     def __init__(self, rtcfd: Rtcfd) -> None:
         self._pieces: asyncio.Queue[Any] = asyncio.Queue()
@@ -33,7 +33,7 @@ class Caller:
         assert [each async for each in self._answers] == []
 
 
-def test_a_stopped_replay_does_not_go_on_in_somebody_elses(
+def test_a_stopped_replay_does_not_continue_in_another_clients(
     rtcfd: Callable[[], Rtcfd], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     replayed: list[int] = []

@@ -1,4 +1,4 @@
-"""States on disk: what a power cut or a full disk leaves of them."""
+"""State on disk after a power cut or on a full disk."""
 
 import errno
 import os
@@ -15,7 +15,7 @@ from rtcfd.state.store import Store
 Value = graph_pb2.ParameterValue
 
 
-def test_a_stop_outlives_a_power_cut_also_on_a_full_disk(
+def test_a_stop_survives_a_power_cut_even_on_a_full_disk(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     store = Store(tmp_path)
@@ -24,7 +24,7 @@ def test_a_stop_outlives_a_power_cut_also_on_a_full_disk(
     store.save("arm", store.text(desired), running=True)
     mark = tmp_path / "arm.running"
     assert mark.exists()
-    on_disk: list[bool] = []  # whether the mark is there, by each fsync of the folder
+    on_disk: list[bool] = []  # whether the mark exists at each fsync of the folder
 
     def full(descriptor: int) -> None:
         if not stat.S_ISDIR(os.fstat(descriptor).st_mode):
@@ -41,7 +41,7 @@ def test_a_stop_outlives_a_power_cut_also_on_a_full_disk(
     assert sorted(file.name for file in tmp_path.iterdir()) == ["arm.json"]
 
 
-def test_a_stop_on_a_read_only_disk_outlives_rtcfd(
+def test_a_stop_on_a_read_only_disk_survives_rtcfd(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     folder, this_boots = tmp_path / "state", tmp_path / "run"
@@ -60,18 +60,18 @@ def test_a_stop_on_a_read_only_disk_outlives_rtcfd(
         patch.setattr(Path, "unlink", read_only)
         with pytest.raises(OSError, match="Read-only"):
             store.save("arm", store.text(desired), running=False)
-    # It can be written again, but says that the loop runs.
+    # The disk is writable again, but still says that the loop runs.
     (state,) = Store(folder, this_boots).load()
     assert not state.running
     assert state.ended_boot == this_boot()
     desired.running = True
     store.save("arm", store.text(desired), running=True)
-    store.forget_stop("arm")  # as whoever saves does when no stop has come since
+    store.forget_stop("arm")  # as a save does if no stop followed
     (state,) = Store(folder, this_boots).load()
     assert state.running
 
 
-def test_nothing_is_resumed_from_a_disk_that_takes_no_stop(
+def test_nothing_is_resumed_from_a_disk_that_stores_no_stop(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     desired = Desired("arm")
@@ -83,7 +83,7 @@ def test_nothing_is_resumed_from_a_disk_that_takes_no_stop(
     (state,) = store.load()
     assert not state.running
     assert "the loop of arm is not resumed: state folder" in store.problems[0]
-    # Of one that runs nobody has to guess.
+    # For a running rtcfd no guess is needed.
     store = Store(tmp_path)
     (state,) = store.load(["arm"])
     assert state.running
@@ -91,7 +91,7 @@ def test_nothing_is_resumed_from_a_disk_that_takes_no_stop(
 
 
 def saved(folder: Path, runner: str, running: bool = False) -> str:
-    """Save the state of a runner as an earlier rtcfd did; return what is on disk."""
+    """Save the state of a runner like an earlier rtcfd; return the content on disk."""
     desired = Desired(runner)
     desired.running = running
     desired.history.note("/a", [("kp", None, Value(int_value=1))], "somebody", "set")
@@ -106,7 +106,7 @@ def aside(folder: Path, name: str) -> list[Path]:
 
 
 @pytest.mark.parametrize("odd", odd_files.ODD)
-def test_what_is_in_the_place_of_a_state_is_set_aside_and_the_others_are_read(
+def test_anything_in_place_of_a_state_is_set_aside_and_others_are_read(
     tmp_path: Path, odd: Callable[[Path], None]
 ) -> None:
     saved(tmp_path, "leg")
@@ -118,14 +118,14 @@ def test_what_is_in_the_place_of_a_state_is_set_aside_and_the_others_are_read(
     (problem,) = store.problems
     assert f"{tmp_path}/arm.json is set aside as arm.unreadable-" in problem
     assert "it cannot be read (" in problem and "\n" not in problem
-    # A state that is saved afterwards takes nothing's place.
+    # A later save replaces none of these.
     saved(tmp_path, "arm")
     (kept,) = aside(tmp_path, "arm")
     assert os.path.samestat(kept.lstat(), there)
 
 
 @pytest.mark.parametrize("odd", odd_files.ODD)
-def test_what_is_in_the_place_of_a_history_is_set_aside(
+def test_anything_in_place_of_a_history_is_set_aside(
     tmp_path: Path, odd: Callable[[Path], None]
 ) -> None:
     saved(tmp_path, "arm")
@@ -142,7 +142,7 @@ def test_what_is_in_the_place_of_a_history_is_set_aside(
     assert [each.value.int_value for each in again.history.of()] == [2]
 
 
-def test_two_that_are_set_aside_in_one_second_are_both_kept(tmp_path: Path) -> None:
+def test_two_files_set_aside_within_a_second_are_both_kept(tmp_path: Path) -> None:
     for _ in range(3):
         (tmp_path / "arm.json").write_text("{")
         Store(tmp_path).load()
@@ -167,18 +167,18 @@ def test_a_state_that_can_neither_be_read_nor_set_aside_is_not_overwritten(
     assert "is not used, and stays: it cannot be read (" in store.problems[0]
     with pytest.raises(OSError, match="could not be read, and is not overwritten"):
         store.save("arm", b"{}", running=False)
-    # What is stopped stays stopped all the same.
+    # Stopped loops stay stopped.
     assert not mark.exists()
     with pytest.raises(OSError, match="could not be read"):
         store.remove("arm")
     assert os.readlink(state) == "/proc/self/mem"
-    # Once it is out of the way.
+    # Once it is removed.
     state.unlink()
     store.save("arm", b"{}", running=False)
     assert state.read_bytes() == b"{}"
 
 
-def test_a_folder_that_cannot_be_listed_has_nothing_overwritten(
+def test_nothing_is_overwritten_in_an_unreadable_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     before = saved(tmp_path, "arm")
@@ -198,7 +198,7 @@ def test_a_folder_that_cannot_be_listed_has_nothing_overwritten(
 
 
 @pytest.mark.parametrize("odd", [odd_files.pipe, odd_files.dangling, odd_files.plug])
-def test_what_is_in_the_way_of_a_save_does_not_hold_it_up(
+def test_an_obstacle_at_a_states_path_does_not_block_a_save(
     tmp_path: Path, odd: Callable[[Path], None]
 ) -> None:
     for name in (".arm.json.new", ".arm.history.new", "arm.json", "arm.running"):
@@ -212,7 +212,7 @@ def test_what_is_in_the_way_of_a_save_does_not_hold_it_up(
     assert state.running
 
 
-def test_a_pipe_that_takes_the_place_of_a_history_holds_nothing_up(tmp_path: Path) -> None:
+def test_a_pipe_in_place_of_a_history_blocks_nothing(tmp_path: Path) -> None:
     saved(tmp_path, "arm")
     store = Store(tmp_path)
     (state,) = store.load()
@@ -222,7 +222,7 @@ def test_a_pipe_that_takes_the_place_of_a_history_holds_nothing_up(tmp_path: Pat
     state.history.note("/a", [("kp", None, Value(int_value=2))], "somebody", "set")
     with odd_files.deadline(), pytest.raises(OSError, match="it is a named pipe"):
         store.save_history("arm", *state.history.to_write())
-    # All there is takes its place the next time.
+    # The next write contains the whole history.
     state.history.not_written()
     state.history.note("/a", [("kp", None, Value(int_value=3))], "somebody", "set")
     store.save_history("arm", *state.history.to_write())
@@ -231,7 +231,7 @@ def test_a_pipe_that_takes_the_place_of_a_history_holds_nothing_up(tmp_path: Pat
 
 
 @pytest.mark.parametrize("odd", [odd_files.pipe, odd_files.folder, odd_files.dangling])
-def test_only_a_file_is_a_mark(tmp_path: Path, odd: Callable[[Path], None]) -> None:
+def test_only_a_regular_file_is_a_mark(tmp_path: Path, odd: Callable[[Path], None]) -> None:
     saved(tmp_path, "arm", running=True)
     mark = tmp_path / "arm.running"
     mark.unlink()
@@ -240,13 +240,13 @@ def test_only_a_file_is_a_mark(tmp_path: Path, odd: Callable[[Path], None]) -> N
     (state,) = store.load()
     assert not state.running
     assert "its loop is not resumed" in store.problems[0]
-    # Nor does one that comes later keep a stop from the disk.
+    # Nor does a later one prevent saving a stop.
     odd(mark)
     store.save("arm", store.text(state), running=False)
     assert not mark.is_file()
 
 
-def test_a_folder_in_the_place_of_a_file_is_one_line(tmp_path: Path) -> None:
+def test_a_folder_in_place_of_a_file_is_reported_in_one_line(tmp_path: Path) -> None:
     (tmp_path / ".arm.json.new").mkdir()
     with pytest.raises(OSError) as failed:
         Store(tmp_path).save("arm", b"{}", running=False)
@@ -261,9 +261,7 @@ def test_a_folder_in_the_place_of_a_file_is_one_line(tmp_path: Path) -> None:
         "[" * 100_000,
     ],
 )
-def test_a_state_whose_numbers_or_depth_are_beyond_all_is_set_aside(
-    tmp_path: Path, text: str
-) -> None:
+def test_a_state_with_huge_numbers_or_depth_is_set_aside(tmp_path: Path, text: str) -> None:
     saved(tmp_path, "leg")
     (tmp_path / "arm.json").write_text(text)
     store = Store(tmp_path)
@@ -271,7 +269,7 @@ def test_a_state_whose_numbers_or_depth_are_beyond_all_is_set_aside(
     assert "it is corrupt" in store.problems[0]
 
 
-def test_a_line_of_a_history_that_is_none_spoils_no_state(tmp_path: Path) -> None:
+def test_an_invalid_history_line_does_not_invalidate_the_state(tmp_path: Path) -> None:
     saved(tmp_path, "arm")
     with (tmp_path / "arm.history").open("a") as history:
         history.write(

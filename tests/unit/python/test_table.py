@@ -1,4 +1,4 @@
-"""Tables that rtcfctl prints: they fit the terminal, and no figure is cut."""
+"""rtcfctl's tables: they fit the terminal, and no number is cut."""
 
 import json
 import time
@@ -19,7 +19,7 @@ def lines(
     return ["".join(text for text, _ in line).rstrip() for line in folded]
 
 
-def test_columns_are_as_wide_as_what_stands_in_them() -> None:
+def test_columns_are_as_wide_as_their_content() -> None:
     assert lines(("name", "Hz"), ("arm", "50"), ("rt_runner", "2000"), right=("Hz",)) == [
         "name         Hz",
         "arm          50",
@@ -31,19 +31,19 @@ def test_columns_without_content_are_left_out() -> None:
     assert lines(("name", "unit", "value"), ("a", "", "1"), ("b", "", "2"))[0] == "name  value"
 
 
-def test_text_is_folded_and_figures_are_not() -> None:
+def test_text_is_wrapped_but_numbers_are_not() -> None:
     text = "ignores /arm/.*, loop break at in1, in2, held by rt_launcher /arm/filter (pid 4711)"
     found = lines(("component", "notes", "µs"), ("/arm/filter", text, "123456.78"),
                   right=("µs",), width=60)  # fmt: skip
     assert max(map(len, found)) <= 60
     assert "123456.78" in found[1]
     assert "4711)" in found[-1]
-    # Where there is no terminal nothing is folded.
+    # Without a terminal nothing is wrapped.
     cells: list[list[Cell]] = [[(text, ""), ("1", "")]]
     assert len(list(format_table(("notes", "µs"), cells))) == 2
 
 
-def test_values_have_the_digits_that_matter() -> None:
+def test_values_have_the_significant_digits() -> None:
     assert words.port_value("data: 0.30000000000000004") == "0.3"
     assert words.port_value("{x: 1.23456789012, y: -2e-07}") == "{x: 1.23457, y: -2e-07}"
     durations = (-1_500.0, 999_000.0, 1_234_567.0, 123_456_789.0)
@@ -69,18 +69,18 @@ def test_values_have_the_digits_that_matter() -> None:
         ("{x: 1, ...", "{x: 1, ..."),
     ],
 )  # fmt: skip
-def test_values_of_ports_are_numbers_and_objects_for_machines(text: str, value: object) -> None:
+def test_port_values_are_numbers_and_objects_in_json(text: str, value: object) -> None:
     assert plain(graph_pb2.PortInfo(name="out", value=text))["value"] == value
     json.dumps(value, allow_nan=False)
 
 
-def test_state_is_numbers_too_and_no_value_is_null() -> None:
+def test_state_values_are_numbers_or_null_in_json() -> None:
     state = plain(graph_pb2.StateInfo(type="double[2]", initial="[0, 1e-05]"))
     assert (state["initial"], state["value"]) == ([0, 1e-05], None)
     assert plain(graph_pb2.PortInfo())["value"] is None
 
 
-def test_what_takes_very_long_tells_what_it_does_unasked(
+def test_long_operations_print_their_progress(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     now = time.monotonic()

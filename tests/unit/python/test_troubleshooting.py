@@ -1,4 +1,4 @@
-"""docs/troubleshooting.md explains messages that there are."""
+"""docs/troubleshooting.md explains existing messages."""
 
 import re
 from pathlib import Path
@@ -18,14 +18,14 @@ _CODE = [
 
 @pytest.fixture(scope="module")
 def texts() -> str:
-    """Give what the code says, with texts that go over several lines joined."""
+    """Return the texts of the code, with multi-line texts joined."""
     return "\n".join(re.sub(r'"\s*\n\s*f?"', "", file.read_text()) for file in _CODE)
 
 
-def test_there_are_messages() -> None:
+def test_the_page_has_messages() -> None:
     assert len(MESSAGES) == len(set(MESSAGES)) > 20
 
 
 @pytest.mark.parametrize("message", MESSAGES)
-def test_a_message_is_one_that_is_said(texts: str, message: str) -> None:
+def test_a_message_of_the_page_exists_in_the_code(texts: str, message: str) -> None:
     assert message in texts

@@ -1,4 +1,4 @@
-"""Parameters that were tuned stay when what gave them their values is applied again."""
+"""Tuned parameters keep their values when a graph or source is applied again."""
 
 import pytest
 import rtcf
@@ -11,7 +11,7 @@ def spec(*parameters: str, name: str = "pid") -> graph_pb2.ComponentSpec:
 
 
 def number(value: graph_pb2.ParameterValue) -> float:
-    """Return a number, also of an int, which this peer leaves one."""
+    """Return a number, including an int, which this peer does not convert."""
     return float(getattr(value, str(value.WhichOneof("kind"))))
 
 
@@ -41,7 +41,7 @@ def again(
 
 
 @pytest.mark.parametrize("given", [(), ("kp:=1.5",), ("kp:=2",)])
-def test_what_was_tuned_stays_and_is_its_setters(
+def test_tuned_values_stay_and_keep_their_user(
     client: rtcf.Client, how: str, given: tuple[str, ...]
 ) -> None:
     client.load(spec(*given))
@@ -59,7 +59,7 @@ def test_what_was_tuned_stays_and_is_its_setters(
     assert kp(client) == (float(given[0].partition(":=")[2]) if given else 1.0)
 
 
-def test_what_nobody_has_tuned_is_as_it_is_given(client: rtcf.Client, how: str) -> None:
+def test_untuned_parameters_get_the_given_value(client: rtcf.Client, how: str) -> None:
     client.load(spec("kp:=2"))
     result = again(client, how, spec("kp:=2"), spec("kp:=2"))
     assert (kp(client), list(result.notes), len(result.kept)) == (2.0, [], 0)
@@ -69,7 +69,7 @@ def test_what_nobody_has_tuned_is_as_it_is_given(client: rtcf.Client, how: str) 
 
 
 @pytest.mark.parametrize("before", [(), ("kp:=1.5",)])
-def test_what_is_given_anew_counts(client: rtcf.Client, how: str, before: tuple[str, ...]) -> None:
+def test_a_new_given_value_applies(client: rtcf.Client, how: str, before: tuple[str, ...]) -> None:
     client.load(spec(*before))
     tune(client, "kp:=5.0")
     known = history(client)
@@ -80,9 +80,9 @@ def test_what_is_given_anew_counts(client: rtcf.Client, how: str, before: tuple[
     assert change.before.double_value == 5.0
 
 
-def test_what_does_not_fit_is_told_and_noted(client: rtcf.Client, how: str) -> None:
+def test_an_unsuitable_tuned_value_is_reported_and_recorded(client: rtcf.Client, how: str) -> None:
     client.load(spec())
-    tune(client, "kp:=-5.0")  # this peer takes it
+    tune(client, "kp:=-5.0")  # this peer accepts it
     result = again(client, how, spec(), spec())
     assert list(result.notes) == ["/pid: kp = -5.0 does not fit: at least 0; it is 1.0 now"]
     assert kp(client) == 1.0
@@ -97,7 +97,7 @@ def test_a_value_of_another_type_does_not_fit(client: rtcf.Client, how: str) -> 
     assert list(result.notes) == [note]
 
 
-def test_a_component_that_is_new_or_another_has_what_it_is_given(
+def test_a_new_or_different_component_has_its_given_values(
     daemon: DaemonUnderTest, client: rtcf.Client
 ) -> None:
     client.load(spec("kp:=2.5"))
@@ -112,7 +112,7 @@ def test_a_component_that_is_new_or_another_has_what_it_is_given(
     assert "kp: 3.5" in daemon.ctl("save").stdout
 
 
-def test_what_was_tuned_is_of_the_saved_graph(
+def test_tuned_values_are_in_the_saved_graph(
     daemon: DaemonUnderTest, client: rtcf.Client, how: str
 ) -> None:
     client.load(spec())
@@ -124,7 +124,7 @@ def test_what_was_tuned_is_of_the_saved_graph(
         assert kp(later) == 5.0
 
 
-def test_a_dry_run_tells_and_changes_nothing(client: rtcf.Client) -> None:
+def test_a_dry_run_reports_and_changes_nothing(client: rtcf.Client) -> None:
     client.load(spec())
     tune(client, "kp:=5.0")
     before = history(client)

@@ -1,4 +1,4 @@
-"""Who may set which parameter, and how fast."""
+"""Rules for setting parameters: users, parameters, rates of change."""
 
 from pathlib import Path
 
@@ -48,7 +48,7 @@ def access(tmp_path: Path) -> rights.Access:
     return settings_file.read(file).access
 
 
-def test_who_is_named_may_set_what_is_named_and_nothing_else(access: rights.Access) -> None:
+def test_a_named_user_may_set_only_the_named_parameters(access: rights.Access) -> None:
     access.check(peer("ann"), "SetParameters")
     tuning = access.tuning(peer("ann"))
     assert tuning is not None
@@ -60,13 +60,13 @@ def test_who_is_named_may_set_what_is_named_and_nothing_else(access: rights.Acce
         access.check(peer("ann"), "Stop")
 
 
-def test_rules_bind_who_may_tune_and_not_who_may_operate(access: rights.Access) -> None:
+def test_rules_apply_to_tune_and_not_to_operate(access: rights.Access) -> None:
     assert access.tuning(peer("tom")) is not None
     assert access.tuning(peer("bob")) is None
     access.check(peer("bob"), "SetParameters")
 
 
-def test_who_may_not_even_look_gets_nothing_by_a_rule(access: rights.Access) -> None:
+def test_a_rule_grants_nothing_without_the_right_to_observe(access: rights.Access) -> None:
     assert access.level(peer("x", "lab")) == Level.NONE
     with pytest.raises(PermissionDenied):
         access.check(peer("x", "lab"), "SetParameters")
@@ -79,14 +79,14 @@ def test_who_may_not_even_look_gets_nothing_by_a_rule(access: rights.Access) -> 
         (1.0, 1.6, None, False),
         (1.0, 0.4, 1.0, False),
         (1.0, 3.0, 4.0, True),
-        (1.0, 7.0, 3600.0, False),  # a long pause is no leave to leap
+        (1.0, 7.0, 3600.0, False),  # a long pause permits no large step
         (1.0, float("nan"), 1.0, False),
         (1, 2, 1.0, False),
         ("a", "b", 0.0, True),
         (True, False, 0.0, True),
     ],
 )
-def test_a_number_changes_no_faster_than_is_allowed(
+def test_a_number_changes_no_faster_than_its_rule_allows(
     old: object, new: object, pause_s: float | None, fits: bool
 ) -> None:
     rule = Rule(frozenset({"ann"}), most_per_s=0.5)
@@ -109,7 +109,7 @@ def test_a_number_changes_no_faster_than_is_allowed(
         ("who = ['a']\npace = 1", "unknown key"),
     ],
 )
-def test_a_bad_rule_is_refused(tmp_path: Path, text: str, said: str) -> None:
+def test_a_bad_rule_is_rejected(tmp_path: Path, text: str, said: str) -> None:
     file = tmp_path / "rtcfd.toml"
     file.write_text(f"[[access.parameters]]\n{text}\n")
     with pytest.raises(Refusal) as refused:
@@ -118,7 +118,7 @@ def test_a_bad_rule_is_refused(tmp_path: Path, text: str, said: str) -> None:
 
 
 @root_only
-def test_a_user_who_may_only_look_sets_what_a_rule_names_no_faster_than_it_says() -> None:
+def test_an_observer_may_set_a_rules_parameters_at_its_rate() -> None:
     rules = (
         "[access]\nobserve = ['nobody']\n"
         "[[access.parameters]]\nwho = ['nobody']\nnames = ['/pid.kp']\nmost_per_s = 0.001\n"

@@ -1,4 +1,4 @@
-"""Files that are there whole or not at all."""
+"""Files that are written completely or not at all."""
 
 import errno
 import os
@@ -9,7 +9,7 @@ import pytest
 from rtcf_shared.whole_file import whole_file
 
 
-def test_the_file_is_there_when_it_is_whole(tmp_path: Path) -> None:
+def test_the_file_appears_once_it_is_complete(tmp_path: Path) -> None:
     to = tmp_path / "file"
     with whole_file(to) as part:
         part.write_text("half ")
@@ -20,7 +20,7 @@ def test_the_file_is_there_when_it_is_whole(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("force", [False, True])
-def test_what_fails_leaves_what_was_there(tmp_path: Path, force: bool) -> None:
+def test_a_failed_write_keeps_the_old_file(tmp_path: Path, force: bool) -> None:
     to = tmp_path / "file"
     before = []
     if force:
@@ -33,7 +33,7 @@ def test_what_fails_leaves_what_was_there(tmp_path: Path, force: bool) -> None:
     assert not force or to.read_text() == "old"
 
 
-def test_a_file_that_is_there_is_kept(tmp_path: Path) -> None:
+def test_an_existing_file_is_kept(tmp_path: Path) -> None:
     to = tmp_path / "file"
     to.write_text("old")
     with pytest.raises(FileExistsError), whole_file(to):
@@ -46,7 +46,7 @@ def test_a_file_that_is_there_is_kept(tmp_path: Path) -> None:
     assert os.listdir(tmp_path) == ["file"]
 
 
-def test_force_writes_over_it(tmp_path: Path) -> None:
+def test_force_overwrites_it(tmp_path: Path) -> None:
     to = tmp_path / "file"
     to.write_text("old")
     with whole_file(to, force=True) as part:
@@ -54,7 +54,7 @@ def test_force_writes_over_it(tmp_path: Path) -> None:
     assert to.read_text() == "new"
 
 
-def test_a_link_stays_one(tmp_path: Path) -> None:
+def test_a_link_stays_a_link(tmp_path: Path) -> None:
     link = tmp_path / "link"
     link.symlink_to(tmp_path / "file")
     (tmp_path / "file").write_text("old")
@@ -64,7 +64,7 @@ def test_a_link_stays_one(tmp_path: Path) -> None:
     assert (tmp_path / "file").read_text() == "new"
 
 
-def test_a_file_system_without_hard_links_takes_it(
+def test_a_file_system_without_hard_links_works(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def link(*_: object) -> None:
@@ -76,7 +76,7 @@ def test_a_file_system_without_hard_links_takes_it(
     assert (tmp_path / "file").read_text() == "all"
 
 
-def test_a_pipe_is_written_to_as_it_is(tmp_path: Path) -> None:
+def test_a_pipe_is_written_directly(tmp_path: Path) -> None:
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     read: list[str] = []

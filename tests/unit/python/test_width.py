@@ -1,4 +1,4 @@
-"""What rtcfctl prints fits a terminal of 80 columns, however long names are."""
+"""rtcfctl's output fits a terminal of 80 columns, with names of any length."""
 
 import os
 import pty
@@ -13,13 +13,13 @@ import rtcf
 from daemon_under_test import BUILD_TREE, DEADLINE_S, DaemonUnderTest
 
 COLUMNS = 80
-# Each of a letter that nothing else has.
+# Each of a letter that occurs nowhere else.
 COMPONENT, PORT, PACKAGE, TYPE, RUNNER = (letter * 60 for letter in "XQKZJ")
 RUNNER = RUNNER[:50]
 
 
 def on_a_terminal(daemon: DaemonUnderTest, command: Sequence[str]) -> list[str]:
-    """Return the lines that somebody sees who calls rtcfctl."""
+    """Return the lines that rtcfctl shows in a terminal."""
     ours, theirs = pty.openpty()
     termios.tcsetwinsize(theirs, (24, COLUMNS))
     with subprocess.Popen(
@@ -33,7 +33,7 @@ def on_a_terminal(daemon: DaemonUnderTest, command: Sequence[str]) -> list[str]:
             while piece := os.read(ours, 65536):
                 shown += piece
         except OSError:
-            pass  # Linux says so at the end of what the other side has written
+            pass  # Linux reports the end of the other side's output this way
         finally:
             os.close(ours)
         assert process.wait(DEADLINE_S) == 0, command
@@ -42,8 +42,8 @@ def on_a_terminal(daemon: DaemonUnderTest, command: Sequence[str]) -> list[str]:
 
 @pytest.fixture(scope="module")
 def daemon() -> Iterator[DaemonUnderTest]:
-    """Give one whose runner, component, ports, package and type have long names."""
-    # Of the 107 characters of a socket's path most are the runner's.
+    """Yield a daemon whose runner, component, ports, package and type have long names."""
+    # Most of the 107 characters of a socket's path belong to the runner's name.
     with tempfile.TemporaryDirectory() as folder:
         daemon = DaemonUnderTest(Path(folder))
         daemon.package(PACKAGE, types={TYPE: "fine"})
@@ -73,14 +73,14 @@ def daemon() -> Iterator[DaemonUnderTest]:
         ("history", [COMPONENT]),
     ],
 )
-def test_no_line_is_wider_and_no_name_is_lost(
+def test_no_line_is_too_wide_and_no_name_is_lost(
     daemon: DaemonUnderTest, command: str, names: list[str]
 ) -> None:
     lines = on_a_terminal(daemon, [*command.split(), "-r", RUNNER])
     shown = "\n".join(lines)
-    # A heading is no table: the terminal folds it without tearing columns apart.
+    # A heading is not a table: the terminal can wrap it without breaking columns.
     headings = (f"/{COMPONENT}: ", f"{PACKAGE}/")
     assert all(len(line) <= COLUMNS for line in lines if not line.startswith(headings)), shown
     for name in names:
-        # Cells of one line stand beside each other where they are folded.
+        # Wrapped cells of one row are next to each other.
         assert name in shown or shown.count(name[0]) >= len(name), shown

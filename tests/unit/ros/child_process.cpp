@@ -21,7 +21,7 @@ ChildProcess::ChildProcess(const std::vector<std::string>& command,
         const std::string text = *variable;
         if (environment.count(text.substr(0, text.find('='))) == 0) variables.push_back(text);
     }
-    // A test that crashes or is ended for its time must not leave processes.
+    // A test that crashes or times out must not leave processes behind.
     std::vector<std::string> words{"setpriv", "--pdeathsig", "KILL"};
     words.insert(words.end(), command.begin(), command.end());
     std::vector<char*> arguments;

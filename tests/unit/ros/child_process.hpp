@@ -1,5 +1,5 @@
 /// @file
-/// A process started by a test: ended with the object, its lines read with a deadline.
+/// A process started by a test: ends with the object; its lines are read with a deadline.
 #pragma once
 
 #include <sys/types.h>
@@ -12,7 +12,7 @@
 
 class ChildProcess {
    public:
-    /// @param environment added to that of the test
+    /// @param environment added to the test's environment
     ChildProcess(const std::vector<std::string>& command,
                  const std::map<std::string, std::string>& environment);
     ~ChildProcess();
@@ -20,7 +20,7 @@ class ChildProcess {
     ChildProcess& operator=(const ChildProcess&) = delete;
 
     void signal(int number) const;
-    /// Ends it at once and waits for it.
+    /// Kills it and waits for its end.
     void kill();
     /// The next line of its standard output; nothing at its end or after `timeout`.
     std::optional<std::string> line(std::chrono::milliseconds timeout);

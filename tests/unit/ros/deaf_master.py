@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""A ROS master that stops answering in the middle: it never replies to registerPublisher.
+"""A ROS master that stops answering: it never replies to registerPublisher.
 
 deaf_master.py PORT   prints `asked` when a topic is registered; the test ends it
 """
@@ -12,14 +12,14 @@ from xmlrpc.server import SimpleXMLRPCServer
 
 
 class DeafMaster(socketserver.ThreadingMixIn, SimpleXMLRPCServer):
-    """Knows one node, by the service that it registers."""
+    """Detects the node by the service that it registers."""
 
     daemon_threads = True
     node = ""
 
     def _dispatch(self, method: str, params: Any) -> Any:
         if method == "registerPublisher":
-            sys.stdout.write("asked\n")  # whole, whoever writes beside it
+            sys.stdout.write("asked\n")  # a single write, since several threads print
             sys.stdout.flush()
             threading.Event().wait()
         if method == "registerService":

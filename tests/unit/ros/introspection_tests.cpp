@@ -1,4 +1,4 @@
-// What peers hear of a runner: a real one, with its loop, at a real master.
+// Introspection topics of a runner: a real runner with its loop, at a real master.
 #include <future>
 
 #include "faults/flight_recorder.hpp"
@@ -25,7 +25,7 @@ class IntrospectionTest : public RosFixture {
             runner_->start([](const std::string&) {});
         });
     }
-    // Ends it, its loop and the node, as an executor does that is asked to go.
+    // Ends it, its loop and the node, like an executor that is asked to end.
     void endRunner() { runner_.reset(); }
 
    private:
@@ -42,7 +42,7 @@ class IntrospectionTest : public RosFixture {
     std::unique_ptr<Runner> runner_;
 };
 
-TEST_F(IntrospectionTest, TellsTheLastStateBeforeItCloses) {
+TEST_F(IntrospectionTest, PublishesTheLastStateBeforeItCloses) {
     startMaster();
     startRunner();
     const auto listener = health();

@@ -1,5 +1,5 @@
-// What a component's safe() wrote is the last value of its topics, and the one that counts: each
-// subscriber gets it, though the topic closes right after it.
+// The value written by a component's safe() is the last one of its topics: each subscriber gets it,
+// although the topic closes right after it.
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kTimes = 50;
 
-// What the listener prints until the value that safe() wrote; false if it does not come.
+// Reads the listener's lines up to the value written by safe(); false if it does not arrive.
 bool getsZero(ChildProcess& listener) {
     while (const auto line = listener.line(10s)) {
         if (*line == "0.0") return true;
@@ -40,12 +40,12 @@ TEST_F(LastValueTest, ReachesSubscribersBeforeTheTopicOfAnUnloadedComponentClose
     }
 }
 
-// roscpp starts once per process: each end has its own.
+// roscpp starts once per process, so each end has its own.
 TEST_F(LastValueTest, ReachesSubscribersBeforeTheNodeEnds) {
     startMaster();
     const auto listener = listen("/out");
     for (int i = 0; i < kTimes; ++i) {
-        std::array<int, 2> heard{};  // closed by us when the listener has got something
+        std::array<int, 2> heard{};  // closed here when the listener has received a value
         ASSERT_EQ(pipe(heard.data()), 0);
         const pid_t child = fork();
         ASSERT_GE(child, 0);
@@ -63,7 +63,7 @@ TEST_F(LastValueTest, ReachesSubscribersBeforeTheNodeEnds) {
                 source.write(0.0);
             });
             char nothing = 0;
-            [[maybe_unused]] const ssize_t end = read(heard[0], &nothing, 1);  // it is closed
+            [[maybe_unused]] const ssize_t end = read(heard[0], &nothing, 1);  // closed
             ending = true;
             loop.join();
             stopNode();
@@ -81,8 +81,8 @@ TEST_F(LastValueTest, ReachesSubscribersBeforeTheNodeEnds) {
     }
 }
 
-// Nobody waits for a subscriber that takes nothing.
-TEST_F(LastValueTest, AStoppedSubscriberHoldsUpNoEnd) {
+// The end does not wait for a subscriber that reads nothing.
+TEST_F(LastValueTest, AStoppedSubscriberDoesNotDelayTheEnd) {
     startMaster();
     startNode();
     Source source("/out");
@@ -90,7 +90,7 @@ TEST_F(LastValueTest, AStoppedSubscriberHoldsUpNoEnd) {
     const auto listener = listen("/out");
     ASSERT_NE(flow(source, *listener), "");
     listener->signal(SIGSTOP);
-    // More than the kernel takes for it.
+    // More than the kernel buffers for it.
     constexpr int kMany = 400'000;
     for (int i = 1; i <= kMany; ++i) {
         source.write(i);

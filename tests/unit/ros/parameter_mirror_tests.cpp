@@ -1,4 +1,4 @@
-// The mirror of parameters, by hand, at a real master.
+// The mirror of parameters, called by hand, at a real master.
 #include "ros/parameters/parameter_mirror.hpp"
 
 #include <cmath>
@@ -48,14 +48,14 @@ class ParameterMirrorTest : public RosFixture {
     std::unique_ptr<ParallelCalls> master_calls_;
 };
 
-// What is owed to the master of a component that left must not be said of one that came since.
-TEST_F(ParameterMirrorTest, OwesNothingOfAComponentThatIsBack) {
+// Pending deletions for an unloaded component must not affect a component loaded later.
+TEST_F(ParameterMirrorTest, DeletesNothingOfAReloadedComponent) {
     ParameterMirror mirror;
     mirror.serve([](const std::string&, const rtcf::executor::ParameterBatch&,
                     const std::function<void(const std::string&)>& done) { done({}); });
     mirror.reconcile(calls(), caller_, {component(2.0)});
     ASSERT_TRUE(ask("getParam", texts({"/test", "/C/kp"}))[0]);
-    // Replaced, while the master is too slow to hear of it.
+    // Replaced while the master is too slow to be told.
     mirror.leave(calls(), caller_, {"/C"}, std::chrono::steady_clock::now() - 1s);
     mirror.reconcile(calls(), caller_, {component(3.0)});
     for (int turn = 0; turn < 3; ++turn) {
@@ -65,8 +65,8 @@ TEST_F(ParameterMirrorTest, OwesNothingOfAComponentThatIsBack) {
     EXPECT_TRUE(ask("getParam", texts({"/test", "/C/kp"}))[0]) << "it was deleted";
 }
 
-// The loop may answer while a turn is under way, which still has the values from before.
-TEST_F(ParameterMirrorTest, WritesNoOldValueOverOneThatTheLoopHasJustTaken) {
+// The loop may answer during a turn, which still has the old values.
+TEST_F(ParameterMirrorTest, OverwritesNoNewValueOfTheLoopWithAnOldOne) {
     std::vector<double> taken;
     ParameterMirror mirror;
     mirror.serve([&](const std::string&, const rtcf::executor::ParameterBatch& batch,
@@ -86,9 +86,9 @@ TEST_F(ParameterMirrorTest, WritesNoOldValueOverOneThatTheLoopHasJustTaken) {
     EXPECT_EQ(static_cast<double>(answers[0].value), 5.0);
 }
 
-// Anybody may tell of a key, which is as long as a call may be: each of its slashes must not cost
-// as much as all of it.
-TEST_F(ParameterMirrorTest, TakesAKeyOfSlashesAsAnyOther) {
+// Any peer may send a key of the maximum size; processing must not be quadratic in its
+// slashes.
+TEST_F(ParameterMirrorTest, HandlesAKeyOfSlashesLikeAnyOther) {
     int asked = 0;
     ParameterMirror mirror;
     mirror.serve([&](const std::string&, const rtcf::executor::ParameterBatch&,
@@ -109,8 +109,8 @@ TEST_F(ParameterMirrorTest, TakesAKeyOfSlashesAsAnyOther) {
     EXPECT_EQ(asked, 1);
 }
 
-// NaN is a value that a default may have; that it does not equal itself is no change.
-TEST_F(ParameterMirrorTest, AsksForNoNaNThatIsThere) {
+// NaN is a valid default; that it does not equal itself is no change.
+TEST_F(ParameterMirrorTest, RequestsNoNanThatIsSetAlready) {
     constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
     int asked = 0;
     ParameterMirror mirror;

@@ -1,12 +1,12 @@
 #!/usr/bin/python3
-"""A ROS node on the other side of a test's topics; the test starts and ends it.
+"""A ROS node at the other end of a test's topics; the test starts and ends it.
 
-peer.py listen TOPIC TYPE   prints the value of each message, of a stamped one its stamp (ns) before
+peer.py listen TOPIC TYPE   prints the value of each message, after its stamp (ns) if it has one
 peer.py send TOPIC VALUE    publishes one latched std_msgs/Float64 and stays
 peer.py health TOPIC        prints `name|message` of each diagnostic status
-peer.py count TOPIC         publishes 1.0, 2.0, ... as std_msgs/Float64, 20 a second
-peer.py node NAME           only has that name; ends when its master says so
-peer.py loggers NODE        does what rqt_logger_level does to a node, prints `done` and ends
+peer.py count TOPIC         publishes 1.0, 2.0, ... as std_msgs/Float64, 20 per second
+peer.py node NAME           only has that name; ends when its master asks it to
+peer.py loggers NODE        calls a node like rqt_logger_level, prints `done` and ends
 """
 
 import contextlib
@@ -22,34 +22,34 @@ from roslib.message import get_message_class
 
 
 def show(message: Any) -> None:
-    """Prints a message's value on a line of its own."""
+    """Print a message's value on its own line."""
     stamp = f"{message.header.stamp.to_nsec()} " if message._has_header else ""
-    # In one piece: each publisher is heard by a thread of its own.
+    # A single write: messages of each publisher arrive in a separate thread.
     sys.stdout.write(f"{stamp}{message.data}\n")
     sys.stdout.flush()
 
 
 def show_health(message: Any) -> None:
-    """Prints each status on a line of its own."""
+    """Print each status on its own line."""
     sys.stdout.write("".join(f"{each.name}|{each.message}\n" for each in message.status))
     sys.stdout.flush()
 
 
 def look_at_loggers(node: str) -> None:
-    """Asks for the loggers of a node and sets the level of one."""
-    with contextlib.suppress(rospy.ServiceException):  # it may refuse
+    """Query the loggers of a node and set the level of one."""
+    with contextlib.suppress(rospy.ServiceException):  # it may fail
         rospy.ServiceProxy(f"{node}/get_loggers", roscpp.srv.GetLoggers)()
     rospy.ServiceProxy(f"{node}/set_logger_level", roscpp.srv.SetLoggerLevel)("ros", "debug")
     print("done", flush=True)
 
 
 def main() -> None:
-    """Does what the command line says until it is killed."""
+    """Run the command of the command line until the process is killed."""
     action, argument = sys.argv[1:3]
     if action == "node":
         namespace, _, name = argument.rpartition("/")
         os.environ["ROS_NAMESPACE"] = namespace
-        # rospy reads it when it is imported.
+        # rospy reads it at import time.
         rospy.names._set_caller_id(argument)
         rospy.init_node(name, disable_signals=True)
     else:

@@ -1,4 +1,4 @@
-// Declared parameters as dynamic_reconfigure has them.
+// Declared parameters in dynamic_reconfigure's format.
 #include <limits>
 #include <optional>
 
@@ -13,10 +13,10 @@ using rtcf::ros1::batchOf;
 using rtcf::ros1::descriptionOf;
 using rtcf::ros1::valuesOf;
 
-constexpr std::int64_t kBeyond = 5'000'000'000;  // what 32 bits hold
+constexpr std::int64_t kBeyond = 5'000'000'000;  // beyond 32 bits
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// One integer of that value.
+// A set with one integer of that value.
 ParameterSet integer(std::int64_t value, std::optional<double> minimum = {},
                      std::optional<double> maximum = {}) {
     rtcf::ParameterDeclaration declaration;
@@ -35,7 +35,7 @@ std::string typeShown(const ParameterSet& set) {
     return descriptionOf(set).groups.at(0).parameters.at(0).type;
 }
 
-TEST(Reconfigure, AnIntegerWithoutBoundsIsShownAsItIs) {
+TEST(Reconfigure, AnIntegerWithoutBoundsIsShownUnchanged) {
     const ParameterSet set = integer(kBeyond);
     const auto values = valuesOf(set);
     EXPECT_TRUE(values.ints.empty());
@@ -49,7 +49,7 @@ TEST(Reconfigure, AnIntegerWithoutBoundsIsShownAsItIs) {
     EXPECT_EQ(description.min.doubles[0].value, -kInfinity);
     ASSERT_EQ(description.dflt.doubles.size(), 1U);
     EXPECT_EQ(description.dflt.doubles[0].value, 1.0);
-    // Who sends it back changes nothing.
+    // Sending it back changes nothing.
     EXPECT_TRUE(batchOf(values, set).empty());
 }
 
@@ -62,12 +62,12 @@ TEST(Reconfigure, AnIntegerWithoutBoundsIsSetBeyond32Bits) {
     EXPECT_EQ(batchOf(asked, set), expected);
 }
 
-TEST(Reconfigure, OneBoundAloneKeepsNoIntegerWithin32Bits) {
+TEST(Reconfigure, ASingleBoundDoesNotLimitAnIntegerTo32Bits) {
     EXPECT_EQ(typeShown(integer(7, 0.0, std::nullopt)), "double");
     EXPECT_EQ(valuesOf(integer(kBeyond, 0.0, std::nullopt)).doubles.at(0).value, 5e9);
     EXPECT_EQ(typeShown(integer(7, std::nullopt, 10.0)), "double");
     EXPECT_EQ(valuesOf(integer(-kBeyond, std::nullopt, 10.0)).doubles.at(0).value, -5e9);
-    // Both do.
+    // Two bounds do.
     const ParameterSet bounded = integer(7, 0.0, 10.0);
     EXPECT_EQ(typeShown(bounded), "int");
     EXPECT_EQ(valuesOf(bounded).ints.at(0).value, 7);
@@ -76,7 +76,7 @@ TEST(Reconfigure, OneBoundAloneKeepsNoIntegerWithin32Bits) {
 
 class ReconfigureTest : public RosFixture {
    protected:
-    // A component with an enum, as a library declares it.
+    // A component with an enum, as declared by a library.
     void serveModes(const std::vector<std::string>& names) {
         auto set = std::make_shared<ParameterSet>();
         set->full_name = "/C";
@@ -91,19 +91,19 @@ class ReconfigureTest : public RosFixture {
         table->parameters.push_back(set);
         rosNode().setTable(table);
     }
-    // What a peer that comes now is told.
+    // Whether the description for a new peer contains the text.
     bool told(const std::string& text) {
         return run({"rostopic", "echo", "-n1", "/C/parameter_descriptions"}).find(text) !=
                std::string::npos;
     }
 };
 
-TEST_F(ReconfigureTest, ChoicesOfAReplacedTypeAreToldAnew) {
+TEST_F(ReconfigureTest, ChoicesOfAReplacedTypeAreSentAgain) {
     startMaster();
     startNode();
     serveModes({"idle", "run"});
     ASSERT_TRUE(eventually([&] { return told("'run'"); }, 60s));
-    // Built anew, with the same names and values but one.
+    // Rebuilt with the same names and values except one.
     serveModes({"idle", "walk"});
     EXPECT_TRUE(eventually([&] { return told("'walk'"); }, 60s));
     EXPECT_FALSE(told("'run'"));

@@ -15,7 +15,7 @@ using rtcf::ros1::Dependence;
 
 namespace {
 
-// Libraries of this process whose name has that part.
+// Loaded libraries whose name contains `part`.
 std::vector<std::string> loaded(const char* part) {
     struct Found {
         const char* part;
@@ -32,7 +32,7 @@ std::vector<std::string> loaded(const char* part) {
     return found.files;
 }
 
-// Functions that a library defines, but for templates and inline ones, which any program may have.
+// Functions defined by a library, except templates and inline ones, which any program may define.
 std::vector<std::string> functionsOf(const std::string& file) {
     std::ifstream stream(file, std::ios::binary);
     const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
@@ -61,7 +61,7 @@ std::vector<std::string> functionsOf(const std::string& file) {
     return names;
 }
 
-// Where the function is that is called by this name; null if nowhere.
+// The address of the function of this name; null if there is none.
 const void* homeOf(const char* name) {
     Dl_info info{};
     void* const function = dlsym(RTLD_DEFAULT, name);
@@ -70,11 +70,11 @@ const void* homeOf(const char* name) {
 
 }  // namespace
 
-TEST(Replacements, AreInPlaceWithTheRoscppOfThisMachine) {
+TEST(Replacements, AreInEffectWithThisMachinesRoscpp) {
     EXPECT_EQ(broken(rtcf::ros1::dependences()), std::vector<std::string>{});
 }
 
-// What stands in the place of a function of theirs, and would do so unseen.
+// A replacement missing in the list would be unnoticed.
 TEST(Replacements, AreAllInTheList) {
     std::set<std::string> listed;
     for (const Dependence& each : rtcf::ros1::dependences()) {
@@ -95,7 +95,7 @@ TEST(Replacements, AreAllInTheList) {
     EXPECT_EQ(replaced, listed);
 }
 
-TEST(Replacements, ThatALibraryDoesNotHaveAreTold) {
+TEST(Replacements, MissingInALibraryAreReported) {
     const std::vector<Dependence> other{
         {Dependence::Kind::Function, "_ZN3ros6master6nobodyEv", "libroscpp.so", "the first use"},
         {Dependence::Kind::Text, "no such text there is", "libroscpp.so", "the second use"}};

@@ -30,7 +30,7 @@ int freePort() {
 RosFixture::RosFixture() : port_(freePort()) {
     std::string folder = (std::filesystem::temp_directory_path() / "rtcf-ros-XXXXXX").string();
     folder_ = mkdtemp(folder.data());
-    // roscpp reads its settings from the environment, and only once.
+    // roscpp reads its settings from the environment only once.
     for (const auto& [name, value] : environment()) setenv(name.c_str(), value.c_str(), 1);
     unsetenv("ROS_MASTER_URI");
     unsetenv("ROS_NAMESPACE");
@@ -141,7 +141,7 @@ void RosFixture::startNode() {
 }
 
 bool RosFixture::nodeEnds() {
-    constexpr auto kHangs = 40s;  // the node's own bound is two, on a machine that has time for it
+    constexpr auto kHangs = 40s;  // the node's own limit is two on an idle machine
     const auto begin = std::chrono::steady_clock::now();
     stopNode();
     return std::chrono::steady_clock::now() - begin < kHangs;

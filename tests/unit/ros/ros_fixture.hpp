@@ -1,7 +1,7 @@
 /// @file
-/// A ROS of its own for each test: a master on a free port, files in a
-/// temporary folder, peers in processes of their own; and what the executor
-/// gives to the node: taps and injectors of std_msgs/Float64.
+/// A private ROS for each test: a master on a free port, files in a temporary
+/// folder, peers in separate processes; and the executor's side of the node:
+/// taps and injectors of std_msgs/Float64.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -23,7 +23,7 @@
 
 using namespace std::chrono_literals;
 
-/// An output of the loop: write() is what a cycle does.
+/// An output of the loop: write() acts like a cycle.
 class Source {
    public:
     explicit Source(const std::string& topic)
@@ -32,7 +32,7 @@ class Source {
                                                      slot_, 1 << 16)) {}
 
     const std::shared_ptr<rtcf::executor::Tap>& tap() const { return tap_; }
-    /// @param stamp_ns of the cycle
+    /// @param stamp_ns stamp of the cycle
     void write(double value, std::int64_t stamp_ns = 0) {
         slot_->value.data = value;
         ++slot_->sequence;
@@ -44,7 +44,7 @@ class Source {
     std::shared_ptr<rtcf::executor::Tap> tap_;
 };
 
-/// An input of the loop: value() is what a cycle reads.
+/// An input of the loop: value() is the value read by a cycle.
 class Sink {
    public:
     explicit Sink(const std::string& topic)
@@ -66,11 +66,11 @@ class RosFixture : public ::testing::Test {
     RosFixture();
     ~RosFixture() override;
 
-    /// Starts a master, the same port each time, and waits until it answers.
+    /// Starts a master, always on the same port, and waits until it answers.
     void startMaster();
-    /// Starts one that answers until a topic is registered.
+    /// Starts a master that answers until a topic is registered.
     void startDeafMaster();
-    /// Starts a real one behind one that takes its time for each call.
+    /// Starts a real master behind a relay that delays each call.
     void startSlowMaster(std::chrono::milliseconds each);
     void stopMaster() {
         master_.reset();
@@ -79,38 +79,38 @@ class RosFixture : public ::testing::Test {
     ChildProcess& master() { return *master_; }
     std::string masterUri() const { return "http://127.0.0.1:" + std::to_string(port_); }
 
-    /// A rospy node that prints the values of a topic, one a line, after the stamp if there is one.
+    /// A rospy node that prints the values of a topic, one per line, after the stamp if any.
     std::unique_ptr<ChildProcess> listen(const std::string& topic,
                                          const std::string& type = "std_msgs/Float64");
     /// A rospy node that publishes one latched value and stays.
     std::unique_ptr<ChildProcess> send(const std::string& topic, double value);
     /// A rospy node that publishes 1, 2, 3...
     std::unique_ptr<ChildProcess> count(const std::string& topic);
-    /// A rospy node that prints `name|message` of all health that is reported, once it is there.
+    /// A rospy node that prints `name|message` of all reported diagnostics.
     std::unique_ptr<ChildProcess> health();
-    /// A rospy node of that name.
+    /// A rospy node with a given name.
     std::unique_ptr<ChildProcess> node(const std::string& name);
-    /// What a command such as `rosnode` prints.
+    /// Runs a command such as `rosnode`. @return its output
     std::string run(const std::vector<std::string>& command);
-    /// Has a peer do what rqt_logger_level does to the node. @return "done\n"
+    /// Has a peer call the node's services like rqt_logger_level. @return "done\n"
     std::string lookAtLoggers();
 
     /// Starts the node with this master.
     void startNode();
     void stopNode() { node_.reset(); }
-    /// A node for who starts and ends it himself.
+    /// A node that the test starts and ends itself.
     std::unique_ptr<rtcf::ros1::RosNode> makeNode();
     rtcf::executor::Log& log() { return log_; }
-    /// Ends the node. @return false if it took as long as only waiting for a master does
+    /// Ends the node. @return false if it took as long as a timeout of the master
     bool nodeEnds();
     rtcf::ros1::RosNode& rosNode() { return *node_; }
     void serve(const std::vector<Source*>& outputs, const std::vector<Sink*>& inputs);
 
-    /// True as soon as `condition` is; false if it is not in time.
+    /// Polls `condition`. @return false at the deadline
     static bool eventually(const std::function<bool()>& condition,
                            std::chrono::milliseconds timeout = 30s);
-    /// Writes rising values, 1 ms apart, until the listener prints one. @return its line, "" if
-    /// none
+    /// Writes increasing values, 1 ms apart, until the listener prints one. @return its line, ""
+    /// if none
     static std::string flow(Source& source, ChildProcess& listener,
                             std::chrono::milliseconds timeout = 30s);
     bool reported(const std::string& part) const;

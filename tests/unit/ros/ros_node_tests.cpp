@@ -12,7 +12,7 @@
 
 class RosNodeTest : public RosFixture {
    protected:
-    // For topics whose names match `latch`.
+    // Settings with latching for topics whose names match `latch`.
     rtcf::executor::BridgeSettings latched(const std::string& latch) const {
         rtcf::executor::BridgeSettings settings;
         settings.master_uri = masterUri();
@@ -21,10 +21,10 @@ class RosNodeTest : public RosFixture {
     }
 };
 
-// Until then the resolver below has no answer.
+// Until then the resolver below does not answer.
 std::atomic<bool> resolver_answers{false};
 
-// Takes the place of the C library's: asked for this name, it is as slow as resolvers can be.
+// Replaces the C library's function: for this name, it is as slow as resolvers can be.
 extern "C" int getaddrinfo(const char* node, const char* service, const addrinfo* hints,
                            addrinfo** found) {
     using Function = int (*)(const char*, const char*, const addrinfo*, addrinfo**);
@@ -80,7 +80,7 @@ TEST_F(RosNodeTest, WaitsForAMaster) {
     ASSERT_TRUE(eventually([&] { return reported("no ROS master"); }));
     EXPECT_FALSE(rosNode().status().connected);
     EXPECT_NE(rosNode().status().problem.find(masterUri()), std::string::npos);
-    // Nobody takes the values, and yet the tap does not fill up.
+    // Values are not sent, and still the tap does not fill up.
     for (int i = 0; i < 10000; ++i) {
         source.write(i);
         if (i % 100 == 0) std::this_thread::sleep_for(2ms);
@@ -103,7 +103,7 @@ TEST_F(RosNodeTest, RegistersAgainWithARestartedMaster) {
     ASSERT_NE(flow(source, *old_listener), "");
     stopMaster();
     ASSERT_TRUE(eventually([&] { return !rosNode().status().connected; }));
-    // Connections do not need the master.
+    // Existing connections do not need the master.
     while (old_listener->line(100ms)) {
     }
     EXPECT_NE(flow(source, *old_listener), "");
@@ -118,13 +118,13 @@ TEST_F(RosNodeTest, RegistersAgainWithARestartedMaster) {
               std::string::npos);
 }
 
-TEST_F(RosNodeTest, FindsPublishersThatAMasterKnewBeforeIt) {
+TEST_F(RosNodeTest, FindsPublishersRegisteredBeforeIt) {
     startMaster();
     Sink sink("/in");
     startNode();
     serve({}, {&sink});
     ASSERT_TRUE(eventually([&] { return rosNode().status().subscriptions == 1; }));
-    // While ours does not look, a sender registers with the new master first.
+    // A sender registers with the new master first, before our node notices it.
     stopMaster();
     ASSERT_TRUE(eventually([&] { return !rosNode().status().connected; }));
     startMaster();
@@ -174,7 +174,7 @@ TEST_F(RosNodeTest, ANewTapOfATopicKeepsItsSubscribers) {
     }
     Source after("/out");
     serve({&after}, {});
-    // The connection stays, so that not even the first value is lost.
+    // The connection stays, so that even the first value is not lost.
     after.write(77.0);
     EXPECT_EQ(listener->line(5s).value_or("none"), "77.0");
 }
@@ -189,7 +189,7 @@ TEST_F(RosNodeTest, ANewInjectorOfATopicGetsTheLatchedValue) {
     Sink after("/in");
     serve({}, {&after});
     EXPECT_TRUE(eventually([&] { return after.value() == 4.0; }));
-    // Nor does it take a master.
+    // Nor does it need a master.
     stopMaster();
     ASSERT_TRUE(eventually([&] { return !rosNode().status().connected; }));
     Sink late("/in");
@@ -210,7 +210,7 @@ TEST_F(RosNodeTest, ARefusedConnectionShowsInTheStatus) {
     EXPECT_TRUE(eventually([&] { return reported("/out"); }));
 }
 
-TEST_F(RosNodeTest, GivesWayToANodeOfItsNameAndComesBack) {
+TEST_F(RosNodeTest, YieldsToANodeOfItsNameAndReturns) {
     startMaster();
     Source source("/out");
     startNode();
@@ -223,14 +223,14 @@ TEST_F(RosNodeTest, GivesWayToANodeOfItsNameAndComesBack) {
     }));
     EXPECT_TRUE(eventually([&] { return rosNode().status().publications == 0; }));
     EXPECT_TRUE(eventually([&] { return reported("another node named"); }));
-    // It ends without a word to the master, which still knows it.
+    // It ends without unregistering, so the master still knows it.
     twin.reset();
     EXPECT_TRUE(eventually([&] { return rosNode().status().connected; }));
     const auto listener = listen("/out");
     EXPECT_NE(flow(source, *listener), "");
 }
 
-TEST_F(RosNodeTest, StaysOffOnceKilledUntilConfiguredAgain) {
+TEST_F(RosNodeTest, StaysDownOnceKilledUntilConfiguredAgain) {
     startMaster();
     Source source("/out");
     startNode();
@@ -247,7 +247,7 @@ TEST_F(RosNodeTest, StaysOffOnceKilledUntilConfiguredAgain) {
     EXPECT_NE(flow(source, *listener), "");
 }
 
-TEST_F(RosNodeTest, ComesBackAtANewMasterOnceKilled) {
+TEST_F(RosNodeTest, ReturnsAtANewMasterOnceKilled) {
     startMaster();
     Source source("/out");
     startNode();
@@ -262,7 +262,7 @@ TEST_F(RosNodeTest, ComesBackAtANewMasterOnceKilled) {
     EXPECT_NE(flow(source, *listener), "");
 }
 
-TEST_F(RosNodeTest, TakesNoNameFromANodeThatHasIt) {
+TEST_F(RosNodeTest, TakesNoNameInUse) {
     startMaster();
     const std::string name = rtcf::ros1::nodeName("", "rt_runner").full();
     auto twin = node(name);
@@ -274,7 +274,7 @@ TEST_F(RosNodeTest, TakesNoNameFromANodeThatHasIt) {
     EXPECT_NE(run({"rosnode", "ping", "-c1", name}).find("reply"), std::string::npos);
 }
 
-TEST_F(RosNodeTest, KeepsLatchedValuesWhenItGoesAndComes) {
+TEST_F(RosNodeTest, KeepsLatchedValuesAcrossAnInterruption) {
     startMaster();
     Source source("/out");
     startNode();
@@ -295,7 +295,7 @@ TEST_F(RosNodeTest, KeepsLatchedValuesWhenItGoesAndComes) {
     EXPECT_EQ(listen("/out")->line(20s).value_or(""), "3.5");
 }
 
-// Between a component's load and the node's next look at its master.
+// Between a component's load and the node's next check of its master.
 TEST_F(RosNodeTest, KeepsTheOnlyValueOfALatchedTopic) {
     startMaster();
     startNode();
@@ -311,8 +311,8 @@ TEST_F(RosNodeTest, KeepsTheOnlyValueOfALatchedTopic) {
     }
 }
 
-// Written at any instant of the change.
-TEST_F(RosNodeTest, OfALatchedTopicSurvivesAChangeOfItsSettings) {
+// Written at a random time during the change.
+TEST_F(RosNodeTest, ALatchedValueSurvivesAChangeOfItsSettings) {
     startMaster();
     Source source("/out");
     startNode();
@@ -354,18 +354,18 @@ TEST_F(RosNodeTest, PublishesNumbersWithTheTimeOfTheirCycleIfAsked) {
     const std::string stamped = "1700000000123456789 3.5";
     EXPECT_EQ(listen("/out", "rtcf_msgs/Float64Stamped")->line(20s).value_or(""), stamped);
     EXPECT_NE(flow(plain, *listen("/plain")), "");
-    // What late subscribers get keeps its stamp when the topic is opened again.
+    // Values for late subscribers keep their stamp when the topic is reopened.
     settings.queue = 7;
     rosNode().configure(settings);
     EXPECT_EQ(listen("/out", "rtcf_msgs/Float64Stamped")->line(20s).value_or(""), stamped);
-    // As it was, while the loop runs: nothing stamped goes to those who expect no header.
+    // Switched back while the loop runs: no stamped message goes to subscribers without a header.
     settings.stamped = "";
     rosNode().configure(settings);
     const auto listener = listen("/out");
     EXPECT_NE(flow(source, *listener), "");
 }
 
-TEST_F(RosNodeTest, OpensLaterWhatItCouldNotOpen) {
+TEST_F(RosNodeTest, OpensFailedTopicsLater) {
     startMaster();
     Source source("/out");
     startNode();
@@ -413,7 +413,7 @@ TEST_F(RosNodeTest, FollowsItsSettings) {
     EXPECT_NE(flow(source, *listener), "");
 }
 
-TEST_F(RosNodeTest, LookingAtItsLoggersDoesNotCrashIt) {
+TEST_F(RosNodeTest, QueryingItsLoggersDoesNotCrashIt) {
     startMaster();
     Source source("/out");
     startNode();
@@ -427,7 +427,7 @@ TEST_F(RosNodeTest, LookingAtItsLoggersDoesNotCrashIt) {
     EXPECT_NE(flow(source, *listener), "");
 }
 
-TEST_F(RosNodeTest, EndsSoonWithoutAMaster) {
+TEST_F(RosNodeTest, EndsQuicklyWithoutAMaster) {
     Source source("/out");
     startNode();
     serve({&source}, {});
@@ -435,7 +435,7 @@ TEST_F(RosNodeTest, EndsSoonWithoutAMaster) {
     EXPECT_TRUE(nodeEnds());
 }
 
-TEST_F(RosNodeTest, EndsSoonAfterItsMasterHasGone) {
+TEST_F(RosNodeTest, EndsQuicklyAfterItsMasterEnded) {
     startMaster();
     Source source("/out");
     Sink sink("/in");
@@ -446,7 +446,7 @@ TEST_F(RosNodeTest, EndsSoonAfterItsMasterHasGone) {
     EXPECT_TRUE(nodeEnds());
 }
 
-TEST_F(RosNodeTest, EndsSoonWithAMasterThatHangs) {
+TEST_F(RosNodeTest, EndsQuicklyWithAHangingMaster) {
     startMaster();
     Source source("/out");
     Sink sink("/in");
@@ -454,7 +454,7 @@ TEST_F(RosNodeTest, EndsSoonWithAMasterThatHangs) {
     serve({&source}, {&sink});
     ASSERT_TRUE(eventually([&] { return rosNode().status().connected; }));
     master().signal(SIGSTOP);
-    // To wait for the master because of each would take a minute.
+    // Waiting for the master for each of them would take a minute.
     std::vector<std::unique_ptr<Source>> sources;
     std::vector<Source*> others;
     for (int i = 0; i < 60; ++i) {
@@ -465,8 +465,8 @@ TEST_F(RosNodeTest, EndsSoonWithAMasterThatHangs) {
     EXPECT_TRUE(nodeEnds());
 }
 
-// The process must end too, which roscpp's exit handler would prevent.
-TEST_F(RosNodeTest, EndsSoonWithAMasterThatHangsInACall) {
+// The process must end, too, which roscpp's exit handler would prevent.
+TEST_F(RosNodeTest, EndsQuicklyWithAMasterThatHangsInACall) {
     startDeafMaster();
     Source source("/out");
     startNode();
@@ -475,8 +475,8 @@ TEST_F(RosNodeTest, EndsSoonWithAMasterThatHangsInACall) {
     EXPECT_TRUE(nodeEnds());
 }
 
-// Its time goes to one answer that does not come, not to asking again and again.
-TEST_F(RosNodeTest, AsksAMasterThatHangsNoMoreThanOnceInTheTimeItHasToLeave) {
+// Its time is spent on one answer that does not arrive, not on repeated calls.
+TEST_F(RosNodeTest, CallsAHangingMasterOnlyOnceBeforeItsEnd) {
     startDeafMaster();
     Source source("/out");
     startNode();
@@ -506,23 +506,23 @@ TEST_F(RosNodeTest, LeavesNothingAtASlowMaster) {
     const std::string name = rosNode().status().node;
     ASSERT_TRUE(eventually(
         [&] { return run({"rosnode", "info", name}).find("/in19") != std::string::npos; }));
-    // As a graph that is torn down does, at once before the end.
+    // Like a graph that is removed right before the end.
     serve({}, {});
     stopNode();
-    // One after the other would take longer than there is time.
+    // One after the other would exceed the available time.
     int most_at_once = 0;
     while (const auto line = master().line(100ms)) most_at_once = std::stoi(*line);
     EXPECT_GE(most_at_once, 4);
-    // On a machine that is too busy for all, it is said.
+    // On a machine that is too busy, the node reports the remaining registrations.
     const bool left = run({"rosnode", "list"}).find(name) != std::string::npos;
     EXPECT_TRUE(!left || reported("may be left"));
 }
 
-// What a registration is answered is old once the master has said more. Here all answers are taken
-// in when the last has come, seconds after the first.
-TEST_F(RosNodeTest, KeepsAPublisherThatCameWhileTheMasterWasTold) {
+// The answer to a registration is outdated once the master has sent newer data. Here all answers
+// are processed when the last one has arrived, seconds after the first.
+TEST_F(RosNodeTest, KeepsAPublisherThatRegisteredDuringARegistration) {
     startSlowMaster(500ms);
-    Sink sink("/a");  // first in the order of registrations
+    Sink sink("/a");  // registered first
     std::vector<std::unique_ptr<Sink>> others;
     std::vector<Sink*> inputs{&sink};
     for (int i = 0; i < 100; ++i) {  // 7 rounds of 16 at a time: 3.5 s
@@ -532,20 +532,20 @@ TEST_F(RosNodeTest, KeepsAPublisherThatCameWhileTheMasterWasTold) {
     startNode();
     ASSERT_TRUE(eventually([&] { return rosNode().status().connected; }));
     serve({}, inputs);
-    // Each would take five calls of half a second, were roscpp not answered from memory.
+    // Each would need five calls of half a second if roscpp were not answered from memory.
     ASSERT_TRUE(eventually([&] { return rosNode().status().subscriptions == 101; }));
     const auto counter = count("/a");  // registers within about a second
     ASSERT_TRUE(eventually([&] { return sink.value() > 0.0; }));
     const std::string name = rosNode().status().node;
     ASSERT_TRUE(eventually(
         [&] { return run({"rosnode", "info", name}).find("/in99") != std::string::npos; }));
-    // The last is known to the master, its answer half a second later here.
+    // The master knows the last one; its answer arrives half a second later.
     const double then = sink.value();
     EXPECT_TRUE(eventually([&] { return sink.value() > then + 40.0; }, 10s))
         << "it was cut off at " << sink.value();
 }
 
-TEST_F(RosNodeTest, SaysWhatItHadToLeaveAtAMasterThatHangs) {
+TEST_F(RosNodeTest, ReportsRegistrationsLeftAtAHangingMaster) {
     startMaster();
     Source source("/out");
     startNode();
@@ -557,8 +557,8 @@ TEST_F(RosNodeTest, SaysWhatItHadToLeaveAtAMasterThatHangs) {
     EXPECT_TRUE(reported("may be left"));
 }
 
-// A resolver that takes long for a name, in the place of the C library's.
-TEST_F(RosNodeTest, AwaitsNoSlowResolver) {
+// A slow resolver in place of the C library's.
+TEST_F(RosNodeTest, DoesNotWaitForASlowResolver) {
     startMaster();
     startNode();
     ASSERT_TRUE(eventually([&] { return rosNode().status().connected; }));

@@ -1,4 +1,4 @@
-// What components of RTCF 2021 ask of rosconsole, in a program without a loop and in the executor.
+// rosconsole as used by components of RTCF 2021, in a program without a loop and in the executor.
 #include <gtest/gtest.h>
 #include <ros/console.h>
 
@@ -72,7 +72,7 @@ TEST(RttLogging, ComponentsOfATestLogEachToTheirOwnLogger) {
     EXPECT_EQ(last, (std::vector<std::string>{"ros.rtcf.one", "ros.rtcf.other", "ros.rtcf.one"}));
 }
 
-TEST(RttLogging, ALoggersLevelIsSetForTheLoop) {
+TEST(RttLogging, ALoggersLevelAppliesInTheLoop) {
     const std::string logger = std::string(NAME_PREFIX) + "./arm/H1";
     EXPECT_FALSE(RtRosconsoleLogging::setLoggerLevel(logger, ros::console::levels::Debug));
     rtcf::executor::Log log([](rtcf::executor::LogEntry&&) {});

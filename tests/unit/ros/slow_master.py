@@ -1,9 +1,9 @@
 #!/usr/bin/python3
-"""A ROS master to which the way is long: relays to a real one, and takes its time for a word.
+"""A ROS master with a high latency: a relay to a real one that delays each call.
 
 slow_master.py PORT REAL_PORT MILLISECONDS   the test ends it
 
-Prints how many withdrawals are on their way at once, whenever they are more than ever before.
+Prints the number of simultaneous unregistering calls whenever it reaches a new maximum.
 """
 
 import asyncio
@@ -44,7 +44,7 @@ async def _relay(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> 
     try:
         answers, calls = await asyncio.open_connection("127.0.0.1", _REAL_PORT)
         await asyncio.gather(_call(reader, calls), _answer(answers, writer, reader))
-    except OSError:  # one of both has gone, or is not there yet
+    except OSError:  # one of the two has ended, or has not started yet
         pass
     finally:
         _withdrawals.discard(reader)

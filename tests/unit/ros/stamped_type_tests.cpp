@@ -24,7 +24,7 @@
 namespace rtcf::ros1 {
 namespace {
 
-// A type of ports, and the message it is published as with a stamp.
+// A port type, and its stamped message.
 template <typename Port, typename Stamped>
 struct Pair {
     using Value = Port;
@@ -51,18 +51,18 @@ TYPED_TEST(StampedTypeTest, CarriesTheValueAndTheStamp) {
     ASSERT_NE(type, nullptr);
     EXPECT_EQ(type->name, ros::message_traits::datatype<Message>());
     EXPECT_EQ(type->md5, ros::message_traits::md5sum<Message>());
-    EXPECT_TRUE(startsWithHeader(type->definition)) << "roscpp counts the messages there";
+    EXPECT_TRUE(startsWithHeader(type->definition)) << "roscpp numbers messages with a header";
 
     Slot<Value> slot;
     slot.value = std::numeric_limits<Value>::max();
     std::vector<std::uint8_t> bytes(port.length(slot));
     port.serialize(slot, bytes.data(), static_cast<std::uint32_t>(bytes.size()));
-    std::vector<std::uint8_t> stamped{1, 2, 3};  // of the one before
+    std::vector<std::uint8_t> stamped{1, 2, 3};  // of the previous message
     stampBytes(bytes.data(), static_cast<std::uint32_t>(bytes.size()), 4'000'000'123, stamped);
     Message message;
     ros::serialization::IStream stream(stamped.data(), static_cast<std::uint32_t>(stamped.size()));
     ros::serialization::deserialize(stream, message);
-    EXPECT_EQ(stream.getLength(), 0U) << "bytes are left over";
+    EXPECT_EQ(stream.getLength(), 0U) << "no bytes may be left";
     EXPECT_EQ(static_cast<Value>(message.data), slot.value);
     EXPECT_EQ(message.header.stamp, ros::Time(4, 123));
     EXPECT_EQ(message.header.frame_id, "");
@@ -75,8 +75,8 @@ TEST(StampedType, OthersHaveNone) {
     EXPECT_EQ(stampedType(""), nullptr);
 }
 
-// A stepped loop's first cycles are at 0, a cycle before is at no time of ROS.
-TEST(StampedType, ATimeBeforeTheFirstOfRosIsZero) {
+// A stepped loop's first cycles are at time 0; an earlier cycle is before ROS's first time.
+TEST(StampedType, ATimeBeforeRossFirstIsZero) {
     const std::uint8_t byte = 1;
     std::vector<std::uint8_t> stamped;
     stampBytes(&byte, 1, -5, stamped);

@@ -1,4 +1,4 @@
-// Who may do what at an executor: the same answers as rtcfd's [access] gives.
+// Rights at an executor: the same answers as rtcfd's [access].
 #include "access/rights.hpp"
 
 #include <gtest/gtest.h>
@@ -27,14 +27,14 @@ AccessRules rules() {
     return rules;
 }
 
-TEST(Rights, AreRootsAndOurOwnBeforeAnythingIsKnown) {
+TEST(Rights, AreGrantedToRootAndTheOwnUserWithoutRules) {
     const Access access;
     EXPECT_EQ(access.of(0, {0}), Right::Admin);
     EXPECT_EQ(access.of(::geteuid(), {kDoor}), Right::Admin);
     EXPECT_EQ(access.of(kBob, {kDoor, kStaff}), Right::None);
 }
 
-TEST(Rights, OfAUserGoBeforeThoseOfItsGroupsOfWhichTheHighestCounts) {
+TEST(Rights, OfAUserPrecedeThoseOfItsGroups) {
     Access access;
     access.set(rules());
     EXPECT_EQ(access.of(kAlice, {kDoor, kStaff}), Right::None);
@@ -43,7 +43,7 @@ TEST(Rights, OfAUserGoBeforeThoseOfItsGroupsOfWhichTheHighestCounts) {
     EXPECT_EQ(access.of(kBob, {kDoor}), Right::Observe);
 }
 
-TEST(Rights, AreNobodysWhoCannotConnectToTheDaemon) {
+TEST(Rights, RequireAccessToTheDaemon) {
     Access access;
     AccessRules closed = rules();
     access.set(closed);

@@ -1,4 +1,4 @@
-// Which bytes of a value its message has: by them others make messages of frames, without the type.
+// The bytes of a value that its message contains. They turn frames into messages without the type.
 #include <geometry_msgs/Twist.h>
 #include <geometry_msgs/Vector3.h>
 #include <gtest/gtest.h>
@@ -16,7 +16,7 @@
 
 namespace rtcf::test {
 
-// A byte before a number: in memory there is room between them, in a message there is none.
+// A byte before a number: memory has padding between them, a message does not.
 struct Padded {
     std::uint8_t joint = 0;
     double angle = 0.0;
@@ -58,7 +58,7 @@ template <>
 struct rtcf::PortType<rtcf::test::Angle>
     : rtcf::MappedPortType<rtcf::test::Angle, std_msgs::Float64, rtcf::test::AngleOnRos> {};
 
-// As a message that somebody has adapted by hand: a field before one that lies further on.
+// A message adapted by hand: a field precedes one that is at a higher address.
 namespace ros::message_traits {
 template <>
 struct IsMessage<rtcf::test::Padded> : TrueType {};
@@ -139,7 +139,7 @@ TEST(Copies, OfNumbers) {
     expectCopied(-2.25);
 }
 
-TEST(Copies, OfMatricesGoRowByRow) {
+TEST(Copies, OfMatricesAreRowByRow) {
     Eigen::Matrix<double, 2, 3> by_columns;
     by_columns << 1, 2, 3, 4, 5, 6;
     expectCopied(by_columns);
@@ -168,7 +168,7 @@ TEST(Copies, OfMessagesAreTheirFields) {
     expectCopied(color);
 }
 
-TEST(Copies, OfMessagesLeaveOutWhatLiesBetweenFields) {
+TEST(Copies, OfMessagesSkipPadding) {
     const Padded value{7, 1.5};
     expectCopied(value);
     EXPECT_EQ(typeInfo<Padded>().copies(), std::vector<ByteCopy>({{0, 0, 1}, {8, 1, 8}}));
@@ -176,7 +176,7 @@ TEST(Copies, OfMessagesLeaveOutWhatLiesBetweenFields) {
 
 TEST(Copies, OfOwnTypesAreTheirBytes) { expectCopied(std::array<std::int32_t, 3>{1, 2, 3}); }
 
-TEST(Copies, OfMappedTypesAreAsTheyAreDeclared) { expectCopied(Point{1.0, 2.0}); }
+TEST(Copies, OfMappedTypesAreAsDeclared) { expectCopied(Point{1.0, 2.0}); }
 
 TEST(Copies, AreUnknownWhereAMessageIsComputed) {
     EXPECT_FALSE(typeInfo<Angle>().copies());
@@ -184,7 +184,7 @@ TEST(Copies, AreUnknownWhereAMessageIsComputed) {
     EXPECT_FALSE(typeInfo<std_msgs::String>().copies()) << "of variable size";
 }
 
-TEST(Copies, SampleOfAMappedTypeIsMadeWithoutItsConversion) {
+TEST(Copies, SampleOfAMappedTypeNeedsNoConversion) {
     EXPECT_EQ(typeInfo<Angle>().sample(), std::string(8, '\0'));
     EXPECT_EQ(typeInfo<std_msgs::String>().sample(), std::string(4, '\0'));
 }

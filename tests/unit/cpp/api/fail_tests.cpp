@@ -1,4 +1,4 @@
-// What a hook says when it fails.
+// The message of a failing hook.
 #include <gtest/gtest.h>
 
 #include <stdexcept>
@@ -27,7 +27,7 @@ class Failing final : public Component {
     void update() override {}
 };
 
-TEST(Fail, SaysWhatItWasTold) {
+TEST(Fail, HasTheGivenText) {
     const auto refusal = [](int how) -> std::string {
         try {
             const Bench bench("Failing", {{"how", std::int64_t{how}}});
@@ -38,7 +38,7 @@ TEST(Fail, SaysWhatItWasTold) {
     };
     EXPECT_EQ(refusal(0), "");
     EXPECT_EQ(refusal(1), "configure failed: nothing {but} a brace");
-    EXPECT_EQ(refusal(2), "configure failed: two {} of {}") << "rather than of the format alone";
+    EXPECT_EQ(refusal(2), "configure failed: two {} of {}") << "the arguments are formatted";
     EXPECT_EQ(refusal(3), "configure failed: no reply from drive in 0.2 s");
 }
 

@@ -1,4 +1,4 @@
-// Which values are finite, and of which types that can be told.
+// Finite values, and the types for which finiteness can be checked.
 #include <geometry_msgs/Twist.h>
 #include <gtest/gtest.h>
 
@@ -39,7 +39,7 @@ struct Nameless {
 };
 enum class Shift { Low, High };
 
-// As a type of a component's own becomes a port's type.
+// A component's own type used as a port type.
 static_assert(std::is_trivially_copyable_v<Nameless>);
 static_assert(!detail::IsCheckable<Nameless>::value, "an output of it is not declared Finite");
 static_assert(!detail::IsCheckable<std::vector<Nameless>>::value);
@@ -56,7 +56,7 @@ static_assert(detail::IsCheckable<geometry_msgs::Twist>::value);
 
 }  // namespace rtcf::test
 
-// Structs with Eigen types are no bytes for C++, and travel as messages.
+// Structs with Eigen types are not trivially copyable, and are sent as messages.
 struct CommandsOnRos {
     static const char* name() { return "Commands"; }
     static void toMessage(const rtcf::test::Commands& value, geometry_msgs::Twist& message) {
@@ -78,7 +78,7 @@ namespace {
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-TEST(FiniteCheck, LooksAtEachFieldOfAStruct) {
+TEST(FiniteCheck, ChecksEachFieldOfAStruct) {
     EXPECT_TRUE(detail::isFinite(Command{}));
     Command command;
     command.torque = kNan;
@@ -91,7 +91,7 @@ TEST(FiniteCheck, LooksAtEachFieldOfAStruct) {
     EXPECT_FALSE(detail::isFinite(command));
 }
 
-TEST(FiniteCheck, LooksAtStructsInStructsAndLists) {
+TEST(FiniteCheck, ChecksNestedStructsAndLists) {
     Commands pair;
     EXPECT_TRUE(detail::isFinite(pair));
     pair.second.torque = kNan;

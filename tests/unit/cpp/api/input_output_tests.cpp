@@ -1,4 +1,4 @@
-// Inputs and outputs wired by hand, as the loop does it at a cycle boundary.
+// Inputs and outputs wired by hand, as by the loop at a cycle boundary.
 #include <gtest/gtest.h>
 #include <std_msgs/Float64.h>
 #include <std_msgs/Float64MultiArray.h>
@@ -11,7 +11,7 @@
 
 namespace rtcf::test {
 
-// Of which a copy may fail between its halves.
+// A copy may fail between its halves.
 struct Halves {
     Halves() = default;
     Halves(const Halves& other) { *this = other; }
@@ -77,7 +77,7 @@ TEST_F(InputOutput, ValueIsNewOnceAndThenOld) {
     EXPECT_EQ(in.value(), 1.5);
     EXPECT_EQ(in.read(), DataStatus::Old);
     first.write(1.5);
-    EXPECT_EQ(in.read(), DataStatus::New) << "a write counts, not a change";
+    EXPECT_EQ(in.read(), DataStatus::New) << "a write is new even if the value is equal";
 }
 
 TEST_F(InputOutput, ValueWrittenBeforeTheFirstConnectionIsNew) {
@@ -124,14 +124,14 @@ TEST_F(InputOutput, RewiredInputKeepsItsValueUntilTheNewWriterWrites) {
     EXPECT_EQ(in.value(), 2.0);
 }
 
-TEST_F(InputOutput, ContinuedConnectionKeepsWhatWasReadAndWhatWasNot) {
+TEST_F(InputOutput, ContinuedConnectionKeepsReadAndUnreadValues) {
     Output<double> copy{&component, "copy"};
     connect(first);
     first.write(1.0);
     in.read();
     first.type().copy(*copy.slot(), *first.slot());
     in.rewire(copy.slot().get(), true);
-    EXPECT_EQ(in.read(), DataStatus::Old) << "the same write, seen already";
+    EXPECT_EQ(in.read(), DataStatus::Old) << "the write was read before";
     EXPECT_EQ(in.value(), 1.0);
     first.write(2.0);
     first.type().copy(*copy.slot(), *first.slot());
@@ -150,7 +150,7 @@ TEST_F(InputOutput, ContinuedConnectionKeepsAnEarlierWritersValueToo) {
     first.type().copy(*copy.slot(), *second.slot());
     in.rewire(copy.slot().get(), true);
     EXPECT_EQ(in.read(), DataStatus::Old);
-    EXPECT_EQ(in.value(), 1.0) << "the new writer has written nothing since";
+    EXPECT_EQ(in.value(), 1.0) << "the new writer has not written yet";
 }
 
 TEST_F(InputOutput, DisconnectedInputKeepsItsValueAsOldData) {
@@ -190,7 +190,7 @@ TEST_F(InputOutput, AgeIsNeverNegative) {
     connect(first);
     writeAt(first, 1.0, 1'000'000);
     in.read();
-    component.loop_clock.time_ns = 0;  // a simulated clock begins anew
+    component.loop_clock.time_ns = 0;  // a simulated clock restarts
     EXPECT_EQ(in.age(), 0);
 }
 
@@ -222,7 +222,7 @@ TEST_F(InputOutput, SlotOutlivesItsOutput) {
     EXPECT_EQ(in.value(), 5.0);
 }
 
-TEST(StagedOutput, ReadersOfItSeeWholeValuesWhateverACopyDoes) {
+TEST(StagedOutput, ReadersSeeWholeValuesEvenIfACopyFails) {
     BareComponent component;
     Output<Halves> out{&component, "out"};
     Input<Halves> in{&component, "in"};
@@ -242,7 +242,7 @@ TEST(StagedOutput, ReadersOfItSeeWholeValuesWhateverACopyDoes) {
     EXPECT_EQ(in.value().first, in.value().second);
 }
 
-TEST(QueueWithoutMemory, DropsWhatItCannotCopy) {
+TEST(QueueWithoutMemory, DropsMessagesThatItCannotCopy) {
     BareComponent component;
     Output<Halves> out{&component, "out"};
     Queue<Halves, 2> queue{&component, "queue"};
@@ -256,7 +256,7 @@ TEST(QueueWithoutMemory, DropsWhatItCannotCopy) {
     EXPECT_EQ(queue.size(), 1U);
 }
 
-TEST(StagedOutput, ComponentGoesOnFromTheValueThatItWrote) {
+TEST(StagedOutput, ComponentContinuesFromTheValueThatItWrote) {
     BareComponent component;
     Output<std::vector<int>> out{&component, "out"};
     out.reserve(std::vector<int>(100));

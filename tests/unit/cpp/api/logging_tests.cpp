@@ -1,4 +1,4 @@
-// The logging macros: what they store, and what text comes of it.
+// The logging macros: the stored records, and the resulting text.
 #include "rtcf/logging.hpp"
 
 #include <gtest/gtest.h>
@@ -79,7 +79,7 @@ TEST_F(LoggingMacros, CutTextThatIsTooLong) {
     EXPECT_EQ(messages(), std::vector<std::string>{std::string(94, 'x') + "|7"});
 }
 
-TEST_F(LoggingMacros, NoteWhereTheyStand) {
+TEST_F(LoggingMacros, RecordTheirSourceLine) {
     BareComponent* self = &component;
     const auto line = static_cast<std::uint32_t>(__LINE__ + 1);
     RTCF_WARN(self, "here");
@@ -113,7 +113,7 @@ TEST_F(LoggingMacros, DoNotEvaluateArgumentsBelowTheLevel) {
     RTCF_DEBUG(self, "{}", ++calls);
     EXPECT_EQ(calls, 0);
     RTCF_INFO(self, "{}", ++calls);
-    EXPECT_EQ(calls, 1) << "and only once otherwise";
+    EXPECT_EQ(calls, 1) << "evaluated once above the level";
 }
 
 TEST_F(LoggingMacros, OnceIsOncePerCall) {
@@ -134,8 +134,8 @@ TEST_F(LoggingMacros, OnceWaitsForItsLevel) {
     EXPECT_EQ(messages(), std::vector<std::string>{"call 1"});
 }
 
-// By loop time, at 100 Hz, once in 0.05 s.
-TEST_F(LoggingMacros, ThrottleGoesByLoopTime) {
+// In loop time, at 100 Hz, once in 0.05 s.
+TEST_F(LoggingMacros, ThrottleUsesLoopTime) {
     BareComponent* self = &component;
     for (int i = 0; i < 20; ++i) {
         component.loop_clock.time_ns = std::int64_t{i} * 10'000'000;
@@ -144,7 +144,7 @@ TEST_F(LoggingMacros, ThrottleGoesByLoopTime) {
     EXPECT_EQ(messages(), (std::vector<std::string>{"0", "5", "10", "15"}));
 }
 
-TEST_F(LoggingMacros, ThrottleFollowsAClockThatBeginsAnew) {
+TEST_F(LoggingMacros, ThrottleFollowsARestartedClock) {
     BareComponent* self = &component;
     for (const std::int64_t time : std::vector<std::int64_t>{3'600'000'000'000, 0, 1}) {
         component.loop_clock.time_ns = time;

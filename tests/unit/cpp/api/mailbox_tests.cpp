@@ -1,5 +1,5 @@
-// Mailboxes: callers in threads of their own, update() by hand. No time is asserted: where a caller
-// is to be in a call, the test waits for its request.
+// Mailboxes: callers in separate threads, update() by hand. No time is asserted: where a caller
+// must be in a call, the test waits for its request.
 #include <gtest/gtest.h>
 
 #include <atomic>
@@ -40,12 +40,12 @@ std::future<Asked> ask(Box& box, int request, nanoseconds timeout = hours(1)) {
     });
 }
 
-// What update() does in some cycle.
+// Simulates update() in some cycle.
 bool finds(Box& box) {
     return eventually([&] { return box.request() != nullptr; });
 }
 
-TEST(Mailbox, BringsARequestInAndAReplyOut) {
+TEST(Mailbox, PassesRequestAndReply) {
     Idle idle;
     Box box(&idle);
     box.open();
@@ -53,7 +53,7 @@ TEST(Mailbox, BringsARequestInAndAReplyOut) {
     auto asked = ask(box, 7);
     ASSERT_TRUE(finds(box));
     for (int cycle = 0; cycle < 100; ++cycle) {
-        ASSERT_NE(box.request(), nullptr) << "it is there until it is answered";
+        ASSERT_NE(box.request(), nullptr) << "the request stays until it is answered";
         EXPECT_EQ(*box.request(), 7);
     }
     box.reply(14);
@@ -72,13 +72,13 @@ TEST(Mailbox, WithoutALoopTheAnswerIsImmediate) {
     EXPECT_EQ(ask(box, 1).get().status, MailStatus::Ended);
 }
 
-TEST(Mailbox, WhoIsNotAnsweredInTimeIsTold) {
+TEST(Mailbox, ACallWithoutAnswerTimesOut) {
     Idle idle;
     Box box(&idle);
     box.open();
     EXPECT_EQ(ask(box, 1, milliseconds(1)).get().status, MailStatus::TimedOut);
     EXPECT_EQ(ask(box, 1, nanoseconds(-1)).get().status, MailStatus::TimedOut);
-    EXPECT_EQ(box.request(), nullptr) << "it has been given up";
+    EXPECT_EQ(box.request(), nullptr) << "the call has timed out";
     box.reply(5);
     auto next = ask(box, 2);
     ASSERT_TRUE(finds(box));
@@ -87,7 +87,7 @@ TEST(Mailbox, WhoIsNotAnsweredInTimeIsTold) {
     EXPECT_EQ(next.get().reply, 6) << "not the late answer to another request";
 }
 
-TEST(Mailbox, AReplyToNobodyIsNone) {
+TEST(Mailbox, AReplyWithoutCallerIsIgnored) {
     Idle idle;
     Box box(&idle);
     box.open();
@@ -98,7 +98,7 @@ TEST(Mailbox, AReplyToNobodyIsNone) {
     EXPECT_EQ(asked.get().reply, 6);
 }
 
-TEST(Mailbox, TheEndOfTheLoopAnswersAllWhoWait) {
+TEST(Mailbox, TheEndOfTheLoopAnswersAllCallers) {
     Idle idle;
     Box box(&idle);
     for (int run = 0; run < 3; ++run) {
@@ -111,7 +111,7 @@ TEST(Mailbox, TheEndOfTheLoopAnswersAllWhoWait) {
     }
 }
 
-TEST(Mailbox, ANewLoopKnowsNothingOfTheOneBefore) {
+TEST(Mailbox, ANewLoopStartsWithoutRequests) {
     Idle idle;
     Box box(&idle);
     box.open();
@@ -127,7 +127,7 @@ TEST(Mailbox, ANewLoopKnowsNothingOfTheOneBefore) {
     EXPECT_EQ(after.get().reply, 3);
 }
 
-TEST(Mailbox, ItsEndLetsCallersGo) {
+TEST(Mailbox, ItsDestructionReleasesCallers) {
     Idle idle;
     auto box = std::make_unique<Box>(&idle);
     box->open();
@@ -137,9 +137,9 @@ TEST(Mailbox, ItsEndLetsCallersGo) {
     EXPECT_EQ(asked.get().status, MailStatus::Ended);
 }
 
-// Of a component that is unloaded in the moment of its reply. To be run with AddressSanitizer.
-TEST(Mailbox, AReplyOutlivesTheMailboxForWhoTakesIt) {
-    const std::string text(200, 'x');  // has memory of its own
+// The component is unloaded at the moment of its reply. For AddressSanitizer.
+TEST(Mailbox, AReplyOutlivesTheMailbox) {
+    const std::string text(200, 'x');  // allocates memory
     for (int i = 0; i < 200; ++i) {
         Idle idle;
         auto box = std::make_unique<Mailbox<int, std::string>>(&idle);
@@ -158,9 +158,9 @@ TEST(Mailbox, AReplyOutlivesTheMailboxForWhoTakesIt) {
     }
 }
 
-// Many callers, some of whom give up, while the loop ends and begins: each answer belongs to its
+// Many callers, some of which time out, while the loop ends and starts: each answer belongs to its
 // request.
-TEST(Mailbox, AnswersAreOfTheirRequests) {
+TEST(Mailbox, AnswersBelongToTheirRequests) {
     Idle idle;
     Mailbox<std::vector<int>, std::vector<int>> box(&idle);
     box.open();
@@ -170,7 +170,7 @@ TEST(Mailbox, AnswersAreOfTheirRequests) {
     for (unsigned caller = 0; caller < 4; ++caller) {
         callers.emplace_back([&, caller] {
             std::mt19937 random(caller);  // NOLINT(cert-msc32-c,cert-msc51-cpp)
-            // All of 200 may come while it is closed, if the thread that opens it has no CPU.
+            // All 200 may arrive while it is closed, if the thread that opens it gets no CPU.
             for (int i = 0; i < 200 || answered == 0; ++i) {
                 const auto size = static_cast<std::size_t>(random() % 50);
                 const std::vector<int> request(size, static_cast<int>(caller) * 1000 + i);

@@ -13,7 +13,7 @@ namespace {
 
 using Int = std::int64_t;
 
-// Checks and, if that goes well, sets. @return what is wrong
+// Checks and, if valid, sets. @return the error
 std::string set(ParameterBase& parameter, ParameterValue value) {
     std::string why = parameter.check(value);
     if (why.empty()) {
@@ -28,7 +28,7 @@ class ParameterTest : public ::testing::Test {
     BareComponent component;
 };
 
-TEST_F(ParameterTest, HasItsDefaultAtFirst) {
+TEST_F(ParameterTest, StartsWithItsDefault) {
     const Parameter<double> gain{&component,  "gain",          1.5, Min(0.0), Max(2.0),
                                  Unit("N/m"), Doc("stiffness")};
     EXPECT_EQ(gain.value(), 1.5);
@@ -58,31 +58,31 @@ TEST_F(ParameterTest, BoundsAreInclusive) {
     EXPECT_EQ(gain.value(), 2.0);
 }
 
-TEST_F(ParameterTest, RefusalNamesParameterValueBoundAndUnit) {
+TEST_F(ParameterTest, ErrorNamesParameterValueBoundAndUnit) {
     Parameter<double> gain{&component, "gain", 1.0, Min(0.5), Unit("N")};
     EXPECT_EQ(set(gain, 0.25), "parameter gain = 0.25 is below its minimum 0.5 N");
 }
 
-TEST_F(ParameterTest, NotFiniteIsRefused) {
+TEST_F(ParameterTest, NonFiniteValueIsRejected) {
     Parameter<double> gain{&component, "gain", 1.0};
     EXPECT_NE(set(gain, std::nan("")), "");
     EXPECT_NE(set(gain, std::numeric_limits<double>::infinity()), "");
     EXPECT_NE(set(gain, -std::numeric_limits<double>::infinity()), "");
 }
 
-TEST_F(ParameterTest, NotFiniteDefaultMeansNoLimit) {
+TEST_F(ParameterTest, NonFiniteDefaultMeansNoLimit) {
     const Parameter<double> limit{&component, "limit", std::numeric_limits<double>::infinity()};
     EXPECT_TRUE(std::isinf(limit.value()));
 }
 
-TEST_F(ParameterTest, DefaultOutsideItsBoundsIsRefused) {
+TEST_F(ParameterTest, DefaultOutsideItsBoundsIsRejected) {
     const auto declare = [this] {
         const Parameter<double> gain{&component, "gain", 3.0, Max(2.0)};
     };
     EXPECT_THROW(declare(), std::logic_error);
 }
 
-TEST_F(ParameterTest, IntegerIsTakenForADoubleAndNotTheOtherWay) {
+TEST_F(ParameterTest, IntegerIsAcceptedForADoubleButNotViceVersa) {
     Parameter<double> gain{&component, "gain", 1.0};
     Parameter<Int> count{&component, "count", 1};
     EXPECT_EQ(set(gain, Int{3}), "");
@@ -90,7 +90,7 @@ TEST_F(ParameterTest, IntegerIsTakenForADoubleAndNotTheOtherWay) {
     EXPECT_EQ(set(count, 3.0), "parameter count takes an int, not a double");
 }
 
-TEST_F(ParameterTest, OtherTypesAreRefused) {
+TEST_F(ParameterTest, OtherTypesAreRejected) {
     Parameter<bool> enabled{&component, "enabled", true};
     Parameter<std::string> device{&component, "device", "none"};
     EXPECT_EQ(set(enabled, Int{0}), "parameter enabled takes a bool, not an int");
@@ -116,7 +116,7 @@ TEST_F(ParameterTest, IntegersOfOtherWidthsAreNarrowed) {
     EXPECT_EQ(set(large, std::numeric_limits<Int>::max()), "");
 }
 
-TEST_F(ParameterTest, FloatTakesNoDoubleBeyondItsRange) {
+TEST_F(ParameterTest, FloatRejectsADoubleBeyondItsRange) {
     Parameter<float> gain{&component, "gain", 1.0F};
     EXPECT_NE(set(gain, 1e39), "");
     EXPECT_EQ(set(gain, 1e38), "");
@@ -125,7 +125,7 @@ TEST_F(ParameterTest, FloatTakesNoDoubleBeyondItsRange) {
 
 enum class Drive { Off = 3, Slow = 7, Fast = 1 };
 
-TEST_F(ParameterTest, EnumeratorTravelsByName) {
+TEST_F(ParameterTest, EnumeratorIsSentByName) {
     Parameter<Drive> mode{&component,
                           "mode",
                           Drive::Slow,
@@ -141,14 +141,14 @@ TEST_F(ParameterTest, EnumeratorTravelsByName) {
     EXPECT_EQ(mode.value(), Drive::Fast);
 }
 
-TEST_F(ParameterTest, EnumDefaultWithoutAChoiceIsRefused) {
+TEST_F(ParameterTest, EnumDefaultWithoutAChoiceIsRejected) {
     const auto declare = [this] {
         const Parameter<Drive> mode{&component, "mode", Drive::Off, Choice("fast", Drive::Fast)};
     };
     EXPECT_THROW(declare(), std::logic_error);
 }
 
-TEST_F(ParameterTest, DeclaredTwiceIsRefused) {
+TEST_F(ParameterTest, DuplicateDeclarationIsRejected) {
     const Parameter<double> gain{&component, "gain", 1.0};
     const auto again = [this] { const Parameter<bool> other{&component, "gain", true}; };
     EXPECT_THROW(again(), std::logic_error);

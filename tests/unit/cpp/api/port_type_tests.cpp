@@ -1,4 +1,4 @@
-// Each port type against roscpp's own serialisation of the message it travels as.
+// Each port type against roscpp's serialisation of its message.
 #include <geometry_msgs/Pose.h>
 #include <geometry_msgs/PoseArray.h>
 #include <geometry_msgs/Quaternion.h>
@@ -58,7 +58,7 @@ Bytes roscppBytes(const Message& message) {
     return bytes;
 }
 
-// By the type-erased functions, as the executor does it.
+// Through the type-erased functions, as the executor does.
 template <typename T>
 Bytes rtcfBytes(const T& value) {
     Slot<T> slot;
@@ -85,7 +85,7 @@ T roundTrip(const T& value) {
     return result;
 }
 
-// Every prefix of the bytes, and the bytes with one more, is no message.
+// Every proper prefix of the bytes, and the bytes plus one, are invalid messages.
 template <typename T>
 void expectOtherLengthsRefused(const T& value) {
     const Bytes bytes = rtcfBytes(value);
@@ -117,7 +117,7 @@ void expectArithmetic(const char* name) {
     expectOtherLengthsRefused(T{1});
 }
 
-TEST(ArithmeticType, TravelsAsTheMessageOfItsWidth) {
+TEST(ArithmeticType, IsSentAsTheMessageOfItsWidth) {
     expectArithmetic<std_msgs::Bool, bool>("bool");
     expectArithmetic<std_msgs::Int8, std::int8_t>("int8");
     expectArithmetic<std_msgs::Int16, std::int16_t>("int16");
@@ -209,13 +209,13 @@ TEST(EigenType, MatrixIsAMultiArrayRowByRow) {
     expectMatrix<std_msgs::Float32MultiArray, Eigen::Matrix<float, 3, 2>>();
 }
 
-TEST(EigenType, MatrixOfAnotherSizeIsRefused) {
+TEST(EigenType, MatrixOfAnotherSizeIsRejected) {
     Eigen::Matrix2d ignored;
     EXPECT_FALSE(deserialize(rtcfBytes(Eigen::Matrix<double, 2, 3>::Zero().eval()), ignored));
     EXPECT_FALSE(deserialize(rtcfBytes(Eigen::Matrix<double, 1, 3>::Zero().eval()), ignored));
 }
 
-TEST(EigenType, MatrixWithoutLayoutIsTakenByItsSize) {
+TEST(EigenType, MatrixWithoutLayoutIsAcceptedByItsSize) {
     std_msgs::Float64MultiArray message;
     message.data = {1.0, 2.0, 3.0, 4.0};
     Eigen::Matrix2d value;
@@ -242,7 +242,7 @@ TEST(AnyType, IsCopiedByteByByte) {
     EXPECT_EQ(text, "two words");
 }
 
-TEST(AnyType, IsNotOnRosAndHasItsNameFromCpp) {
+TEST(AnyType, IsNotOnRosAndHasItsCppName) {
     EXPECT_STREQ(typeInfo<Gains>().name, "rtcf::test::Gains");
     EXPECT_STREQ(typeInfo<std::string>().name, "std::string");
     EXPECT_STREQ(typeInfo<Gains>().ros_type, "");
@@ -250,7 +250,7 @@ TEST(AnyType, IsNotOnRosAndHasItsNameFromCpp) {
     EXPECT_FALSE(typeInfo<std::vector<Gains>>().fixed_size);
 }
 
-TEST(AnyType, IsPrintedAsFarAsItTellsWhatItIs) {
+TEST(AnyType, IsPrintedAsFarAsItsTypeIsKnown) {
     EXPECT_EQ(PortType<Grip>::print(Grip::Force), "7");
     EXPECT_EQ((PortType<std::array<float, 2>>::print({0.5F, -1.0F})), "[0.5, -1]");
     EXPECT_EQ(PortType<std::string>::print("a b"), "\"a b\"");
@@ -261,14 +261,14 @@ TEST(AnyType, IsPrintedAsFarAsItTellsWhatItIs) {
     EXPECT_EQ(PortType<Pair>::print({1, 255}), "0x01ff");
 }
 
-TEST(AnyType, IsOnRosIfItIsGivenAMessage) {
+TEST(AnyType, IsOnRosIfItHasAMessage) {
     EXPECT_STREQ(typeInfo<Target>().ros_type, "geometry_msgs/Vector3");
     geometry_msgs::Vector3 message;
     message.y = 2.0;
     EXPECT_EQ(rtcfBytes(Target{0.0, 2.0, 0.0}), roscppBytes(message));
 }
 
-TEST(MessageType, IsAsRoscppHasIt) {
+TEST(MessageType, MatchesRoscpp) {
     geometry_msgs::PoseArray message;
     message.header.frame_id = "base";
     message.poses.resize(2);
@@ -286,16 +286,16 @@ TEST(MessageType, IsPrintedOnOneLine) {
     EXPECT_NE(text.find("orientation"), std::string::npos) << text;
 }
 
-TEST(PortType, SlotIsMadeWithTheSamplesValue) {
+TEST(PortType, SlotIsCreatedWithTheSamplesValue) {
     Slot<std_msgs::String> sample;
     sample.value.data = "long enough not to fit into the string itself";
     sample.sequence = 5;
     const auto made = typeInfo<std_msgs::String>().make_slot(&sample);
     EXPECT_EQ(static_cast<Slot<std_msgs::String>&>(*made).value.data, sample.value.data);
-    EXPECT_EQ(made->sequence, 0U) << "made, not written";
+    EXPECT_EQ(made->sequence, 0U) << "a new slot counts no write";
 }
 
-TEST(PortType, CopyTakesValueAndHeader) {
+TEST(PortType, CopyIncludesValueAndHeader) {
     Slot<double> from;
     from.value = 2.5;
     from.sequence = 3;
@@ -307,9 +307,9 @@ TEST(PortType, CopyTakesValueAndHeader) {
     EXPECT_EQ(to.time_ns, 5);
 }
 
-TEST(SameType, IsByNameMd5SizeAndAlignment) {
+TEST(SameType, IsDecidedByNameMd5SizeAndAlignment) {
     const TypeInfo& original = typeInfo<std_msgs::Float64>();
-    TypeInfo other = original;  // as another library has it
+    TypeInfo other = original;  // as in another library
     const std::string name = original.name;
     other.name = name.c_str();
     EXPECT_TRUE(sameType(original, other));
@@ -323,16 +323,16 @@ TEST(SameType, IsByNameMd5SizeAndAlignment) {
     EXPECT_FALSE(sameType(original, other));
 }
 
-TEST(SameType, IsThatOfAMessageOfOneFieldWithTheSameLayout) {
+TEST(SameType, IncludesAMessageOfOneFieldWithTheSameLayout) {
     EXPECT_TRUE(sameType(typeInfo<double>(), typeInfo<std_msgs::Float64>()));
     EXPECT_FALSE(sameType(typeInfo<float>(), typeInfo<std_msgs::Float64>()));
 }
 
-TEST(SameType, TellsTypesOfTheSameMessageApart) {
+TEST(SameType, DistinguishesTypesOfTheSameMessage) {
     EXPECT_FALSE(sameType(typeInfo<Eigen::Matrix2d>(), typeInfo<Eigen::Matrix<double, 4, 1>>()));
     EXPECT_FALSE(sameType(typeInfo<Eigen::Matrix<double, 2, 3>>(),
                           typeInfo<Eigen::Matrix<double, 2, 3, Eigen::RowMajor>>()))
-        << "their values lie in memory in another order";
+        << "their memory layouts differ";
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ namespace {
 
 class QueueAlone : public ::testing::Test {
    protected:
-    // As at a boundary, as in Rewire::apply().
+    // As at a boundary, like Rewire::apply().
     void connect(OutputBase& output) {
         queue.receive();
         queue.rewire(output.slot().get(), false);
@@ -42,7 +42,7 @@ class QueueAlone : public ::testing::Test {
     Output<int> second{&component, "second"};
 };
 
-TEST_F(QueueAlone, IsEmptyAtFirst) {
+TEST_F(QueueAlone, StartsEmpty) {
     EXPECT_EQ(queue.front(), nullptr);
     EXPECT_EQ(queue.size(), 0U);
     EXPECT_EQ(queue.age(), -1);
@@ -62,7 +62,7 @@ TEST_F(QueueAlone, KeepsMessagesInOrder) {
     EXPECT_EQ(queue.dropped(), 0U);
 }
 
-TEST_F(QueueAlone, AWriteIsSeenAtOnceAndOnce) {
+TEST_F(QueueAlone, AWriteIsSeenImmediatelyAndOnce) {
     connect(first);
     first.write(7);
     ASSERT_NE(queue.front(), nullptr);
@@ -72,7 +72,7 @@ TEST_F(QueueAlone, AWriteIsSeenAtOnceAndOnce) {
     EXPECT_EQ(queue.front(), nullptr);
 }
 
-TEST_F(QueueAlone, CountsWhatItHasNoRoomFor) {
+TEST_F(QueueAlone, CountsDroppedMessages) {
     connect(first);
     for (int i = 0; i < 8; ++i) write(first, i);
     EXPECT_EQ(queue.dropped(), 5U);
@@ -82,7 +82,7 @@ TEST_F(QueueAlone, CountsWhatItHasNoRoomFor) {
     EXPECT_EQ(queue.dropped(), 5U);
 }
 
-TEST_F(QueueAlone, WhatWasWrittenBeforeItWasConnectedIsNoMessage) {
+TEST_F(QueueAlone, AValueWrittenBeforeTheConnectionIsNoMessage) {
     first.write(1);
     connect(first);
     EXPECT_EQ(queue.size(), 0U);
@@ -93,7 +93,7 @@ TEST_F(QueueAlone, WhatWasWrittenBeforeItWasConnectedIsNoMessage) {
     EXPECT_EQ(taken(), (std::vector<int>{2, 4}));
 }
 
-TEST_F(QueueAlone, AgeIsThatOfTheOldest) {
+TEST_F(QueueAlone, AgeIsThatOfTheOldestMessage) {
     connect(first);
     write(first, 1, 100);
     write(first, 2, 300);
@@ -132,8 +132,8 @@ class Summing final : public Component {
 };
 RTCF_COMPONENT(Summing, "sums up a queue")
 
-// The memory of what comes from a topic becomes the queue's, and goes to a topic in turn.
-TEST_F(QueueAlone, ATopicTakesNothingOfTheReserve) {
+// Memory of messages from a topic moves to the queue, and then to a topic.
+TEST_F(QueueAlone, ATopicUsesNoReservedMemory) {
     Queue<std_msgs::String, 3> texts{&component, "texts"};
     std_msgs::String longest;
     longest.data.assign(100, 'x');
@@ -150,7 +150,7 @@ TEST_F(QueueAlone, ATopicTakesNothingOfTheReserve) {
     }
 }
 
-TEST(QueueInABench, GetsEachWrite) {
+TEST(QueueInABench, ReceivesEachWrite) {
     Bench bench("Summing");
     for (const double value : {1.0, 2.0, 4.0}) bench.write("in", value);
     bench.cycle();

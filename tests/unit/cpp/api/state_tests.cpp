@@ -1,4 +1,4 @@
-// Components alone, by rtcf/test.hpp, and what they declare.
+// Single components with rtcf/test.hpp, and their declared state.
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
@@ -87,7 +87,7 @@ TEST(State, IsAsLargeAsItsValue) {
     EXPECT_EQ(sizeof(State<bool>), sizeof(bool));
 }
 
-TEST(State, TypesAreToldApart) {
+TEST(State, TypesAreDistinguished) {
     EXPECT_EQ(StateType<long>::identity(), StateType<long long>::identity());
     EXPECT_NE(StateType<double>::identity(), StateType<std::int64_t>::identity());
     EXPECT_NE(StateType<float>::identity(), StateType<double>::identity());
@@ -118,7 +118,7 @@ TEST(State, TypesAndValuesHaveNames) {
     EXPECT_EQ(StateType<Eigen::Isometry3d>::name(), "transform");
 }
 
-TEST(State, ThatIsDeclaredTwiceOrTooLargeIsRefused) {
+TEST(State, DuplicateOrTooLargeDeclarationIsRejected) {
     EXPECT_THROW(TwiceDeclared(), std::logic_error);
     EXPECT_THROW(TooLarge(), std::logic_error);
 }
@@ -142,7 +142,7 @@ TEST(Bench, RunsAComponentByHand) {
     EXPECT_EQ(pi.deviceCalls(), 1001U);
 }
 
-TEST(Bench, CountsWhatIsNotFinite) {
+TEST(Bench, CountsNonFiniteValues) {
     Bench pi("BenchPi");
     pi.write("setpoint", std::numeric_limits<double>::quiet_NaN());
     pi.cycle();
@@ -150,7 +150,7 @@ TEST(Bench, CountsWhatIsNotFinite) {
     EXPECT_EQ(pi.read<double>("effort"), nullptr);
 }
 
-TEST(Bench, CountsWhatReadersSee) {
+TEST(Bench, CountsValuesVisibleToReaders) {
     Bench pi("BenchPi");
     pi.write("setpoint", 1.0);
     pi.cycle(3);
@@ -161,11 +161,11 @@ TEST(Bench, CountsWhatReadersSee) {
     pi.write("setpoint", 1.0);
     pi.state<double>("integral") = 0.0;
     pi.cycle();
-    EXPECT_EQ(pi.writes("effort"), 4U) << "without those in between";
+    EXPECT_EQ(pi.writes("effort"), 4U) << "values between updates are not counted";
     EXPECT_EQ(pi.nonFinite(), 2U);
 }
 
-TEST(Bench, SaysWhatIsWrong) {
+TEST(Bench, ReportsErrors) {
     EXPECT_THROW(Bench("Nothing"), std::invalid_argument);
     EXPECT_THROW(Bench("BenchPi", {{"limit", -1.0}}), std::runtime_error);
     EXPECT_THROW(Bench("BenchPi", {{"kp", -1.0}}), std::invalid_argument);
@@ -176,7 +176,7 @@ TEST(Bench, SaysWhatIsWrong) {
     EXPECT_THROW(pi.state<float>("integral"), std::invalid_argument);
 }
 
-TEST(Bench, HandsStateOver) {
+TEST(Bench, TransfersState) {
     Bench old("BenchPi");
     old.write("setpoint", 1.0);
     old.cycle(10);
@@ -185,8 +185,8 @@ TEST(Bench, HandsStateOver) {
     EXPECT_EQ(fresh.state<double>("integral"), old.state<double>("integral"));
 }
 
-// Of six joints of one class each says it, and a reloaded one again.
-TEST(Logging, OnceIsOfEachComponent) {
+// Each of six joints of one class logs once, and a reloaded one logs again.
+TEST(Logging, OnceAppliesToEachComponent) {
     Bench left("BenchPi");
     Bench right("BenchPi");
     left.cycle(3);
@@ -195,8 +195,8 @@ TEST(Logging, OnceIsOfEachComponent) {
     EXPECT_EQ(right.log(), left.log());
 }
 
-// Not even with a bench: the object as it is.
-TEST(Component, ThatTalksToADeviceNeedsNoExecutor) {
+// Without a bench: the object alone.
+TEST(Component, WithADeviceNeedsNoExecutor) {
     BenchPi pi;
     static_cast<Component&>(pi).update();
     EXPECT_FALSE(pi.logs(LogLevel::Fatal));

@@ -1,4 +1,4 @@
-// What is told of messages that were too large.
+// Reports of messages that were too large.
 #include "bridge/size_watch.hpp"
 
 #include <gtest/gtest.h>
@@ -36,7 +36,7 @@ class SizeWatchTest : public testing::Test {
     std::int64_t now_ = 0;
 };
 
-TEST_F(SizeWatchTest, SaysWhatWasLostSinceItLastDid) {
+TEST_F(SizeWatchTest, ReportsMessagesLostSinceTheLastReport) {
     const auto injector = std::make_shared<Injector>("/x", typeInfo<std_msgs::String>());
     lose(*injector, 2);
     look(injector);
@@ -49,8 +49,8 @@ TEST_F(SizeWatchTest, SaysWhatWasLostSinceItLastDid) {
     EXPECT_EQ(watch_.total(), 5U);
 }
 
-TEST_F(SizeWatchTest, CountsAnewWhatCameToThePlaceOfAConnectionThatLeft) {
-    // The memory of one that left is that of the next.
+TEST_F(SizeWatchTest, CountsFromZeroForANewConnectionAtTheSameAddress) {
+    // The next injector uses the memory of the removed one.
     std::optional<Injector> place;
     for (int turn = 1; turn <= 3; ++turn) {
         place.emplace("/x", typeInfo<std_msgs::String>());
@@ -61,7 +61,7 @@ TEST_F(SizeWatchTest, CountsAnewWhatCameToThePlaceOfAConnectionThatLeft) {
     EXPECT_EQ(said_.size(), 3U);
 }
 
-TEST_F(SizeWatchTest, GoesOnCountingOneThatComesBack) {
+TEST_F(SizeWatchTest, ContinuesCountingAConnectionThatReturns) {
     const auto injector = std::make_shared<Injector>("/x", typeInfo<std_msgs::String>());
     lose(*injector, 2);
     look(injector);

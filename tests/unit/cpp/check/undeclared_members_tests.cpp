@@ -1,4 +1,4 @@
-// What a component remembers and does not declare is found by its place.
+// Undeclared members that a component changes are found by their offsets.
 #include "check/undeclared_members.hpp"
 
 #include <gtest/gtest.h>
@@ -38,7 +38,7 @@ TEST(UndeclaredMembers, AreNotPortsAndStates) {
     EXPECT_TRUE(members.found().empty());
 }
 
-TEST(UndeclaredMembers, AreToldByWhatTheyStandBeside) {
+TEST(UndeclaredMembers, AreNamedByTheirNeighbours) {
     const auto component = std::make_unique<Forgetful>();
     executor::UndeclaredMembers members(*component);
     ++component->count;
@@ -47,7 +47,7 @@ TEST(UndeclaredMembers, AreToldByWhatTheyStandBeside) {
     members.look();
     component->odd = true;
     members.look();
-    component->odd = false;  // also if it is what it was in the end
+    component->odd = false;  // even if it ends with its first value
     members.look();
     const auto found = members.found();
     ASSERT_EQ(found.size(), 2U);

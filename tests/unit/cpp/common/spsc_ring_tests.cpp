@@ -34,7 +34,7 @@ TEST(SpscRing, ClaimedElementIsNotSeenBeforeCommit) {
     EXPECT_NE(ring.front(), nullptr);
 }
 
-TEST(SpscRing, FullRingRefusesAndCounts) {
+TEST(SpscRing, FullRingRejectsAndCounts) {
     SpscRing<int, 4> ring;
     for (int i = 0; i < 4; ++i) {
         *ring.claim() = i;
@@ -43,12 +43,12 @@ TEST(SpscRing, FullRingRefusesAndCounts) {
     EXPECT_EQ(ring.claim(), nullptr);
     EXPECT_EQ(ring.claim(), nullptr);
     EXPECT_EQ(ring.dropped(), 2U);
-    EXPECT_EQ(*ring.front(), 0) << "what is in it stays";
+    EXPECT_EQ(*ring.front(), 0) << "the content is kept";
     ring.pop();
     EXPECT_NE(ring.claim(), nullptr);
 }
 
-TEST(SpscRing, ConsumerSeesAllThatWasNotDroppedInOrder) {
+TEST(SpscRing, ConsumerSeesAllElementsNotDroppedInOrder) {
     constexpr std::uint64_t kCount = 200'000;
     SpscRing<std::uint64_t, 64> ring;
     std::thread producer([&ring] {

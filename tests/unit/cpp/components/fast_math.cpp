@@ -1,4 +1,4 @@
-// Linked with -ffast-math: loading it tells the processor to flush subnormal numbers to zero.
+// Linked with -ffast-math: loading it makes the processor flush subnormal numbers to zero.
 #include <rtcf/component.hpp>
 
 namespace {

@@ -1,6 +1,6 @@
 /// @file
-/// What the test components report to the test that loaded them. The test
-/// program owns the one journal; component libraries find it as a symbol of
+/// The reports of the test components to the test that loaded them. The test
+/// program owns the single journal; component libraries find it as a symbol of
 /// the program. Writing is wait-free, so that the real-time thread can write.
 #pragma once
 
@@ -16,7 +16,7 @@ namespace rtcf_unit_test {
 
 class Journal {
    public:
-    /// Notes e.g. "/H1 start". Real-time safe, any thread.
+    /// Adds a note, e.g. "/H1 start". Real-time safe, any thread.
     void note(const std::string& component, const char* what) noexcept {
         const std::size_t index = used_.fetch_add(1);
         if (index >= entries_.size()) return;
@@ -36,14 +36,14 @@ class Journal {
         return result;
     }
 
-    /// How often a note has been made.
+    /// The number of occurrences of a note.
     std::size_t count(const std::string& note_text) const {
         std::size_t result = 0;
         for (const std::string& line : notes()) result += line == note_text ? 1 : 0;
         return result;
     }
 
-    /// Forgets all; while no component runs.
+    /// Removes all notes; only while no component runs.
     void clear() {
         for (Entry& entry : entries_) {
             entry.component.fill('\0');
@@ -54,9 +54,9 @@ class Journal {
         copies_throw.store(false);
     }
 
-    /// Hooks of Blocker wait until it is open.
+    /// Blocker's hooks wait until it is open.
     std::atomic<bool> gate_open{true};
-    /// Values of Touchy's ports cannot be copied.
+    /// Whether copying the values of Touchy's ports fails.
     std::atomic<bool> copies_throw{false};
 
    private:

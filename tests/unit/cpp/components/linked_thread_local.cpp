@@ -1,4 +1,4 @@
-// Tells whether the thread of its first cycle had the memory of what it links against before.
+// Reports whether the thread had the TLS memory of its linked library before the first cycle.
 #include <dlfcn.h>
 #include <link.h>
 #include <std_msgs/Float64.h>
@@ -9,7 +9,7 @@
 
 namespace {
 
-// By the loader's list, as any use of a variable would get its memory.
+// Uses the loader's list, as any access to a variable would allocate its memory.
 bool thisThreadHas(const void* library) {
     struct Search {
         const void* library;
@@ -18,7 +18,7 @@ bool thisThreadHas(const void* library) {
     dl_iterate_phdr(
         [](dl_phdr_info* info, std::size_t, void* data) {
             auto& wanted = *static_cast<Search*>(data);
-            // NOLINTNEXTLINE(performance-no-int-to-ptr): the loader gives addresses as numbers
+            // NOLINTNEXTLINE(performance-no-int-to-ptr): the loader returns addresses as numbers
             if (reinterpret_cast<const void*>(info->dlpi_addr) != wanted.library) return 0;
             wanted.found = info->dlpi_tls_data != nullptr;
             return 1;

@@ -1,4 +1,4 @@
-// Components whose ports carry types of their own that travel as ROS messages.
+// Components whose ports have their own types, which are sent as ROS messages.
 #include <std_msgs/Float64MultiArray.h>
 #include <std_msgs/Int32.h>
 
@@ -12,7 +12,7 @@ namespace rtcf_unit_test {
 
 enum class Gear : std::uint8_t { None, Low, High };
 
-// Ends the process for a value that no component has written: a table has no place for it.
+// Ends the process for a value that no component has written: it is outside a table.
 struct GearOnRos {
     static const char* name() { return "rtcf_unit_test/Gear"; }
     static void toMessage(const Gear& value, std_msgs::Int32& message) {
@@ -24,12 +24,12 @@ struct GearOnRos {
     }
 };
 
-// Of a size that stays, in a message that has as many elements as it likes.
+// A type of fixed size, whose message has any number of elements.
 struct Scan {
     std::uint32_t count = 0;
     std::array<double, 50> ranges{};
 };
-// With memory of its own.
+// A type that owns memory.
 struct Trace {
     std::vector<double> points;
 };
@@ -78,7 +78,7 @@ class Gearbox final : public rtcf::Component {
     }
 };
 
-// Writes as many ranges as the cycles before it, up to 50, and tells how many it has read.
+// Writes as many ranges as there were cycles, up to 50, and outputs the number that it has read.
 class Scanner final : public rtcf::Component {
     rtcf::Input<rtcf_unit_test::Scan> in{this, "in"};
     rtcf::Output<rtcf_unit_test::Scan> scan{this, "scan"};
@@ -109,5 +109,5 @@ class Tracer final : public rtcf::Component {
 }  // namespace
 
 RTCF_COMPONENT(Scanner, "Writes values whose messages have arrays")
-RTCF_COMPONENT(Tracer, "Writes values with memory of their own")
-RTCF_COMPONENT(Gearbox, "Writes values of which not every one is a message")
+RTCF_COMPONENT(Tracer, "Writes values that own memory")
+RTCF_COMPONENT(Gearbox, "Writes values that not all convert to a message")

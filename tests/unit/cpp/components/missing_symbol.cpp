@@ -1,4 +1,4 @@
-// Calls a function that nothing defines.
+// Calls an undefined function.
 #include <rtcf/component.hpp>
 
 extern "C" void rtcf_unit_test_undefined_function();

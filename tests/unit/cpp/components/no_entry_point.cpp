@@ -1,2 +1,2 @@
-// A shared library that is none of components.
+// A shared library without components.
 extern "C" __attribute__((visibility("default"))) int rtcf_unit_test_unrelated() { return 1; }

@@ -1,4 +1,4 @@
-// What components of RTCF 2021 use of OROCOS beside ports of messages and the macros of RTCF.
+// OROCOS features used by components of RTCF 2021, besides ports of messages and RTCF's macros.
 #include <std_msgs/Float64.h>
 
 #include <array>
@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-// These bring ros/ros.h and ros/console.h along.
+// These include ros/ros.h and ros/console.h.
 #include <rtcf/rt_logging_macros.hpp>
 #include <rtcf/rtcf_extension.hpp>
 
@@ -26,7 +26,7 @@ struct Gains {
 enum class Mode { Idle, Position, Force };
 using Triple = std::array<float, 3>;
 
-/// Writes values of types that are no messages.
+/// Writes values whose types are not messages.
 class Sender : public RTT::TaskContext, public RtcfExtension {
    public:
     explicit Sender(const std::string& name) : TaskContext(name) {
@@ -57,7 +57,7 @@ class Sender : public RTT::TaskContext, public RtcfExtension {
     std::vector<double> written_;
 };
 
-/// Reads them, and says what it has read.
+/// Reads them, and logs the values.
 class Receiver : public RTT::TaskContext {
    public:
     explicit Receiver(const std::string& name) : TaskContext(name) {
@@ -92,13 +92,13 @@ class Receiver : public RTT::TaskContext {
     std::vector<double> read_;
 };
 
-/// Logs by every way there is, in its constructor too.
+/// Logs in every possible way, including in its constructor.
 class Logger : public RTT::TaskContext, public RtcfExtension {
    public:
     explicit Logger(const std::string& name) : TaskContext(name) {
         RTT::Logger::In in("Logger");
         RTT::log(RTT::Warning) << "constructed by " << 1
-                               << std::endl;  // NOLINT(performance-avoid-endl): as they do
+                               << std::endl;  // NOLINT(performance-avoid-endl): as in users' code
         RT_INFO("constructed by 2");
         rtLogError("constructed by 3");
     }
@@ -116,7 +116,7 @@ class Logger : public RTT::TaskContext, public RtcfExtension {
     }
 };
 
-/// Fails in its constructor, having logged.
+/// Fails in its constructor after logging.
 class Unlucky : public RTT::TaskContext {
    public:
     explicit Unlucky(const std::string& name) : TaskContext(name) {
@@ -125,7 +125,7 @@ class Unlucky : public RTT::TaskContext {
     }
 };
 
-/// Is in error in iterations 2 and 3.
+/// In the error state in iterations 2 and 3.
 class Erring : public RTT::TaskContext, public RtcfExtension {
    public:
     explicit Erring(const std::string& name) : TaskContext(name) {}
@@ -139,7 +139,7 @@ class Erring : public RTT::TaskContext, public RtcfExtension {
     }
 };
 
-/// Says which ports it has, is called back by one, and stops listening to it.
+/// Logs its ports, uses a port's callback, and stops listening to it.
 class Listener : public RTT::TaskContext, public RtcfExtension {
    public:
     explicit Listener(const std::string& name) : TaskContext(name) {
@@ -168,7 +168,7 @@ class Listener : public RTT::TaskContext, public RtcfExtension {
     RTT::OutputPort<std_msgs::Float64> other_{"other"};
 };
 
-/// Has properties and operations of OROCOS, and logs by streams; says what it has.
+/// Uses OROCOS properties and operations, and logs by streams.
 class Property21 : public RTT::TaskContext, public RtcfExtension {
    public:
     explicit Property21(const std::string& name) : TaskContext(name) {
@@ -182,7 +182,7 @@ class Property21 : public RTT::TaskContext, public RtcfExtension {
     bool configureHook() override {
         rtLogStream(ros::console::levels::Info)
             << "configured with " << gain_ << ' ' << count_ << ' ' << label_
-            << std::endl;  // NOLINT(performance-avoid-endl): as people wrote it
+            << std::endl;  // NOLINT(performance-avoid-endl): as in users' code
         rtLogStream(ros::console::levels::Debug) << "not shown";
         active("configureHook");
         return true;
@@ -190,7 +190,7 @@ class Property21 : public RTT::TaskContext, public RtcfExtension {
     void updateHook() override {
         out_.write(gain_ + late_);
         if (getIteration() == 0) active("updateHook");
-        if (getIteration() == 1) gain_ = 7.0;  // its own, until the parameter changes
+        if (getIteration() == 1) gain_ = 7.0;  // its own value, until the parameter changes
     }
     void stopHook() override {
         rtLogStream(ros::console::levels::Warn) << "stopped with " << label_;
@@ -211,7 +211,7 @@ class Property21 : public RTT::TaskContext, public RtcfExtension {
     RTT::OutputPort<double> out_{"gain_seen"};
 };
 
-/// Adds a property where nobody can set it any more.
+/// Adds a property after parameters can be set.
 class LateProperty : public RTT::TaskContext {
    public:
     explicit LateProperty(const std::string& name) : TaskContext(name) {}

@@ -1,4 +1,4 @@
-// Components as RTCF 2021 has them, for tests of the source compatibility.
+// Components in the style of RTCF 2021, for tests of source compatibility.
 #include <std_msgs/Float64.h>
 #include <std_msgs/String.h>
 
@@ -41,7 +41,7 @@ class Third : public RTT::TaskContext, public RtcfExtension {
     RTT::WriteStatus status_ = RTT::NotConnected;
 };
 
-/// Tells by its outputs what its reads give.
+/// Outputs the results of its reads.
 class Reader : public RTT::TaskContext {
    public:
     explicit Reader(const std::string& name) : TaskContext(name), in_("in") {
@@ -59,7 +59,7 @@ class Reader : public RTT::TaskContext {
         sample.data = -1.0;
         write(flow_, in_.read(sample, false));
         write(copied_, sample.data);
-        // Read already: old, if there is a value at all.
+        // Read already: old data, if there is a value.
         (void)in_.read(sample);
         write(copied_old_, sample.data);
         write(connected_, in_.connected() ? 1.0 : 0.0);
@@ -80,7 +80,7 @@ class Reader : public RTT::TaskContext {
     Output connected_;
 };
 
-/// Logs what it knows of itself in each hook.
+/// Logs its own properties in each hook.
 class Teller : public RTT::TaskContext, public RtcfExtension {
    public:
     explicit Teller(const std::string& name) : TaskContext(name), constructed_as_(name) {}
@@ -131,7 +131,7 @@ class Writer : public RTT::TaskContext, public RtcfExtension {
     const std::string long_;
 };
 
-/// Adds a port when it is too late.
+/// Adds a port too late.
 class TooLate : public RTT::TaskContext {
    public:
     explicit TooLate(const std::string& name) : TaskContext(name) {}
@@ -157,20 +157,20 @@ class Twice : public RTT::TaskContext {
     RTT::InputPort<std_msgs::Float64> port_{"port"};
 };
 
-/// Uses the extension where there is none yet.
+/// Uses the extension before it exists.
 class TooEarly : public RTT::TaskContext, public RtcfExtension {
    public:
     explicit TooEarly(const std::string& name) : TaskContext(name) { (void)getNodeHandle(); }
 };
 
-/// Wants ROS.
+/// Needs ROS.
 class NeedsRos : public RTT::TaskContext, public RtcfExtension {
    public:
     explicit NeedsRos(const std::string& name) : TaskContext(name) {}
     bool configureHook() override { return getNodeHandle().hasParam("anything"); }
 };
 
-/// A message that grows, with room for the largest.
+/// A message of growing size, with reserved memory for the largest.
 class Grower : public RTT::TaskContext, public RtcfExtension {
    public:
     explicit Grower(const std::string& name) : TaskContext(name) {

@@ -1,4 +1,4 @@
-// Built with containers of another size than the executor's: see CMakeLists.txt.
+// Built with containers of another size than the executor's; see CMakeLists.txt.
 #include <rtcf/component.hpp>
 
 namespace {

@@ -1,4 +1,4 @@
-// A component whose output's values have a megabyte each.
+// A component with output values of a megabyte.
 #include <array>
 #include <cstring>
 #include <rtcf/component.hpp>

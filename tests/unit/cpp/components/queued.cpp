@@ -1,4 +1,4 @@
-// Takes the messages of queues, and tells in which order they came.
+// Reads messages from queues, and outputs their order.
 #include <std_msgs/String.h>
 
 #include <rtcf/component.hpp>
@@ -8,7 +8,7 @@ namespace {
 class Collector final : public rtcf::Component {
     rtcf::Queue<double, 4> in{this, "in"};
     rtcf::Queue<std_msgs::String, 4> texts{this, "texts"};
-    rtcf::Output<double> order{this, "order"};  // of the digits that came: 1, 2, 3 is 123
+    rtcf::Output<double> order{this, "order"};  // digits in order of arrival: 1, 2, 3 is 123
     rtcf::Output<double> waiting{this, "waiting"};
     rtcf::Output<double> dropped{this, "dropped"};
     rtcf::Output<double> letters{this, "letters"};
@@ -26,13 +26,13 @@ class Collector final : public rtcf::Component {
         letters.write(characters);
     }
 };
-RTCF_COMPONENT(Collector, "Tells what queues have given")
+RTCF_COMPONENT(Collector, "Outputs the messages of queues")
 
 class Digits final : public rtcf::Component {
     rtcf::Output<double> out{this, "out"};
 
     void update() override { out.write(static_cast<double>(iteration() % 10)); }
 };
-RTCF_COMPONENT(Digits, "Writes 0 to 9, again and again")
+RTCF_COMPONENT(Digits, "Writes 0 to 9 repeatedly")
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Notes every call of its hooks, and fails where it is told to.
+// Records every call of its hooks, and fails on demand.
 #include <std_msgs/Float64.h>
 
 #include <chrono>
@@ -34,7 +34,7 @@ class Recorder : public rtcf::Component {
     void stop() override { hook("stop"); }
     void cleanup() override { hook("cleanup"); }
 
-    // Its output counts its updates, so that one can see from outside whether its state was kept.
+    // Its output counts its updates, which shows whether its state was kept.
     void update() override {
         if (static_cast<std::int64_t>(count_) == throws_at) throw std::runtime_error("as told");
         if (count_ == 0.0) note("update");
@@ -62,7 +62,7 @@ class Recorder : public rtcf::Component {
     rtcf::State<double> count_{this, "count", 0.0, rtcf::Doc("updates so far")};
 };
 
-// Its hook of the parameter's name waits until the test opens the journal's gate.
+// The hook named by its parameter waits until the test opens the journal's gate.
 class Blocker final : public Recorder {
     rtcf::Parameter<std::string> blocks{this, "blocks", "configure"};
 
@@ -83,5 +83,5 @@ class Blocker final : public Recorder {
 
 }  // namespace
 
-RTCF_COMPONENT(Recorder, "Notes its hooks in the test's journal")
+RTCF_COMPONENT(Recorder, "Records its hooks in the test's journal")
 RTCF_COMPONENT(Blocker, "Has a hook that waits for the test")

@@ -1,4 +1,4 @@
-// A controller and a driver of which one can see what they made of the last cycle.
+// A controller and a driver that show their actions in the last cycle.
 #include <std_msgs/String.h>
 
 #include <array>
@@ -18,7 +18,7 @@ void note(const rtcf::Component& component, const char* what) {
         rtcf_unit_test_journal()->note(component.fullName(), what);
 }
 
-// Commands 5, and 0 when it makes safe. May leave half a command when it throws.
+// Commands 5, and 0 in safe(). May leave an incomplete command when it throws.
 class Controller final : public rtcf::Component {
     rtcf::Output<double> effort{this, "effort"};
     rtcf::Output<double> other{this, "other"};
@@ -60,7 +60,7 @@ class Controller final : public rtcf::Component {
     }
 };
 
-// Does what it is told, counts how often it was told anything new, and in what kind of cycle.
+// Applies commands; counts new ones, and records the kind of cycle of each.
 class Driver final : public rtcf::Component {
     rtcf::Input<double> command{this, "command"};
     rtcf::Output<double> applied{this, "applied", "", rtcf::Finite()};
@@ -91,8 +91,8 @@ class Driver final : public rtcf::Component {
     }
 };
 
-// Writes what lies elsewhere than in the frame: a text, and a table that is large. May leave half
-// of both when it throws.
+// Writes values stored outside the frame: a text, and a large table. May leave both incomplete when
+// it throws.
 class Author final : public rtcf::Component {
     rtcf::Output<std_msgs::String> text{this, "text"};
     rtcf::Output<std::array<double, 1024>> table{this, "table"};
@@ -117,7 +117,7 @@ class Author final : public rtcf::Component {
     }
 };
 
-// Tells how many of what it has read are whole.
+// Outputs how many of the values it read are complete.
 class Critic final : public rtcf::Component {
     rtcf::Input<std_msgs::String> text{this, "text"};
     rtcf::Input<std::array<double, 1024>> table{this, "table"};
@@ -132,7 +132,7 @@ class Critic final : public rtcf::Component {
     }
 };
 
-// The highest value ever read.
+// Outputs the highest value read so far.
 class Watcher final : public rtcf::Component {
     rtcf::Input<double> in{this, "in"};
     rtcf::Output<double> highest{this, "highest"};
@@ -149,5 +149,5 @@ class Watcher final : public rtcf::Component {
 RTCF_COMPONENT(Controller, "Commands 5, and 0 in safe()")
 RTCF_COMPONENT(Driver, "Applies new commands")
 RTCF_COMPONENT(Author, "Writes a text and a table")
-RTCF_COMPONENT(Critic, "Tells what is whole of a text and a table")
-RTCF_COMPONENT(Watcher, "Tells the highest value")
+RTCF_COMPONENT(Critic, "Counts complete texts and tables")
+RTCF_COMPONENT(Watcher, "Outputs the highest value")

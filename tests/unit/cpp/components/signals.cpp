@@ -1,4 +1,4 @@
-// Small components whose outputs tell what they saw.
+// Small components whose outputs show their inputs.
 #include <std_msgs/Float64.h>
 #include <std_msgs/Int32.h>
 #include <std_msgs/String.h>
@@ -11,7 +11,7 @@
 
 namespace {
 
-// Passes its input on plus `add`, whether it is new or not, and tells the status of its read.
+// Outputs its input plus `add`, new or old, and the status of its read.
 class Relay final : public rtcf::Component {
     rtcf::Input<std_msgs::Float64> in{this, "in"};
     rtcf::Output<std_msgs::Float64> out{this, "out"};
@@ -37,7 +37,7 @@ class Ticker final : public rtcf::Component {
     }
 };
 
-// Takes `busy_us` for some updates, and sums up what elapsed() says, in periods.
+// Runs for `busy_us` in some updates, and sums elapsed(), in periods.
 class Spinner final : public rtcf::Component {
     rtcf::Output<std_msgs::Float64> periods{this, "periods"};
     rtcf::Parameter<std::int64_t> busy_us{this, "busy_us", 0, rtcf::Min(0)};
@@ -59,7 +59,7 @@ class Spinner final : public rtcf::Component {
     }
 };
 
-// Writes texts that grow by a letter each cycle.
+// Writes texts that grow by a letter per cycle.
 class Talker final : public rtcf::Component {
     rtcf::Output<std_msgs::String> out{this, "out"};
 
@@ -78,13 +78,13 @@ class Talker final : public rtcf::Component {
     static constexpr std::size_t kLongest = 100;
 };
 
-// A port of another type than others of its name.
+// A port whose type differs from others of the same name.
 class VectorSource final : public rtcf::Component {
     rtcf::Output<Eigen::Vector3d> out{this, "out"};
     void update() override { out.write(Eigen::Vector3d::Ones()); }
 };
 
-// Writes before the first cycle, and to a value that it found in configure().
+// Writes before the first cycle, and modifies a value from configure() in place.
 class Herald final : public rtcf::Component {
     rtcf::Output<std_msgs::Float64> announced{this, "announced"};
     rtcf::Output<std_msgs::Float64> counted{this, "counted"};
@@ -133,7 +133,7 @@ class Allocator final : public rtcf::Component {
 
 }  // namespace
 
-RTCF_COMPONENT(Relay, "Adds to what it reads")
+RTCF_COMPONENT(Relay, "Adds to its input")
 RTCF_COMPONENT(Ticker, "Writes in each n-th cycle")
 RTCF_COMPONENT(Spinner, "Takes time")
 RTCF_COMPONENT(Talker, "Writes values of variable size")

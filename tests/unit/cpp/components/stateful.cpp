@@ -1,5 +1,5 @@
-// Built twice, with another VERSION each: a class before and after its author changed what it
-// remembers. An object of one is not to be read as one of the other.
+// Built twice, with different VERSIONs: a class before and after a change of its members. An object
+// of one must not be read as one of the other.
 #include <array>
 #include <rtcf/component.hpp>
 
@@ -17,7 +17,7 @@ struct Delay {
 
 class Stateful final : public rtcf::Component {
 #if VERSION == 2
-    std::array<double, 9> added_{};  // all that follows lies elsewhere
+    std::array<double, 9> added_{};  // moves all following members
     rtcf::State<double> fresh{this, "fresh", 0.25};
     rtcf::State<double> renamed{this, "new_name", 0.0};
     rtcf::State<double> gain{this, "gain", 2.0};
@@ -29,7 +29,7 @@ class Stateful final : public rtcf::Component {
     rtcf::State<std::uint64_t> count{this, "count", 0, rtcf::Doc("updates so far")};
     rtcf::State<Delay> delay{this, "delay", {}, rtcf::Unit("cycles")};
     rtcf::Output<double> out{this, "out"};
-    rtcf::Output<double> skipped{this, "skipped"};  // cycles between two updates in a row, less 1
+    rtcf::Output<double> skipped{this, "skipped"};  // cycles skipped between two updates
 
     void update() override {
         ++count;
@@ -43,7 +43,7 @@ class Stateful final : public rtcf::Component {
     void takeOver(const rtcf::Predecessor& previous) noexcept override {
         if (const auto* old = previous.state<double>("old_name")) renamed = *old;
         if (previous.state<double>("count") != nullptr || previous.state<int>("none") != nullptr)
-            renamed = -1.0;  // of another type, and not there
+            renamed = -1.0;  // of another type, and missing
         if (const auto* last = previous.output<double>("out")) fresh = *last;
     }
 #endif
@@ -51,4 +51,4 @@ class Stateful final : public rtcf::Component {
 
 }  // namespace
 
-RTCF_COMPONENT(Stateful, "Counts, and remembers more or less")
+RTCF_COMPONENT(Stateful, "Counts, with more or fewer members")

@@ -1,4 +1,4 @@
-// Built twice: as anyone would, and with the memory of its thread_local at hand from the start.
+// Built twice: with dynamic TLS, as usual, and with static TLS.
 #include <rtcf/component.hpp>
 
 namespace {
@@ -13,4 +13,4 @@ class ThreadLocal final : public rtcf::Component {
 
 }  // namespace
 
-RTCF_COMPONENT(ThreadLocal, "Keeps numbers by thread")
+RTCF_COMPONENT(ThreadLocal, "Has thread_local numbers")

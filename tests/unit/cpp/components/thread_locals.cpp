@@ -1,5 +1,5 @@
-// A library that knows nothing of rtcf. Most of its variants have more than the loader would put
-// beside each thread.
+// A library independent of rtcf. Most of its variants have more thread_local memory than fits into
+// static TLS.
 #include "thread_locals.hpp"
 
 #ifndef NUMBERS

@@ -1,4 +1,4 @@
 #pragma once
 
-/// How often the calling thread has called it.
+/// The number of calls by the calling thread.
 extern "C" double rtcf_unit_test_count();

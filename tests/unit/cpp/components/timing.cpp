@@ -1,4 +1,4 @@
-// A device that paces its loop, and a component that tells what it is told of time.
+// A device that paces its loop, and a component that outputs the loop's times.
 #include <time.h>
 
 #include <algorithm>
@@ -54,7 +54,7 @@ class Watch final : public rtcf::Component {
     static constexpr double kMillisecond = 1e6;
 };
 
-// Whether elapsed() is what time() has gone on by, and safe() comes at a later time than updates.
+// Checks that elapsed() is the progress of time(), and that safe() has a later time than updates.
 class Stopwatch final : public rtcf::Component {
     rtcf::Output<std::int64_t> furthest_off{this, "furthest_off", "ns"};
     rtcf::Output<std::int64_t> last{this, "last", "ns"};
@@ -79,7 +79,7 @@ class Stopwatch final : public rtcf::Component {
     }
 };
 
-// Takes 6 ms to take over.
+// Takes 6 ms in takeOver().
 class SlowSuccessor final : public rtcf::Component {
     void update() override {}
     void takeOver(const rtcf::Predecessor& /*previous*/) noexcept override {
@@ -99,7 +99,7 @@ class Gated final : public rtcf::Component {
     }
 };
 
-// A number below those that are normal, if it is not flushed to zero.
+// Writes a subnormal number, unless it is flushed to zero.
 class Subnormal final : public rtcf::Component {
     rtcf::Output<double> out{this, "out"};
     void update() override {
@@ -110,9 +110,9 @@ class Subnormal final : public rtcf::Component {
 
 }  // namespace
 
-RTCF_COMPONENT(Gated, "Has an update that waits for the test")
-RTCF_COMPONENT(SlowSuccessor, "Takes long to take over")
+RTCF_COMPONENT(Gated, "Has an update() that waits for the test")
+RTCF_COMPONENT(SlowSuccessor, "Has a slow takeOver()")
 RTCF_COMPONENT(Stopwatch, "Compares time() and elapsed()")
 RTCF_COMPONENT(Subnormal, "Writes a subnormal number")
 RTCF_COMPONENT(Device, "Paces the loop")
-RTCF_COMPONENT(Watch, "Tells what it is told of time")
+RTCF_COMPONENT(Watch, "Outputs the loop's times")

@@ -1,4 +1,4 @@
-// A component whose ports carry values that can refuse to be copied, as memory can run out.
+// A component whose values can fail to be copied, as without memory.
 #include <new>
 #include <rtcf/component.hpp>
 
@@ -56,4 +56,4 @@ class Touchy final : public rtcf::Component {
 
 }  // namespace
 
-RTCF_COMPONENT(Touchy, "Has values that may not be copied")
+RTCF_COMPONENT(Touchy, "Has values whose copies may fail")

@@ -1,4 +1,4 @@
-// Built twice, with another VERSION each: the same type before and after a rebuild.
+// Built twice, with different VERSIONs: the same type before and after a rebuild.
 #include <rtcf/component.hpp>
 
 namespace {
@@ -10,4 +10,4 @@ class Versioned final : public rtcf::Component {
 
 }  // namespace
 
-RTCF_COMPONENT(Versioned, "Writes the version it was built as")
+RTCF_COMPONENT(Versioned, "Writes its VERSION")

@@ -1,4 +1,4 @@
-// Built, as it says, with the headers of another ABI.
+// Claims to be built with headers of another ABI.
 #include <rtcf/version.hpp>
 #undef RTCF_ABI_VERSION
 #define RTCF_ABI_VERSION 4711u

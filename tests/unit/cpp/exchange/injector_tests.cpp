@@ -33,13 +33,13 @@ double front(const Injector& injector) {
     return static_cast<const Slot<double>*>(injector.front())->value;
 }
 
-TEST(Injector, HasNothingAtFirst) {
+TEST(Injector, StartsEmpty) {
     Injector injector("/x", typeInfo<double>());
     EXPECT_FALSE(injector.adopt(LoopClock{}));
     EXPECT_EQ(injector.front()->sequence, 0U);
 }
 
-TEST(Injector, GivesABacklogWhatItPassesOver) {
+TEST(Injector, PassesSkippedMessagesToABacklog) {
     Injector injector("/x", typeInfo<double>());
     BareComponent component;
     Queue<double, 8> queue(&component, "queue");
@@ -61,10 +61,10 @@ TEST(Injector, GivesABacklogWhatItPassesOver) {
     const std::uint8_t short_one[] = {1, 2};
     EXPECT_FALSE(injector.deliver(short_one, sizeof short_one));
     backlog->enter(200);
-    EXPECT_EQ(queue.size(), 0U) << "bytes that are no message are none for a queue either";
+    EXPECT_EQ(queue.size(), 0U) << "a queue gets no invalid messages";
 }
 
-TEST(Injector, CountsAndRefusesWhatIsLargerThanAllowed) {
+TEST(Injector, CountsAndRejectsMessagesAboveTheLimit) {
     Injector injector("/x", typeInfo<std_msgs::String>());
     injector.setLargest(6);
     const std::vector<std::uint8_t> fits{2, 0, 0, 0, 'h', 'i'};
@@ -78,15 +78,15 @@ TEST(Injector, CountsAndRefusesWhatIsLargerThanAllowed) {
     EXPECT_EQ(slot->value.data, "hi");
 }
 
-// In KiB: the most that was ever present.
+// Peak memory in KiB.
 long mostMemory() {
     rusage usage{};
     getrusage(RUSAGE_SELF, &usage);
     return usage.ru_maxrss;
 }
 
-// A length is only a number until the bytes are there.
-TEST(Injector, MakesNoRoomForWhatIsNotThere) {
+// A length in a message reserves no memory until the bytes have arrived.
+TEST(Injector, ReservesNoMemoryForMissingBytes) {
     constexpr long kLittle = 16 * 1024;  // KiB
     Injector numbers("/x", typeInfo<std_msgs::Float64MultiArray>());
     std::vector<std::uint8_t> bytes(12);
@@ -104,12 +104,12 @@ TEST(Injector, MakesNoRoomForWhatIsNotThere) {
     EXPECT_LT(mostMemory() - before, kLittle);
 }
 
-TEST(Injector, GivesTheNewestOfSeveral) {
+TEST(Injector, ReturnsTheNewestOfSeveral) {
     Injector injector("/x", typeInfo<double>());
     for (int i = 1; i <= 5; ++i) deliver(injector, i);
     EXPECT_TRUE(injector.adopt(LoopClock{}));
     EXPECT_EQ(front(injector), 5.0);
-    EXPECT_FALSE(injector.adopt(LoopClock{})) << "there is nothing newer";
+    EXPECT_FALSE(injector.adopt(LoopClock{})) << "no newer value exists";
     EXPECT_EQ(front(injector), 5.0);
     EXPECT_EQ(injector.delivered(), 5U);
 }
@@ -126,7 +126,7 @@ TEST(Injector, StampsWithTheLoopsClock) {
     }
 }
 
-TEST(Injector, RefusesWhatIsNoMessageAndKeepsTheLastOne) {
+TEST(Injector, RejectsInvalidMessagesAndKeepsTheLastOne) {
     Injector injector("/x", typeInfo<double>());
     deliver(injector, 1.0);
     const std::vector<std::uint8_t> few(3);
@@ -137,7 +137,7 @@ TEST(Injector, RefusesWhatIsNoMessageAndKeepsTheLastOne) {
     EXPECT_EQ(front(injector), 1.0);
 }
 
-// Values of two numbers that belong together: neither thread ever sees half of one.
+// Values of two equal numbers: neither thread may see them differ.
 TEST(Injector, IsNeverTornBetweenTwoThreads) {
     constexpr int kCount = 100'000;
     Injector injector("/x", typeInfo<std_msgs::String>());

@@ -18,7 +18,7 @@ namespace rtcf::test {
 struct Words {
     std::uint32_t letters = 0;
 };
-// The thread that calls the conversion; it may also throw, or be none.
+// Records the thread that calls the conversion; can also throw, or have no message.
 struct WordsOnRos {
     static const char* name() { return "Words"; }
     static void toMessage(const Words& value, std_msgs::String& message) {
@@ -75,7 +75,7 @@ TEST(Tap, PassesEachWrittenValueOnce) {
     EXPECT_FALSE(tap.pop([](const std::uint8_t*, std::uint32_t, std::int64_t) {}));
 }
 
-TEST(Tap, TellsTheStampOfTheCycleThatWroteAValue) {
+TEST(Tap, HasTheStampOfTheCycleThatWroteAValue) {
     const auto slot = std::make_shared<Slot<double>>();
     Tap tap("/x", typeInfo<double>(), slot, 64);
     for (std::int64_t stamp = 1'700'000'000'000'000'000; stamp < 1'700'000'000'000'000'020;
@@ -89,8 +89,8 @@ TEST(Tap, TellsTheStampOfTheCycleThatWroteAValue) {
     }
 }
 
-// Which allocates: the cycle copies the value alone.
-TEST(Tap, BuildsMessagesWhereTheyAreTaken) {
+// Building a message allocates; the cycle only copies the value.
+TEST(Tap, BuildsMessagesInTheReadersThread) {
     const auto slot = std::make_shared<Slot<Words>>();
     Tap tap("/x", typeInfo<Words>(), slot, 1024, 64);
     WordsOnRos::converted_by = {};
@@ -131,8 +131,8 @@ TEST(Tap, CountsMessagesThatCannotBeBuilt) {
     EXPECT_EQ(tap.tooLarge(), 1U);
 }
 
-// A topic that is closed and opened again: the old reader has not gone yet.
-TEST(Tap, OfTwoReadersAtOnceOneFindsNothing) {
+// A topic that is closed and reopened while its old reader still exists.
+TEST(Tap, OneOfTwoSimultaneousReadersFindsNothing) {
     const auto slot = std::make_shared<Slot<double>>();
     Tap tap("/x", typeInfo<double>(), slot, 1024);
     for (const double value : {1.0, 2.0}) {
@@ -148,7 +148,7 @@ TEST(Tap, OfTwoReadersAtOnceOneFindsNothing) {
     EXPECT_EQ(takeAll(tap), std::vector<double>{2.0});
 }
 
-TEST(Tap, TakesTheFirstValueAndThenEachNth) {
+TEST(Tap, PassesTheFirstValueAndThenEachNth) {
     const auto slot = std::make_shared<Slot<double>>();
     Tap tap("/x", typeInfo<double>(), slot, 1024);
     tap.setDecimation(3);
@@ -164,11 +164,11 @@ TEST(Tap, TakesTheFirstValueAndThenEachNth) {
     EXPECT_EQ(tap.dropped(), 0U);
 }
 
-TEST(Tap, CountsWhatIsLargerThanAllowed) {
+TEST(Tap, CountsValuesAboveTheLimit) {
     const auto slot = std::make_shared<Slot<std_msgs::String>>();
     Tap tap("/x", typeInfo<std_msgs::String>(), slot, 1024, 104);
     std_msgs::String text;
-    text.data.assign(100, 'x');  // and its length, 4 bytes
+    text.data.assign(100, 'x');  // plus its length, 4 bytes
     write(slot, text);
     tap.push(0);
     EXPECT_EQ(tap.tooLarge(), 0U);
@@ -182,7 +182,7 @@ TEST(Tap, CountsWhatIsLargerThanAllowed) {
     EXPECT_FALSE(tap.pop([](const std::uint8_t*, std::uint32_t, std::int64_t) {}));
 }
 
-TEST(Tap, GoesOnWhereItsRingEnds) {
+TEST(Tap, WrapsAroundAtTheEndOfItsRing) {
     for (const std::size_t capacity : {32, 40, 48, 56, 104}) {
         const auto slot = std::make_shared<Slot<double>>();
         Tap tap("/x", typeInfo<double>(), slot, capacity);
@@ -210,7 +210,7 @@ TEST(Tap, FullRingDropsTheNewestAndCounts) {
     EXPECT_EQ(takeAll(tap), std::vector<double>{8.0});
 }
 
-TEST(Tap, RingTooSmallForAValueIsMadeLargeEnough) {
+TEST(Tap, RingTooSmallForAValueIsEnlarged) {
     const auto slot = std::make_shared<Slot<double>>();
     Tap tap("/x", typeInfo<double>(), slot, 1);
     write(slot, 1.0);
@@ -233,7 +233,7 @@ TEST(Tap, ValueLargerThanTheRingIsDroppedAndCounted) {
         [](const std::uint8_t*, std::uint32_t size, std::int64_t) { EXPECT_EQ(size, 9U); }));
 }
 
-TEST(Tap, ValuesOfAllLengthsComeOutAsTheyWentIn) {
+TEST(Tap, ValuesOfAllLengthsAreUnchanged) {
     const auto slot = std::make_shared<Slot<std_msgs::String>>();
     Tap tap("/x", typeInfo<std_msgs::String>(), slot, 256);
     for (std::size_t length = 0; length < 500; ++length) {
@@ -250,7 +250,7 @@ TEST(Tap, ValuesOfAllLengthsComeOutAsTheyWentIn) {
     EXPECT_EQ(tap.dropped(), 0U);
 }
 
-TEST(Tap, ConsumerInAnotherThreadGetsAllThatWasNotDropped) {
+TEST(Tap, ConsumerInAnotherThreadGetsAllValuesNotDropped) {
     constexpr int kCount = 100'000;
     const auto slot = std::make_shared<Slot<double>>();
     Tap tap("/x", typeInfo<double>(), slot, 1000);

@@ -16,8 +16,8 @@
 namespace rtcf::executor {
 namespace {
 
-// What another process finds in the file: sequence, words' offset, frames, words of each, layout's
-// offset and bytes; of each ring.
+// An entry of the file as another process reads it, per ring: sequence, offset of the words,
+// frames, words per frame, offset and bytes of the layout.
 using Entry = std::array<std::uint64_t, 6>;
 
 std::vector<Entry> entriesOf(const FrameMemory& memory) {
@@ -39,7 +39,7 @@ std::shared_ptr<FrameRing> ringIn(FrameMemory& memory, const double& value,
     return ring;
 }
 
-TEST(FrameMemory, HasFramesWhereItsFileSaysThatTheyAre) {
+TEST(FrameMemory, HasFramesAtTheOffsetsInItsFile) {
     FrameMemory memory;
     double value = 2.5;
     const auto ring = ringIn(memory, value, "layout");
@@ -51,7 +51,7 @@ TEST(FrameMemory, HasFramesWhereItsFileSaysThatTheyAre) {
     EXPECT_EQ(frames, ring->capacity());
     std::vector<std::uint64_t> frame(words);
     ASSERT_GT(::pread(memory.fd(), frame.data(), words * 8, static_cast<off_t>(offset)), 0);
-    EXPECT_EQ(frame[0], 2) << "whole, and the first one";
+    EXPECT_EQ(frame[0], 2) << "the first frame is complete";
     EXPECT_EQ(frame[1], 7);
     const std::size_t head = words - ring->wordsOfValues();
     EXPECT_EQ(frame[head + ring->offset(0) / 8], 0x4004000000000000) << "2.5";
@@ -61,7 +61,7 @@ TEST(FrameMemory, HasFramesWhereItsFileSaysThatTheyAre) {
     EXPECT_EQ(layout, "layout");
 }
 
-TEST(FrameMemory, KeepsTheRingsOfGraphsBefore) {
+TEST(FrameMemory, KeepsTheRingsOfEarlierGraphs) {
     FrameMemory memory;
     const double value = 0.0;
     for (std::size_t i = 0; i < 3 * FrameMemory::kRings; ++i) (void)ringIn(memory, value, "x");
@@ -70,24 +70,24 @@ TEST(FrameMemory, KeepsTheRingsOfGraphsBefore) {
     std::uint64_t newest = 0;
     for (const Entry& entry : entries) {
         newest = std::max(newest, entry[0]);
-        EXPECT_GT(entry[0], 2 * FrameMemory::kRings) << "the oldest ones go";
+        EXPECT_GT(entry[0], 2 * FrameMemory::kRings) << "the oldest rings are removed";
     }
     EXPECT_EQ(newest, 3 * FrameMemory::kRings);
 }
 
-TEST(FrameMemory, HasRoomAgainAfterRingsWhoseLayoutFoundNone) {
+TEST(FrameMemory, HasRoomAgainAfterRingsWithoutRoomForTheirLayout) {
     FrameMemory memory;
     const double value = 0.0;
     const std::string endless(FrameMemory::kMost + 1, 'x');
     constexpr std::size_t kSmallest = 4096;  // bytes of a block
     for (std::size_t i = 0; i < 2 * FrameMemory::kMost / kSmallest; ++i)
         ASSERT_NE(ringIn(memory, value, endless)->block(), nullptr) << i;
-    EXPECT_TRUE(entriesOf(memory).empty()) << "nobody knows what is in them";
+    EXPECT_TRUE(entriesOf(memory).empty()) << "rings without a layout are useless";
     const auto last = ringIn(memory, value, "known");
     EXPECT_EQ(entriesOf(memory).size(), 1U);
 }
 
-TEST(FrameMemory, TakesNoRingFromWhoStillReadsIt) {
+TEST(FrameMemory, ReusesNoRingThatIsStillRead) {
     FrameMemory memory;
     const double value = 0.0;
     const auto read = ringIn(memory, value, "read");
@@ -108,11 +108,11 @@ TEST(FrameMemory, IsBoundedInBytes) {
         if (held.back() != nullptr) bytes += held.back()->bytes();
     }
     EXPECT_LE(bytes, FrameMemory::kMost);
-    EXPECT_EQ(held.back(), nullptr) << "others have all the room";
+    EXPECT_EQ(held.back(), nullptr) << "the other rings use all of the memory";
     held.pop_back();
 }
 
-TEST(FrameMemory, GivesARingWithoutRoomOneOfTheProcess) {
+TEST(FrameMemory, UsesProcessMemoryForARingWithoutRoom) {
     FrameMemory memory;
     std::vector<std::shared_ptr<FrameBlock>> held;
     while (auto block = memory.take(4096)) {
@@ -129,13 +129,13 @@ TEST(FrameMemory, GivesARingWithoutRoomOneOfTheProcess) {
     EXPECT_EQ(frame.cycle().iteration, 3);
 }
 
-TEST(FrameMemory, GivesAClearedBlock) {
+TEST(FrameMemory, ReturnsAClearedBlock) {
     FrameMemory memory;
     const double value = 1.0;
     for (std::size_t i = 0; i < 3 * FrameMemory::kRings; ++i) {
         const auto ring = ringIn(memory, value, "x");
         Frame frame;
-        ASSERT_FALSE(ring->read(0, frame)) << "of a ring before";
+        ASSERT_FALSE(ring->read(0, frame)) << "the block has frames of an earlier ring";
         for (std::uint64_t cycle = 0; cycle < 40; ++cycle) {
             ring->take();
             ring->commit({cycle, 0, 0, 0}, false);

@@ -60,10 +60,10 @@ TEST(FrameRing, HasEachValueOfEachCycle) {
         EXPECT_EQ(valueAt<bool>(frame, ring.offset(1)), i % 2 == 1);
         EXPECT_EQ(valueAt<std::uint8_t>(frame, ring.offset(2) + 10), i);
     }
-    EXPECT_FALSE(ring.read(10, frame)) << "it has not been";
+    EXPECT_FALSE(ring.read(10, frame)) << "the cycle has not run yet";
 }
 
-// Each size has its way: words are gathered, what is larger or odd is not.
+// Each size has its own path: words are gathered, larger or odd sizes are not.
 TEST(FrameRing, HasValuesOfAllSizes) {
     constexpr std::size_t kMost = 70;  // bytes
     std::vector<std::vector<std::uint8_t>> values;
@@ -91,7 +91,7 @@ TEST(FrameRing, HasValuesOfAllSizes) {
     }
 }
 
-TEST(FrameRing, KnowsWhichFramesHaveGone) {
+TEST(FrameRing, KnowsWhichFramesAreOverwritten) {
     double number = 0.0;
     FrameRing ring({{&number, sizeof number}}, 16);
     ASSERT_EQ(ring.capacity(), 16);
@@ -102,7 +102,7 @@ TEST(FrameRing, KnowsWhichFramesHaveGone) {
     EXPECT_EQ(frame.cycle().iteration, 24);
 }
 
-TEST(FrameRing, SaysWhichCycleWasTheLastOfItsLoop) {
+TEST(FrameRing, MarksTheLastCycleOfItsLoop) {
     FrameRing ring({}, 16);
     fill(ring, 0);
     ring.take();
@@ -121,8 +121,8 @@ TEST(FrameRing, IsBoundedInBytes) {
     EXPECT_GE(ring.capacity(), FrameRing::kFewestFrames);
 }
 
-// All words of a frame are the same number; a torn one would have two.
-TEST(FrameRing, GivesNoReaderATornFrame) {
+// All words of a frame are equal; a torn frame would have two different ones.
+TEST(FrameRing, NoReaderSeesATornFrame) {
     std::array<std::uint64_t, 32> values{};
     FrameRing ring({{values.data(), sizeof values}}, 16);
     std::atomic<bool> done{false};
@@ -148,7 +148,7 @@ TEST(FrameRing, GivesNoReaderATornFrame) {
         }
     }
     writer.join();
-    EXPECT_GE(whole, ring.capacity()) << "at least what was there at the end";
+    EXPECT_GE(whole, ring.capacity()) << "at least the frames in the ring at the end";
 }
 
 }  // namespace

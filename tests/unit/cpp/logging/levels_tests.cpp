@@ -26,7 +26,7 @@ TEST(LogLevels, AreTheNearestAncestors) {
     EXPECT_EQ(levels.of("elsewhere"), LogLevel::Warn);
 }
 
-TEST(LogLevels, AreThoseOfRtcf2021sNamesToo) {
+TEST(LogLevels, ApplyToRtcf2021sNames) {
     LogLevels levels;
     levels.set("ros.rtcf./arm/H1", LogLevel::Debug);
     EXPECT_EQ(levels.of("ros.rtcf.arm.H1"), LogLevel::Debug);
@@ -35,7 +35,7 @@ TEST(LogLevels, AreThoseOfRtcf2021sNamesToo) {
     EXPECT_EQ(levels.all().count("ros.rtcf./arm/H1"), 0U);
 }
 
-TEST(LogLevels, ReachComponentsAtOnce) {
+TEST(LogLevels, ApplyImmediately) {
     LogLevels levels;
     std::atomic<LogLevel> one{LogLevel::Fatal};
     std::atomic<LogLevel> other{LogLevel::Fatal};
@@ -51,14 +51,14 @@ TEST(LogLevels, ReachComponentsAtOnce) {
     levels.set("ros.rtcf.one", LogLevel::Fatal);
     EXPECT_EQ(one, LogLevel::Debug);
     EXPECT_EQ(other, LogLevel::Error);
-    // A component that comes later has what was set before.
+    // A later component gets the level that was set before.
     levels.attach("/one", one);
     EXPECT_EQ(one, LogLevel::Fatal);
     levels.detach(one);
     levels.detach(other);
 }
 
-TEST(LogLevels, TellOfAllLoggersThatWereNamed) {
+TEST(LogLevels, ListAllNamedLoggers) {
     LogLevels levels;
     std::atomic<LogLevel> level{LogLevel::Info};
     levels.attach("/H1", level);

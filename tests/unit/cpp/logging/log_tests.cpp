@@ -36,7 +36,7 @@ TEST_F(LogTest, KeepsTheOrderOfOneThread) {
         EXPECT_EQ(entries[static_cast<std::size_t>(i)].message, std::to_string(i));
 }
 
-TEST_F(LogTest, RecordsThatFindItFullAreCountedAndReportedOnce) {
+TEST_F(LogTest, DroppedRecordsAreCountedAndReportedOnce) {
     BareComponent* self = &component;
     for (int i = 0; i < 1030; ++i) RTCF_INFO(self, "{}", i);
     EXPECT_EQ(log.dropped(), 6U);
@@ -51,7 +51,7 @@ TEST_F(LogTest, RecordsThatFindItFullAreCountedAndReportedOnce) {
     EXPECT_EQ(entries.size(), 1U);
 }
 
-TEST_F(LogTest, NotesIterationAndThread) {
+TEST_F(LogTest, RecordsIterationAndThread) {
     BareComponent* self = &component;
     const std::atomic<std::uint64_t> iteration{42};
     log.setIteration(&iteration);
@@ -65,14 +65,14 @@ TEST_F(LogTest, NotesIterationAndThread) {
     EXPECT_EQ(entries[0].iteration, 42U);
 }
 
-TEST_F(LogTest, OwnRecordGoesToTheConsumerAtOnce) {
+TEST_F(LogTest, OwnRecordGoesToTheConsumerImmediately) {
     log.write(LogLevel::Error, "/H1", "text");
     ASSERT_EQ(entries.size(), 1U);
     EXPECT_EQ(entries[0].message, "text");
     EXPECT_EQ(entries[0].component, "/H1");
 }
 
-TEST_F(LogTest, TakesRecordsOfManyThreadsAtOnce) {
+TEST_F(LogTest, AcceptsRecordsOfManyThreadsAtOnce) {
     constexpr int kThreads = 4;
     constexpr int kEach = 5000;
     std::atomic<int> running{kThreads};
@@ -91,7 +91,7 @@ TEST_F(LogTest, TakesRecordsOfManyThreadsAtOnce) {
     std::map<int, int> last;
     std::uint64_t seen = 0;
     for (const LogEntry& entry : entries) {
-        if (entry.component.empty()) continue;  // a report of lost records
+        if (entry.component.empty()) continue;  // a report of dropped records
         int id = 0;
         int number = 0;
         ASSERT_TRUE(std::istringstream(entry.message) >> id >> number) << entry.message;
@@ -104,7 +104,7 @@ TEST_F(LogTest, TakesRecordsOfManyThreadsAtOnce) {
     EXPECT_EQ(seen + log.dropped(), std::uint64_t{kThreads * kEach});
 }
 
-TEST_F(LogTest, AFloodOfOneLineIsLeftOutAndCounted) {
+TEST_F(LogTest, AFloodOfOneLineIsSuppressedAndCounted) {
     log.setLimit(10);
     BareComponent* self = &component;
     for (int i = 0; i < 997; ++i) RTCF_INFO(self, "flood {}", i);
@@ -118,7 +118,7 @@ TEST_F(LogTest, AFloodOfOneLineIsLeftOutAndCounted) {
     EXPECT_EQ(entries[11].component, entries[0].component);
 }
 
-TEST(LogLimit, BeginsAnewAfterASecondAndKeepsComponentsApart) {
+TEST(LogLimit, RestartsAfterASecondSeparatelyForEachComponent) {
     constexpr std::int64_t kSecond = 1'000'000'000;
     executor::LogLimit limit;
     limit.set(1);

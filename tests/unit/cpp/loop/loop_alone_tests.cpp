@@ -1,4 +1,4 @@
-// A loop and one component, without a runner: what is done in the middle of a cycle.
+// A loop with one component, without a runner: events in the middle of a cycle.
 #include <gtest/gtest.h>
 
 #include <cstdint>
@@ -23,7 +23,7 @@ using namespace executor;
 
 class LoopAlone : public ::testing::Test {
    protected:
-    // Does in each cycle what the test says.
+    // Runs the test's function in each cycle.
     class Worker final : public Component {
        public:
         explicit Worker(std::function<void(std::uint64_t)> work) : work_(std::move(work)) {}
@@ -53,7 +53,7 @@ class LoopAlone : public ::testing::Test {
         loop_.start(settings_, loop_.stops());
     }
 
-    // What the test's own objects are used for has ended then.
+    // After this, the test's objects are no longer used.
     void stop() {
         loop_.requestStop();
         EXPECT_TRUE(eventually([this] { return loop_.join(0); }));
@@ -81,10 +81,10 @@ class LoopAlone : public ::testing::Test {
     std::unique_ptr<Worker> worker_;
 };
 
-// Amid a cycle. The counter goes on or begins anew, CLOCK_MONOTONIC stands still.
+// During a cycle. The counter continues or restarts, CLOCK_MONOTONIC stands still.
 class LoopSuspended : public LoopAlone, public ::testing::WithParamInterface<std::int64_t> {};
 
-TEST_P(LoopSuspended, ASuspendNeitherHoldsNorStallsTheLoop) {
+TEST_P(LoopSuspended, ASuspendNeitherStopsNorStallsTheLoop) {
     if (!ShiftedCounter::possible()) GTEST_SKIP() << "the counter cannot be trapped here";
     constexpr std::int64_t kSlept = 5;  // s
     constexpr std::uint64_t kAt = 50;
@@ -95,13 +95,13 @@ TEST_P(LoopSuspended, ASuspendNeitherHoldsNorStallsTheLoop) {
     });
     ASSERT_TRUE(reaches(kAt + 100));
     EXPECT_LT(loop_.figures().missed.load(), static_cast<std::uint64_t>(kSlept) * 1000)
-        << "cycles that did not run for as long as the machine slept";
+        << "cycles missed during the suspend";
     stop();
 }
 
 INSTANTIATE_TEST_SUITE_P(LoopAlone, LoopSuspended, ::testing::Values(1, -1));
 
-// Here, as a runner lets it be full only where nothing is missing for real time.
+// Tested here, since a runner stops its loop for this only with full real-time rights.
 TEST_F(LoopAlone, FullBucketEndsTheLoop) {
     settings_.max_overruns = 3;
     start([](std::uint64_t iteration) {
@@ -121,8 +121,8 @@ TEST_F(LoopAlone, BucketOfNoSizeIsNeverFull) {
     stop();
 }
 
-// Copies that take longer than the cycle may.
-TEST_F(LoopAlone, FramesAreACauseOfOverrunsOfTheirOwn) {
+// Copies of frames that exceed the cycle.
+TEST_F(LoopAlone, FramesAreASeparateCauseOfOverruns) {
     std::vector<std::uint8_t> large(4 * 1024 * 1024);
     FrameRing ring({{large.data(), large.size()}}, 16);
     frames_ = &ring;
@@ -132,7 +132,7 @@ TEST_F(LoopAlone, FramesAreACauseOfOverrunsOfTheirOwn) {
     stop();
     const LoopFigures& figures = loop_.figures();
     EXPECT_GE(figures.frame_overruns.value(), 20U);
-    // A cycle that is held up elsewhere has a cause of its own.
+    // A cycle delayed elsewhere has another cause.
     EXPECT_EQ(figures.frame_overruns.value() + figures.exchange_overruns.value() +
                   figures.late_wake_ups.value() + component_.overruns.load(),
               figures.overruns.load());

@@ -1,5 +1,5 @@
-// What a loop does when a cycle takes too long. No times are asserted here, only
-// what the counters must say of a cycle that took 6 ms of 1 ms.
+// A loop with cycles that take too long. The tests assert no times, only the counters
+// after a cycle that took 6 ms instead of 1 ms.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -16,8 +16,7 @@ using executor::OverrunPolicy;
 
 class LoopTiming : public RunnerFixture {
    protected:
-    // Runs a loop in which `cycles` cycles take 6 ms, and stops it some time after, in cycle
-    // `until`.
+    // Runs a loop in which `cycles` cycles take 6 ms, and stops it later, in cycle `until`.
     void overrun(OverrunPolicy policy, std::int64_t cycles = 1, std::int64_t busy_us = 6000,
                  std::uint64_t until = 60) {
         configure([policy](RunnerSettings& settings) { settings.loop.overrun = policy; });
@@ -38,11 +37,11 @@ class LoopTiming : public RunnerFixture {
         }
         return lines;
     }
-    // What elapsed() added up to, in periods.
+    // The sum of elapsed(), in periods.
     double periods() { return value("/S", "periods"); }
 };
 
-TEST_F(LoopTiming, SkipDropsTheMissedCyclesAndTellsTheNextOne) {
+TEST_F(LoopTiming, SkipDropsMissedCyclesAndCountsThemInElapsed) {
     overrun(OverrunPolicy::Skip);
     EXPECT_GE(overruns(), 1U);
     EXPECT_GE(missed(), 5U);
@@ -59,7 +58,7 @@ TEST_F(LoopTiming, CatchUpDropsNothing) {
     EXPECT_EQ(periods(), static_cast<double>(iteration()));
 }
 
-// As after a freeze: 500 cycles are missed at once.
+// As after a freeze: 500 cycles are missed together.
 TEST_F(LoopTiming, CatchUpRunsNoMoreThanAHundredCyclesInARow) {
     configure([](RunnerSettings& settings) { settings.loop.warmup_cycles = 0; });
     overrun(OverrunPolicy::CatchUp, 1, 500'000, 200);
@@ -69,7 +68,7 @@ TEST_F(LoopTiming, CatchUpRunsNoMoreThanAHundredCyclesInARow) {
     EXPECT_LE(periods(), static_cast<double>(iteration() + missed()));
 }
 
-TEST_F(LoopTiming, RelativeBeginsThePeriodAnew) {
+TEST_F(LoopTiming, RelativeRestartsThePeriod) {
     overrun(OverrunPolicy::Relative);
     EXPECT_GE(overruns(), 1U);
     EXPECT_EQ(missed(), 0U);
@@ -83,7 +82,7 @@ TEST_F(LoopTiming, OverrunIsCountedForTheComponentThatWasRunning) {
     EXPECT_GE(runner().snapshot()->get("/S").figures->overruns.load(), 1U);
 }
 
-TEST_F(LoopTiming, WhatAChangeTakesIsNoComponentsOverrun) {
+TEST_F(LoopTiming, AChangesDurationIsNoComponentsOverrun) {
     load(definition("Ticker", "A"));
     ComponentDefinition relay = definition("Relay", "B");
     relay.remaps = {{"out", "B_out"}};
@@ -95,8 +94,8 @@ TEST_F(LoopTiming, WhatAChangeTakesIsNoComponentsOverrun) {
     EXPECT_GE(runner().loop().figures().exchange_overruns.value(), 1U);
 }
 
-// The process is held for a while between two cycles, as by a hypervisor.
-TEST_F(LoopTiming, LateWakeUpIsACauseOfItsOwn) {
+// The process is stopped between two cycles, as by a hypervisor.
+TEST_F(LoopTiming, LateWakeUpIsASeparateCause) {
     load(definition("Ticker", "A"));
     start();
     ASSERT_TRUE(runs());
@@ -113,11 +112,11 @@ TEST_F(LoopTiming, LateWakeUpIsACauseOfItsOwn) {
         waitpid(helper, nullptr, 0);
         return runs(2) && late() > 0;
     }));
-    stop();  // figures that do not change between one look and the next
+    stop();  // statistics that no longer change
     EXPECT_LE(late() + runner().snapshot()->get("/A").figures->overruns.load(), overruns());
 }
 
-// Where anything is missing for real time a loop is not to blame for being late.
+// Without full real-time rights a loop is not blamed for being late.
 TEST_F(LoopTiming, FullBucketStopsTheLoopUnlessItRunsDegraded) {
     configure([](RunnerSettings& settings) { settings.loop.max_overruns = 3; });
     ComponentDefinition spinner = definition("Spinner", "S");
@@ -146,9 +145,9 @@ TEST_F(LoopTiming, ManyOverrunsAreOneLine) {
     overrun(OverrunPolicy::Skip, 30);
     ASSERT_GE(overruns(), 30U);
     const std::vector<std::string> lines = linesOnOverruns();
-    ASSERT_LE(lines.size(), 2U) << "the first one, and what came after it at the end of the loop";
+    ASSERT_LE(lines.size(), 2U) << "the first overrun, and the rest at the end of the loop";
     EXPECT_NE(lines.back().find("ended late"), std::string::npos) << lines.back();
-    // Of the two, one may tell of nothing but cycles that the machine was late with.
+    // One of the two lines may report only cycles delayed by the machine.
     EXPECT_TRUE(std::any_of(lines.begin(), lines.end(), [](const std::string& line) {
         return line.find("in /S") != std::string::npos;
     })) << lines.front();
@@ -160,7 +159,7 @@ TEST_F(LoopTiming, SpinFollowsTheWakeUpLatencyUpToATenthOfThePeriod) {
     start();
     ASSERT_TRUE(eventually([this] { return runner().picture().settings.loop.spin_ns > 0; }));
     EXPECT_LE(runner().picture().settings.loop.spin_ns, 100'000);
-    // What it has chosen is no setting that others could contradict.
+    // The chosen value is not a setting that could conflict with others.
     configure([](RunnerSettings& settings) { settings.frequency_hz = 20000.0; });
     ASSERT_TRUE(runs());
     EXPECT_LE(runner().picture().settings.loop.spin_ns, 5'000);
@@ -168,7 +167,7 @@ TEST_F(LoopTiming, SpinFollowsTheWakeUpLatencyUpToATenthOfThePeriod) {
     EXPECT_EQ(runner().picture().settings.loop.spin_ns, 0);
 }
 
-TEST_F(LoopTiming, EveryCycleIsInTheFigures) {
+TEST_F(LoopTiming, EveryCycleIsInTheStatistics) {
     configure([](RunnerSettings& settings) { settings.loop.warmup_cycles = 0; });
     load(definition("Ticker", "A"));
     start();
@@ -180,7 +179,7 @@ TEST_F(LoopTiming, EveryCycleIsInTheFigures) {
     EXPECT_EQ(runner().snapshot()->get("/A").figures->duration.snapshot().count, iteration());
 }
 
-TEST_F(LoopTiming, WarmUpIsNotInTheFigures) {
+TEST_F(LoopTiming, WarmUpIsNotInTheStatistics) {
     configure([](RunnerSettings& settings) { settings.loop.warmup_cycles = 10; });
     load(definition("Ticker", "A"));
     start();

@@ -1,4 +1,4 @@
-// A look at ports costs no cycle more than it can spare.
+// A query of port values takes a limited part of each cycle.
 #include "loop/probe.hpp"
 
 #include <gtest/gtest.h>
@@ -30,7 +30,7 @@ class ProbeTest : public ::testing::Test {
     ProbeTest() {
         for (const OutputBase* output : component_.outputs()) probe_.add(*output);
     }
-    // Boundaries that it takes.
+    // The number of boundaries used.
     int boundaries(std::int64_t period_ns) {
         LoopClock clock;
         clock.period_ns = period_ns;
@@ -49,7 +49,7 @@ TEST_F(ProbeTest, IsSpreadOverTheCyclesOfAFastLoop) {
     EXPECT_NE(probe_.value(2).text.value_or("").find("xxx"), std::string::npos);
 }
 
-TEST_F(ProbeTest, IsOneLookAtASlowLoop) { EXPECT_EQ(boundaries(100'000'000), 1); }
+TEST_F(ProbeTest, IsASingleStepInASlowLoop) { EXPECT_EQ(boundaries(100'000'000), 1); }
 
 TEST_F(ProbeTest, LargeValuesAreNotCopied) {
     boundaries(500'000);

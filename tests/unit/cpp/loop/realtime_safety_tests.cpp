@@ -1,5 +1,5 @@
-// Only in a build with RealtimeSanitizer, which ends the program at the first
-// call in the cycle that may block: allocation, lock, system call.
+// Only in a build with RealtimeSanitizer, which ends the program at the first call in
+// the cycle that may block: allocation, lock, system call.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -26,7 +26,7 @@ class RealtimeSafety : public RunnerFixture {
     }
 };
 
-TEST_F(RealtimeSafety, Fig1WithTopicsLogsAndHotSwapsBreaksNoRule) {
+TEST_F(RealtimeSafety, Fig1WithTopicsLogsAndHotSwapsIsSafe) {
     loadFig1();
     configure([](RunnerSettings& settings) {
         settings.whitelist = ".*R3_G2H1|.*R1_H1R2|.*G2_R2|/T_out";
@@ -58,7 +58,7 @@ TEST_F(RealtimeSafety, Fig1WithTopicsLogsAndHotSwapsBreaksNoRule) {
     EXPECT_EQ(state(), RunnerState::Stopped);
 }
 
-TEST_F(RealtimeSafety, QueuesBreakNoRule) {
+TEST_F(RealtimeSafety, QueuesAreSafe) {
     configure([](RunnerSettings& settings) { settings.whitelist = "/texts"; });
     load(definition("Digits", "D"));
     ComponentDefinition collector = definition("Collector", "C");
@@ -79,8 +79,8 @@ TEST_F(RealtimeSafety, QueuesBreakNoRule) {
     EXPECT_EQ(value("/C", "letters"), letters);
 }
 
-// Messages of types of a component's own have arrays, the values have none.
-TEST_F(RealtimeSafety, MappedTypesOfVariableSizeBreakNoRule) {
+// Messages of a component's own types have arrays, the values do not.
+TEST_F(RealtimeSafety, MappedTypesOfVariableSizeAreSafe) {
     configure([](RunnerSettings& settings) { settings.whitelist = "/scan|/in"; });
     load(definition("Scanner", "S"));
     ComponentDefinition late = definition("Scanner", "L");
@@ -100,13 +100,13 @@ TEST_F(RealtimeSafety, MappedTypesOfVariableSizeBreakNoRule) {
     EXPECT_EQ(state(), RunnerState::Stopped);
 }
 
-TEST_F(RealtimeSafety, SteppedCyclesBreakNoRule) {
+TEST_F(RealtimeSafety, SteppedCyclesAreSafe) {
     loadFig1();
     step(5000);
     EXPECT_EQ(iteration(), 5000U);
 }
 
-TEST_F(RealtimeSafety, ComponentThatAllocatesIsCaught) {
+TEST_F(RealtimeSafety, AllocatingComponentIsCaught) {
     GTEST_FLAG_SET(death_test_style, "threadsafe");
     EXPECT_DEATH(
         {

@@ -1,4 +1,4 @@
-// How many cycles the ticks of a simulated clock make, and at which times.
+// The number and the times of cycles for the ticks of a simulated clock.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -18,7 +18,7 @@ using Times = std::vector<std::int64_t>;
 constexpr std::int64_t kMillisecond = 1'000'000;
 constexpr std::int64_t kNoJump = INT64_MAX;
 
-// All cycles that are due by the ticks so far.
+// All cycles due for the ticks so far.
 Times due(SimulatedClock& clock, std::int64_t period) {
     Times times;
     while (const auto time = clock.next(period, std::chrono::milliseconds(0)))
@@ -38,7 +38,7 @@ TEST(SimulatedClock, BeginsWithOneCycleAtItsFirstTick) {
     EXPECT_FALSE(clock.takeJump());
 }
 
-TEST(SimulatedClock, MakesACycleForEachWholePeriod) {
+TEST(SimulatedClock, RunsACycleForEachWholePeriod) {
     SimulatedClock clock;
     clock.reset(kNoJump);
     clock.tick(100, 0);
@@ -48,11 +48,11 @@ TEST(SimulatedClock, MakesACycleForEachWholePeriod) {
     EXPECT_EQ(due(clock, 10), Times{});
     clock.tick(140, 0);
     EXPECT_EQ(due(clock, 10), Times{140});
-    clock.tick(140, 0);  // a clock that stands still
+    clock.tick(140, 0);  // a stopped clock
     EXPECT_EQ(due(clock, 10), Times{});
 }
 
-TEST(SimulatedClock, LosesNoCycleWhateverTheRateOfTheClock) {
+TEST(SimulatedClock, LosesNoCycleAtAnyRateOfTheClock) {
     constexpr std::int64_t kSpan = 10'000 * kMillisecond;
     for (const std::int64_t rate : {100, 999, 1001, 7}) {
         SimulatedClock clock;
@@ -66,7 +66,7 @@ TEST(SimulatedClock, LosesNoCycleWhateverTheRateOfTheClock) {
     }
 }
 
-TEST(SimulatedClock, GoesOnFromAJumpWithOneCycle) {
+TEST(SimulatedClock, ContinuesAfterAJumpWithOneCycle) {
     SimulatedClock clock;
     clock.reset(100);
     clock.tick(1000, 0);
@@ -83,7 +83,7 @@ TEST(SimulatedClock, GoesOnFromAJumpWithOneCycle) {
     EXPECT_EQ(clock.now(), 75);
 }
 
-TEST(SimulatedClock, ForgetsItsTicksWhenItBeginsAnew) {
+TEST(SimulatedClock, ForgetsItsTicksAtARestart) {
     SimulatedClock clock;
     clock.reset(kNoJump);
     clock.tick(1000, 0);
@@ -93,7 +93,7 @@ TEST(SimulatedClock, ForgetsItsTicksWhenItBeginsAnew) {
     EXPECT_FALSE(clock.now());
 }
 
-TEST(SimulatedClock, SpreadsWhatCameBetweenTwoTicksOverTheirCycles) {
+TEST(SimulatedClock, SpreadsArrivalsBetweenTwoTicksOverTheirCycles) {
     SimulatedClock clock;
     clock.reset(1000);
     const auto arrivals = [&] {
@@ -107,14 +107,14 @@ TEST(SimulatedClock, SpreadsWhatCameBetweenTwoTicksOverTheirCycles) {
     clock.tick(140, 7800);
     EXPECT_EQ(arrivals(), (Times{7200, 7400, 7600, 7800}));
     clock.tick(145, 8000);
-    clock.tick(145, 9000);  // it stands still: nothing that comes meanwhile is of a later time
+    clock.tick(145, 9000);  // it has stopped: arrivals do not get later times
     clock.tick(155, 9100);
     EXPECT_EQ(arrivals(), Times{9050});
-    clock.tick(20, 9500);  // a jump: all that came before it is older
+    clock.tick(20, 9500);  // a jump: earlier arrivals are older
     EXPECT_EQ(arrivals(), Times{9500});
 }
 
-TEST(SimulatedClock, TellsTheRateAtWhichItGoesOnBetweenCycles) {
+TEST(SimulatedClock, KnowsItsRateBetweenCycles) {
     SimulatedClock clock;
     clock.reset(1000);
     using Rates = std::vector<double>;
@@ -125,19 +125,19 @@ TEST(SimulatedClock, TellsTheRateAtWhichItGoesOnBetweenCycles) {
         return all;
     };
     clock.tick(100, 7000);
-    EXPECT_EQ(rates(), Rates{0.0}) << "it begins";
+    EXPECT_EQ(rates(), Rates{0.0}) << "the first tick";
     clock.tick(120, 7040);
     EXPECT_EQ(rates(), (Rates{0.5, 0.5}));
     clock.tick(125, 7050);
-    clock.tick(125, 9000);  // it stands still
+    clock.tick(125, 9000);  // it has stopped
     clock.tick(135, 9010);
-    EXPECT_EQ(rates(), Rates{10.0 / (9005 - 7040)}) << "on the whole";
+    EXPECT_EQ(rates(), Rates{10.0 / (9005 - 7040)}) << "the average rate";
     clock.tick(140, 9010);  // two ticks at once
     EXPECT_EQ(rates(), Rates{10.0 / (9010 - 9005)});
     clock.tick(150, 9010);
-    EXPECT_EQ(rates(), Rates{0.0}) << "nothing can come in no time";
+    EXPECT_EQ(rates(), Rates{0.0}) << "no time has passed";
     clock.tick(20, 9500);
-    EXPECT_EQ(rates(), Rates{0.0}) << "it leapt";
+    EXPECT_EQ(rates(), Rates{0.0}) << "the clock jumped";
     clock.tick(30, 9520);
     EXPECT_EQ(rates(), Rates{0.5});
 }
@@ -149,7 +149,7 @@ class QueueingInjector : public ::testing::Test {
         std::memcpy(bytes.data(), &value, sizeof value);
         injector_.deliver(bytes.data(), sizeof value, arrived_ns);
     }
-    // What a cycle sees; nothing if it is nothing new.
+    // The value that a cycle reads; nothing if it is not new.
     std::optional<double> cycle(std::int64_t arrived_ns, double rate = 0.0) {
         injector_.deliverUntil(arrived_ns, rate);
         if (!injector_.adopt(clock_)) return {};
@@ -160,7 +160,7 @@ class QueueingInjector : public ::testing::Test {
     LoopClock clock_{};
 };
 
-TEST_F(QueueingInjector, GivesEachCycleTheNewestOfItsTime) {
+TEST_F(QueueingInjector, ReturnsTheNewestValueOfEachCyclesTime) {
     injector_.setQueueing(true);
     deliver(1.0, 10);
     deliver(2.0, 15);
@@ -174,7 +174,7 @@ TEST_F(QueueingInjector, GivesEachCycleTheNewestOfItsTime) {
     EXPECT_EQ(injector_.passedOver(), 1);
 }
 
-TEST_F(QueueingInjector, IsNoDelayLineForATopicThatIsFasterThanTheLoop) {
+TEST_F(QueueingInjector, DoesNotDelayATopicFasterThanTheLoop) {
     injector_.setQueueing(true);
     for (int round = 1; round <= 1000; ++round) {
         for (int part = 0; part < 4; ++part) deliver(round + part / 4.0, round * 100 + part);
@@ -183,7 +183,7 @@ TEST_F(QueueingInjector, IsNoDelayLineForATopicThatIsFasterThanTheLoop) {
     EXPECT_EQ(injector_.passedOver(), 3000);
 }
 
-TEST_F(QueueingInjector, ValuesAreAsOldAsTheMessageInSimulatedTime) {
+TEST_F(QueueingInjector, AgeIsThatOfTheMessageInSimulatedTime) {
     const auto time = [&] { return injector_.front()->time_ns; };
     injector_.setQueueing(true);
     deliver(1.0, 50);
@@ -198,15 +198,15 @@ TEST_F(QueueingInjector, ValuesAreAsOldAsTheMessageInSimulatedTime) {
     EXPECT_EQ(time(), 1010 - 3);
     clock_.time_ns = 1020;
     EXPECT_EQ(cycle(120, 0.5), 4.0);
-    EXPECT_EQ(time(), 1020) << "it came with the cycle";
+    EXPECT_EQ(time(), 1020) << "the message arrived with the cycle";
     injector_.setQueueing(false);
     deliver(5.0, 130);
     clock_.time_ns = 1030;
     EXPECT_EQ(cycle(200), 5.0);
-    EXPECT_EQ(time(), 1030) << "in real time it is as old as the cycle that takes it";
+    EXPECT_EQ(time(), 1030) << "in real time its age counts from the cycle that reads it";
 }
 
-TEST_F(QueueingInjector, GivesTheNewestOnceItQueuesNoMore) {
+TEST_F(QueueingInjector, ReturnsTheNewestValueAfterTheQueueIsOff) {
     injector_.setQueueing(true);
     deliver(1.0, 10);
     deliver(2.0, 20);
@@ -220,11 +220,11 @@ TEST_F(QueueingInjector, GivesTheNewestOnceItQueuesNoMore) {
     EXPECT_EQ(injector_.passedOver(), 2);
 }
 
-TEST_F(QueueingInjector, KeepsTheNewestWhileTheClockStands) {
+TEST_F(QueueingInjector, KeepsTheNewestValuesWhileTheClockIsStopped) {
     injector_.setQueueing(true);
     for (int value = 1; value <= 200'000; ++value) deliver(value, value);
     EXPECT_EQ(injector_.passedOver(), 190'000);
-    EXPECT_EQ(cycle(190'001), 190'001.0);  // the oldest that is left
+    EXPECT_EQ(cycle(190'001), 190'001.0);  // the oldest remaining one
     EXPECT_EQ(cycle(300'000), 200'000.0);
 }
 

@@ -1,4 +1,4 @@
-// A component that waits for its device and so paces the loop.
+// A component that waits for its device and thereby paces the loop.
 #include <gtest/gtest.h>
 
 #include <chrono>
@@ -17,7 +17,7 @@ class SourceTest : public RunnerFixture {
         return result;
     }
 
-    // One cycle's worth of the device. @return false if no cycle comes of it
+    // One event of the device. @return false if it causes no cycle
     bool tick() {
         const std::uint64_t before = iteration();
         journal().gate_open.store(true);
@@ -37,12 +37,12 @@ TEST_F(SourceTest, PacesTheLoop) {
         ASSERT_TRUE(tick());
         ASSERT_EQ(value("/D", "out"), static_cast<double>(i));
     }
-    EXPECT_EQ(iteration(), 50U) << "one cycle for each time that it is ready";
+    EXPECT_EQ(iteration(), 50U) << "one cycle per event of the device";
     EXPECT_LT(runner().loop().figures().overruns.load(), 10U)
-        << "waiting for it is none, though the machine may hold up a cycle";
+        << "waiting for the device is no overrun; the machine may delay a cycle";
 }
 
-TEST_F(SourceTest, MissedBeatsAreCountedAndTold) {
+TEST_F(SourceTest, MissedEventsAreCountedAndReported) {
     ComponentDefinition watch = definition("Watch", "W");
     watch.remaps = {{"in", "D_out"}};
     load(watch);
@@ -57,13 +57,13 @@ TEST_F(SourceTest, MissedBeatsAreCountedAndTold) {
     EXPECT_EQ(runner().loop().figures().missed.load(), static_cast<std::uint64_t>(periods) - 1);
 }
 
-TEST_F(SourceTest, LatencyIsHowFarABeatIsOff) {
+TEST_F(SourceTest, LatencyIsTheDeviationOfAnEvent) {
     startSilent();
     for (int i = 0; i < 60; ++i) ASSERT_TRUE(tick());
     const auto latency = runner().loop().figures().latency.snapshot();
     EXPECT_EQ(latency.count, 50U);
     EXPECT_GT(latency.maximum, 0);
-    EXPECT_LE(latency.maximum, 500'000) << "half a period: more is another beat";
+    EXPECT_LE(latency.maximum, 500'000) << "half a period: more would be another event";
 }
 
 TEST_F(SourceTest, ChangesAreAdoptedWhileItIsSilent) {
@@ -95,10 +95,10 @@ TEST_F(SourceTest, ClockPacesTheLoopWithoutIt) {
     load(device("E"));
     const std::uint64_t before = iteration();
     ASSERT_TRUE(tick());
-    EXPECT_LE(iteration(), before + 2) << "and the next one paces it again";
+    EXPECT_LE(iteration(), before + 2) << "the next source paces the loop again";
 }
 
-TEST_F(SourceTest, TwoAreRefusedByName) {
+TEST_F(SourceTest, TwoAreRejectedByName) {
     startSilent();
     const std::string text = refusal([&] { load(device("E")); });
     EXPECT_NE(text.find("/D and /E both pace the loop"), std::string::npos) << text;

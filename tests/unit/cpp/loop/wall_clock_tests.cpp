@@ -1,5 +1,5 @@
-// How far the wall clock is from the loop's: found by clocks that can only be read one after the
-// other, by a thread that others may hold up between the two.
+// The offset of the wall clock from the loop's clock, measured by reading the clocks one after the
+// other, in a thread that may be delayed in between.
 #include <gtest/gtest.h>
 
 #include <cstdint>
@@ -13,13 +13,13 @@ namespace {
 using executor::realtimeOffset;
 
 constexpr std::int64_t kOffset = 1'700'000'000'000'000'000;  // ns
-constexpr std::int64_t kReading = 40;                        // what reading a clock takes, ns
+constexpr std::int64_t kReading = 40;                        // duration of reading a clock, ns
 constexpr std::int64_t kHeldUp = 39'000'000;                 // ns
 
-// Two clocks of one time, which passes as they are read.
+// Two clocks of the same time, which passes while they are read.
 struct Time {
     static inline std::int64_t now = 0;
-    static inline std::deque<std::int64_t> pauses;  // before each reading to come
+    static inline std::deque<std::int64_t> pauses;  // before each coming reading
 
     static std::int64_t pass() {
         now += kReading;
@@ -33,10 +33,10 @@ struct Time {
     static std::int64_t realtime() { return pass() + kOffset; }
 };
 
-TEST(WallClock, OffsetIsThatOfTheUndisturbedReading) {
+TEST(WallClock, OffsetIsFromTheUndisturbedReading) {
     Time::now = 5'000'000'000;
-    // The first is held up between the clocks, the second after them, the third is not, and all
-    // that may follow are.
+    // The first reading is delayed between the clocks, the second after them, the third is not, and
+    // all following ones are.
     Time::pauses = {0, kHeldUp, 0, 0, 0, kHeldUp, 0, 0, 0};
     for (int i = 0; i < 100; ++i) Time::pauses.insert(Time::pauses.end(), {0, kHeldUp, 0});
     EXPECT_EQ(realtimeOffset(Time::monotonic, Time::realtime), kOffset);

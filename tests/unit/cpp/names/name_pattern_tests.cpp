@@ -28,15 +28,15 @@ TEST(NamePattern, MustMatchTheWholeName) {
     EXPECT_FALSE(NamePattern("whitelist", "a").matches("/a"));
 }
 
-TEST(NamePattern, TakesThePapersWhitelist) {
+TEST(NamePattern, AcceptsThePapersWhitelist) {
     const NamePattern pattern("whitelist", ".*R3_G2H1|.*R1_H1R2|.*G2_R2");
     EXPECT_TRUE(pattern.matches("/R3_G2H1"));
     EXPECT_TRUE(pattern.matches("/ns/G2_R2"));
     EXPECT_FALSE(pattern.matches("/R3_G2H1/more"));
 }
 
-// A refusal names what the expression is for, the expression, and what is wrong.
-TEST(NamePattern, BadExpressionIsRefusedWithTheReason) {
+// An error names the setting, the expression and the reason.
+TEST(NamePattern, BadExpressionIsRejectedWithTheReason) {
     const auto refusal = [](const std::string& expression) -> std::string {
         try {
             const NamePattern pattern("ignore of /H1", expression);
@@ -54,9 +54,9 @@ TEST(NamePattern, BadExpressionIsRefusedWithTheReason) {
     EXPECT_NE(refusal("(a").find("not closed"), std::string::npos);
 }
 
-// libstdc++ would recurse once for each character, or try all ways there are: it has a small stack
-// and a loop that waits.
-TEST(NamePattern, LongNamesAndHardExpressionsTakeLittleTimeAndStack) {
+// libstdc++ would recurse once per character, or try all alternatives; the executor's threads have
+// small stacks, and the loop waits.
+TEST(NamePattern, LongNamesAndHardExpressionsNeedLittleTimeAndStack) {
     const std::string name(executor::kLongestName, 'a');
     std::string hard;
     for (int i = 0; i < 200; ++i) hard += "a?";
@@ -70,7 +70,7 @@ TEST(NamePattern, LongNamesAndHardExpressionsTakeLittleTimeAndStack) {
     small.join();
 }
 
-TEST(NamePattern, TooLongExpressionIsRefused) {
+TEST(NamePattern, TooLongExpressionIsRejected) {
     const std::string longest(executor::kLongestPattern, 'a');
     EXPECT_TRUE(NamePattern("whitelist", longest).matches(longest));
     try {

@@ -17,7 +17,7 @@ TEST(Names, RelativeOnesResolveInTheNamespace) {
     EXPECT_EQ(resolveName("foo/bar", "/wg", "/wg/node3"), "/wg/foo/bar");
 }
 
-TEST(Names, AbsoluteOnesStayAsTheyAre) {
+TEST(Names, AbsoluteOnesStayUnchanged) {
     EXPECT_EQ(resolveName("/bar", "/", "/node1"), "/bar");
     EXPECT_EQ(resolveName("/bar", "/wg", "/wg/node2"), "/bar");
 }
@@ -28,7 +28,7 @@ TEST(Names, PrivateOnesResolveBelowTheComponent) {
     EXPECT_EQ(resolveName("~/bar", "/wg", "/wg/node3"), "/wg/node3/bar");
 }
 
-TEST(Names, DoubledAndTrailingSlashesGo) {
+TEST(Names, DoubledAndTrailingSlashesAreRemoved) {
     EXPECT_EQ(resolveName("//a//b/", "/", "/n"), "/a/b");
     EXPECT_EQ(canonicalNamespace("arm//left/"), "/arm/left");
     EXPECT_EQ(canonicalNamespace(""), "/");
@@ -48,19 +48,19 @@ TEST(Names, BaseNamesHaveNoSlashes) {
         EXPECT_FALSE(isBaseName(name)) << name;
 }
 
-TEST(Names, NamespaceThatIsNoNameIsRefused) {
+TEST(Names, InvalidNamespaceIsRejected) {
     for (const char* ns : {"~arm", "left arm", "/a-b"})
         EXPECT_THROW(canonicalNamespace(ns), Refusal) << ns;
 }
 
-TEST(Names, ComponentsAreTakenInTheRoot) {
+TEST(Names, ComponentsResolveInTheRoot) {
     EXPECT_EQ(fullNameOf("H1"), "/H1");
     EXPECT_EQ(fullNameOf("arm/H1"), "/arm/H1");
     EXPECT_EQ(fullNameOf("/arm//H1/"), "/arm/H1");
     for (const char* name : {"", "~H1", "H 1"}) EXPECT_THROW(fullNameOf(name), Refusal) << name;
 }
 
-TEST(Names, ThatAreTooLongAreRefusedWithTheirLength) {
+TEST(Names, ThatAreTooLongAreRejectedWithTheirLength) {
     const std::string longest(kLongestName, 'a');
     EXPECT_EQ(fullNameOf("/" + longest.substr(1)).size(), kLongestName);
     for (const auto& refuse : {std::function<void()>([&] { fullNameOf(longest + "a"); }),
@@ -88,7 +88,7 @@ TEST(MappedName, RemapIsResolvedOnBothSides) {
     EXPECT_EQ(mappedName("in", "/arm", "/arm/pid", {{"in", "left/speed"}}), "/arm/left/speed");
 }
 
-TEST(MappedName, RemapOfAnotherNameDoesNotCount) {
+TEST(MappedName, RemapOfAnotherNameIsIgnored) {
     EXPECT_EQ(mappedName("in", "/arm", "/arm/pid", {{"in1", "speed"}, {"/in", "/x"}, {"~in", "y"}}),
               "/arm/in");
 }
@@ -97,7 +97,7 @@ TEST(MappedName, RemapsDoNotChain) {
     EXPECT_EQ(mappedName("in", "/", "/pid", {{"in", "a"}, {"a", "b"}}), "/a");
 }
 
-TEST(MappedName, LaterRemapOfTheSameNameCounts) {
+TEST(MappedName, LaterRemapOfTheSameNameWins) {
     EXPECT_EQ(mappedName("in", "/", "/pid", {{"in", "a"}, {"/in", "b"}}), "/b");
 }
 

@@ -8,7 +8,7 @@ namespace rtcf::test {
 
 namespace {
 
-// What each row of a graph becomes, and where it goes, under one renaming of the nodes.
+// The new position of each row and node of a graph under one renaming of the nodes.
 struct Renaming {
     std::array<unsigned, kDigraphWidth> to{};
     std::array<Digraph, 1U << kDigraphWidth> row{};
@@ -39,7 +39,7 @@ std::vector<Renaming> renamingsOf(unsigned nodes) {
     return renamings;
 }
 
-// The least of all graphs that differ in the nodes' names only.
+// The smallest of all graphs that differ only in the nodes' names.
 Digraph canonical(Digraph graph, unsigned nodes, const std::vector<Renaming>& renamings) {
     Digraph least = ~Digraph{0};
     for (const Renaming& renaming : renamings)
@@ -54,7 +54,7 @@ std::vector<Digraph> digraphsUpToIsomorphism(unsigned nodes) {
     const std::vector<Digraph> smaller =
         nodes == 1 ? std::vector<Digraph>{0} : digraphsUpToIsomorphism(nodes - 1);
     std::vector<Digraph> found;
-    // Each graph is a smaller one and a node more, joined to the others in some way.
+    // Each graph is a smaller one plus a node, with any edges to the others.
     const unsigned last = nodes - 1;
     for (const Digraph base : smaller) {
         for (unsigned ways = 0; ways < 1U << (2 * last + 1); ++ways) {

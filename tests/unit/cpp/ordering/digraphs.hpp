@@ -19,7 +19,7 @@ inline bool hasEdge(Digraph graph, unsigned from, unsigned to) {
 /// One graph of each isomorphism class of `nodes` (1 to 5) nodes, in ascending order.
 std::vector<Digraph> digraphsUpToIsomorphism(unsigned nodes);
 
-/// Whether the graph has no loop, found by removing nodes that nothing leads to.
+/// Whether the graph has no loop, decided by removing nodes without incoming edges.
 bool isAcyclic(Digraph graph, unsigned nodes);
 
 }  // namespace rtcf::test

@@ -57,7 +57,7 @@ TEST_F(FootprintTest, NamesNoLineTwice) {
     EXPECT_EQ(reinterpret_cast<std::uintptr_t>(lines.front()) % kCacheLine, 0U);
 }
 
-TEST_F(FootprintTest, OfALongChainIsThatOfItsBeginning) {
+TEST_F(FootprintTest, OfALongChainCoversItsStart) {
     std::vector<std::shared_ptr<Instance>> chain;
     for (int i = 0; i < 100; ++i) {
         const std::string name = "m" + std::to_string(i);

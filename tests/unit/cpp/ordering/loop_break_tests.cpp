@@ -1,5 +1,5 @@
-// A loop break always means the value of the previous cycle, wherever its writer
-// stands in the order.
+// A loop break always reads the value of the previous cycle, at any position of its
+// writer in the order.
 #include <gtest/gtest.h>
 
 #include "support/runner_fixture.hpp"
@@ -48,7 +48,7 @@ TEST_F(LoopBreak, ReaderAfterItsWriterSeesThePreviousCycleToo) {
     loadReader("Z", "x", true);
     EXPECT_EQ(order(), (std::vector<std::string>{"/W", "/Z"}));
     step(1);
-    EXPECT_EQ(value("/Z", "status"), kNone) << "what was written in this cycle is not for it";
+    EXPECT_EQ(value("/Z", "status"), kNone) << "values of this cycle are not read";
     step(9);
     EXPECT_EQ(value("/W", "out"), 9.0);
     EXPECT_EQ(value("/Z", "out"), 8.0);
@@ -72,7 +72,7 @@ TEST_F(LoopBreak, BrokenAndOtherReadersOfOneWriterDoNotMix) {
     EXPECT_EQ(value("/Z", "out"), 8.0);
 }
 
-TEST_F(LoopBreak, ValueIsNewOnceAlsoWhenTheWriterPauses) {
+TEST_F(LoopBreak, ValueIsNewOnceEvenIfTheWriterPauses) {
     loadTicker("W", "x", 4);
     loadReader("Z", "x", true);
     step(9);  // written in cycles 0, 4 and 8
@@ -98,7 +98,7 @@ TEST_F(LoopBreak, ComponentThatReadsItselfCounts) {
     EXPECT_EQ(value("/S", "status"), kNew);
 }
 
-TEST_F(LoopBreak, SetBetweenCyclesDelaysByOneAndTakenBackCatchesUp) {
+TEST_F(LoopBreak, SettingDelaysByOneCycleAndRemovingCatchesUp) {
     loadTicker("W", "x", 1);
     loadReader("Z", "x", false);
     step(10);
@@ -107,7 +107,7 @@ TEST_F(LoopBreak, SetBetweenCyclesDelaysByOneAndTakenBackCatchesUp) {
     step(1);
     EXPECT_EQ(value("/W", "out"), 10.0);
     EXPECT_EQ(value("/Z", "out"), 9.0);
-    EXPECT_EQ(value("/Z", "status"), kOld) << "it has read that one before";
+    EXPECT_EQ(value("/Z", "status"), kOld) << "the value was read before";
     step(1);
     EXPECT_EQ(value("/Z", "out"), 10.0);
     EXPECT_EQ(value("/Z", "status"), kNew);
@@ -116,7 +116,7 @@ TEST_F(LoopBreak, SetBetweenCyclesDelaysByOneAndTakenBackCatchesUp) {
     EXPECT_EQ(value("/Z", "out"), 12.0);
 }
 
-TEST_F(LoopBreak, WriterThatLeavesIsReadToItsLastValue) {
+TEST_F(LoopBreak, LastValueOfAnUnloadedWriterIsRead) {
     loadTicker("W", "x", 1);
     loadReader("A", "x", true);
     loadReader("Z", "x", false);
@@ -125,10 +125,10 @@ TEST_F(LoopBreak, WriterThatLeavesIsReadToItsLastValue) {
     step(2);
     EXPECT_EQ(value("/Z", "out"), 9.0);
     EXPECT_EQ(value("/Z", "status"), kOld);
-    EXPECT_EQ(value("/A", "out"), 9.0) << "written after it had run, so read in the next cycle";
+    EXPECT_EQ(value("/A", "out"), 9.0) << "written after the reader ran, so read in the next cycle";
 }
 
-TEST_F(LoopBreak, ValueOfALeftWriterStaysUntilTheNextOneWrites) {
+TEST_F(LoopBreak, ValueOfAnUnloadedWriterStaysUntilTheNextOneWrites) {
     loadTicker("W", "x", 1);
     loadReader("Z", "x", false);
     step(10);
@@ -139,7 +139,7 @@ TEST_F(LoopBreak, ValueOfALeftWriterStaysUntilTheNextOneWrites) {
     EXPECT_EQ(value("/Z", "status"), kOld);
     setBreak("/Z", "in", true);
     step(2);
-    EXPECT_EQ(value("/Z", "out"), 9.0) << "also by way of a copy";
+    EXPECT_EQ(value("/Z", "out"), 9.0) << "also through a copy";
     setBreak("/Z", "in", false);
     step(87);  // V has written in iteration 100
     EXPECT_EQ(value("/Z", "out"), 100.0);

@@ -28,7 +28,7 @@ std::vector<std::string> namesInOrder(const OrderProblem& problem) {
     return names;
 }
 
-TEST(Order, OfFig1IsTheSameWhateverTheOrderOfLoading) {
+TEST(Order, OfFig1DoesNotDependOnTheOrderOfLoading) {
     std::array<std::size_t, 5> place{0, 1, 2, 3, 4};
     int permutations = 0;
     do {
@@ -58,7 +58,7 @@ TEST(Order, PutsReadyFirstComponentsBeforeOthers) {
     EXPECT_EQ(namesInOrder(problem), (std::vector<std::string>{"/z", "/a", "/b"}));
 }
 
-TEST(Order, OfNothingIsNothing) {
+TEST(Order, OfAnEmptyGraphIsEmpty) {
     const OrderResult result = findOrder({});
     EXPECT_TRUE(result.orderable());
     EXPECT_TRUE(result.order.empty());
@@ -93,7 +93,7 @@ bool contains(const std::vector<Edge>& edges, const Edge& wanted) {
                        [&](const Edge& edge) { return sameEdge(edge, wanted); });
 }
 
-// Why the loop is none; empty = it is one.
+// The reason why it is not a loop; empty = it is one.
 std::string flawOfLoop(const OrderProblem& problem, const std::vector<Edge>& loop) {
     if (loop.empty()) return "no loop";
     for (std::size_t i = 0; i < loop.size(); ++i) {
@@ -112,7 +112,7 @@ std::string flawOfCuts(const OrderProblem& problem, const OrderResult& result) {
             const auto gone =
                 std::remove_if(cut.edges.begin(), cut.edges.end(),
                                [&](const Edge& other) { return sameEdge(edge, other); });
-            if (gone == cut.edges.end()) return "a cut of what is not there";
+            if (gone == cut.edges.end()) return "a break of a missing connection";
             cut.edges.erase(gone, cut.edges.end());
         }
         if (!findOrder(cut).orderable()) return "a cut that leaves a loop";
@@ -120,7 +120,7 @@ std::string flawOfCuts(const OrderProblem& problem, const OrderResult& result) {
     return {};
 }
 
-// Why the order is none; empty = it is one.
+// The reason why it is not a valid order; empty = it is one.
 std::string flawOfOrder(const OrderProblem& problem, const OrderResult& result) {
     if (result.order.size() != problem.names.size()) return "not all components";
     std::vector<std::size_t> position(problem.names.size());
@@ -139,7 +139,7 @@ struct ClassCount {
 
 class AllDigraphs : public ::testing::TestWithParam<ClassCount> {};
 
-TEST_P(AllDigraphs, AreOrderedOrRefusedWithATrueLoopAndCutsThatHelp) {
+TEST_P(AllDigraphs, AreOrderedOrRejectedWithACorrectLoopAndWorkingBreaks) {
     const auto [nodes, expected_graphs, expected_acyclic] = GetParam();
     const std::vector<Digraph> graphs = digraphsUpToIsomorphism(nodes);
     ASSERT_EQ(graphs.size(), expected_graphs);

@@ -1,5 +1,5 @@
-// Components that run every n-th cycle: when they run, and what they are told of time. Stepped,
-// so that each cycle is known.
+// Components that run every n-th cycle: their cycles, and their times. Stepped, so that each cycle
+// is known.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -28,7 +28,7 @@ class Rates : public RunnerFixture {
         return result;
     }
 
-    // How many of these run in each of the next `cycles` cycles.
+    // The number of these components that run in each of the next `cycles` cycles.
     std::vector<int> loadOfCycles(const std::vector<std::string>& names, int cycles) {
         std::vector<int> result;
         std::map<std::string, double> before;
@@ -68,7 +68,7 @@ TEST_F(Rates, PeriodAndElapsedAreThoseOfTheComponent) {
     load(watch("S", 5, 2));
     step(3);
     EXPECT_EQ(value("/S", "nominal"), 5.0);
-    EXPECT_EQ(value("/S", "since"), 5.0) << "never below its period, the first time too";
+    EXPECT_EQ(value("/S", "since"), 5.0) << "never below its period, even at first";
     step(20);
     EXPECT_EQ(value("/S", "since"), 5.0);
     EXPECT_EQ(value("/F", "nominal"), 1.0);
@@ -86,7 +86,7 @@ TEST_F(Rates, AgeOfAnInputIsTheTimeSinceItWasWritten) {
     }
 }
 
-TEST_F(Rates, PhasesThatAreNotGivenSpreadTheLoad) {
+TEST_F(Rates, DefaultPhasesSpreadTheLoad) {
     std::vector<std::string> names;
     for (int i = 0; i < 4; ++i) {
         names.push_back("/W" + std::to_string(i));
@@ -95,7 +95,7 @@ TEST_F(Rates, PhasesThatAreNotGivenSpreadTheLoad) {
     EXPECT_EQ(loadOfCycles(names, 8), std::vector<int>(8, 1));
 }
 
-TEST_F(Rates, LoadOfAnotherDoesNotMoveAComponentsPhase) {
+TEST_F(Rates, LoadingAnotherComponentChangesNoPhase) {
     load(watch("M", 4));
     step(9);
     const double before = value("/M", "cycle");
@@ -105,7 +105,7 @@ TEST_F(Rates, LoadOfAnotherDoesNotMoveAComponentsPhase) {
     EXPECT_EQ(value("/M", "since"), 4.0);
 }
 
-TEST_F(Rates, RateThatDoesNotDivideIsRefusedWithTheNearestThatDoes) {
+TEST_F(Rates, IncompatibleRateIsRejectedWithTheNearestCompatibleOne) {
     load(watch("A", 4));
     load(watch("B", 12));
     const std::vector<std::string> before = order();
@@ -118,7 +118,7 @@ TEST_F(Rates, RateThatDoesNotDivideIsRefusedWithTheNearestThatDoes) {
     EXPECT_EQ(refusal([&] { load(watch("E", 1)); }), "");
 }
 
-TEST_F(Rates, RefusalIsAboutTheReplacementAndNotAboutThoseThatStay) {
+TEST_F(Rates, ErrorNamesTheReplacementNotTheOthers) {
     load(watch("A", 2));
     load(watch("B", 6));
     const std::string text = refusal([&] { replace("/A", watch("A", 4)); });
@@ -126,8 +126,8 @@ TEST_F(Rates, RefusalIsAboutTheReplacementAndNotAboutThoseThatStay) {
     EXPECT_NE(text.find("--every 3 or 6"), std::string::npos) << text;
 }
 
-// What the refusal advises is true: for all pairs of rates up to 24.
-TEST_F(Rates, AdviceOfARefusalIsAccepted) {
+// The advice of the error is correct for all pairs of rates up to 24.
+TEST_F(Rates, AdviceOfAnErrorIsAccepted) {
     for (std::uint32_t first = 2; first <= 24; first += 2) {
         load(watch("A", first));
         for (std::uint32_t second = 2; second <= 24; ++second) {

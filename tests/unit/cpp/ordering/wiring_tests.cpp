@@ -22,7 +22,7 @@ std::vector<std::string> orderOf(const Graph& graph) {
     return names;
 }
 
-TEST_F(WiringTest, OrderOfFig1IsTheSameWhateverTheOrderOfLoading) {
+TEST_F(WiringTest, OrderOfFig1DoesNotDependOnTheOrderOfLoading) {
     auto instances = fig1();
     std::sort(instances.begin(), instances.end());
     int permutations = 0;
@@ -54,7 +54,7 @@ TEST_F(WiringTest, WhitelistedOutputIsPublishedAndInputWithoutWriterSubscribed) 
     }
 }
 
-TEST_F(WiringTest, BlacklistTakesFromTheWhitelist) {
+TEST_F(WiringTest, BlacklistOverridesTheWhitelist) {
     const Graph graph = graphOf(fig1());
     const MappingFilter filter{NamePattern("whitelist", ".*"), NamePattern("blacklist", "/R.*")};
     const Wiring wiring = wire(graph, filter, {});
@@ -62,7 +62,7 @@ TEST_F(WiringTest, BlacklistTakesFromTheWhitelist) {
     EXPECT_TRUE(wiring.connections.at("/H1_F1").published);
 }
 
-TEST_F(WiringTest, TwoWritersOfWhatIsReadAreRefusedByName) {
+TEST_F(WiringTest, TwoWritersOfAReadNameAreRejectedByName) {
     const std::string text = refusalOf(graphOf(
         {mimo("A", {{"out1", "x"}, {"out2", "a2"}}), mimo("B", {{"out1", "b1"}, {"out2", "x"}}),
          mimo("C", {{"in1", "x"}, {"out1", "c1"}, {"out2", "c2"}})}));
@@ -71,7 +71,7 @@ TEST_F(WiringTest, TwoWritersOfWhatIsReadAreRefusedByName) {
     }
 }
 
-TEST_F(WiringTest, SeveralMayWriteWhatNoInputReadsAndOfATopicThatIsSaid) {
+TEST_F(WiringTest, SeveralMayWriteAnUnreadNameWithANoteForATopic) {
     const Graph graph = graphOf(
         {mimo("A", {{"out1", "x"}, {"out2", "a2"}}), mimo("B", {{"out1", "b1"}, {"out2", "x"}})});
     EXPECT_TRUE(remarks(graph, wire(graph, {}, {}), {}, {"/B"}).empty());
@@ -83,7 +83,7 @@ TEST_F(WiringTest, SeveralMayWriteWhatNoInputReadsAndOfATopicThatIsSaid) {
         (std::vector<std::string>{"topic /x has 2 writers in this runner: /A.out1, /B.out2"}));
 }
 
-TEST_F(WiringTest, TypesThatDifferAreRefusedWithBothPortsAndTypes) {
+TEST_F(WiringTest, DifferentTypesAreRejectedWithBothPortsAndTypes) {
     const std::string text = refusalOf(
         graphOf({make(kUnitComponents, "VectorSource", "V", {{"out", "x"}}),
                  mimo("M", {{"in1", "x"}, {"in2", "i2"}, {"in3", "i3"}, {"in4", "i4"}})}));
@@ -92,7 +92,7 @@ TEST_F(WiringTest, TypesThatDifferAreRefusedWithBothPortsAndTypes) {
     }
 }
 
-TEST_F(WiringTest, LoopIsRefusedPortByPortWithTheCommandsThatCutIt) {
+TEST_F(WiringTest, LoopIsRejectedPortByPortWithCommandsThatBreakIt) {
     auto instances = fig1();
     instances[0] = mimo("H1", {{"in1", "R3_G2H1"}, {"out1", "H1_F1"}, {"out2", "H1_R1R2"}});
     const std::string text = refusalOf(graphOf(instances));
@@ -136,17 +136,17 @@ TEST_F(WiringTest, ConnectionOfAComponentToItselfIsALoop) {
     EXPECT_EQ(orderOf(graph), std::vector<std::string>{"/A"});
 }
 
-TEST_F(WiringTest, BreakOfAPortThatIsNoneIsRefused) {
+TEST_F(WiringTest, BreakOfAMissingPortIsRejected) {
     Graph graph = graphOf({mimo("A", {})});
     try {
         graph.setBreak("/A", "out1", true);
-        FAIL() << "not refused";
+        FAIL() << "no error";
     } catch (const Refusal& refused) {
         EXPECT_STREQ(refused.what(), "/A has no input out1; it has in1, in2, in3, in4");
     }
 }
 
-TEST_F(WiringTest, RemapsThatNameNoPortAreNoted) {
+TEST_F(WiringTest, RemapsOfMissingPortsAreNoted) {
     const auto instance = mimo("A", {{"in1", "x"}, {"speed", "y"}, {"/out1", "z"}});
     EXPECT_EQ(instance->uselessRemaps(), std::vector<std::string>{"speed:=y"});
 }

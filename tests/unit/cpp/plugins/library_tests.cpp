@@ -25,7 +25,7 @@ std::string refusalOf(const std::string& path) {
     }
 }
 
-// What a Versioned component of this library writes.
+// The value that a Versioned component of this library writes.
 std::int32_t versionOf(const Library& library) {
     const std::unique_ptr<Component> component(library.find("Versioned")->create("V", nullptr));
     component->update();
@@ -47,7 +47,7 @@ TEST(Library, MissingFileIsNamed) {
     EXPECT_EQ(refusalOf("/nowhere/x.so"), "library /nowhere/x.so: No such file or directory");
 }
 
-TEST(Library, FolderIsRefused) {
+TEST(Library, FolderIsRejected) {
     EXPECT_NE(refusalOf("/tmp").find("not a regular file"), std::string::npos);
 }
 
@@ -57,16 +57,16 @@ TEST(Library, MissingSymbolIsNamed) {
     EXPECT_NE(text.find("undefined symbol: rtcf_unit_test_undefined_function"), std::string::npos)
         << text;
     EXPECT_EQ(text.find("/proc/"), std::string::npos)
-        << "the name of the private copy means nothing to a person";
+        << "the name of the private copy is meaningless to users";
 }
 
-TEST(Library, WithoutEntryPointIsRefused) {
+TEST(Library, WithoutEntryPointIsRejected) {
     const std::string text = refusalOf(kFolder + "no_entry_point.so");
     EXPECT_NE(text.find("has no components"), std::string::npos) << text;
     EXPECT_NE(text.find("rtcf_add_components()"), std::string::npos) << text;
 }
 
-TEST(Library, OfAnotherAbiIsRefusedWithBothNumbers) {
+TEST(Library, OfAnotherAbiIsRejectedWithBothNumbers) {
     const std::string text = refusalOf(kFolder + "wrong_abi.so");
     for (const std::string& part :
          {"ABI " + std::to_string(AbiProbe::fingerprint(4711)),
@@ -74,26 +74,26 @@ TEST(Library, OfAnotherAbiIsRefusedWithBothNumbers) {
         EXPECT_NE(text.find(part), std::string::npos) << text;
 }
 
-// The same headers and the same number by hand: the compiler's options alone make the difference.
-TEST(Library, OfAnotherLayoutIsRefused) {
+// The same headers and ABI number; only the compiler options differ.
+TEST(Library, OfAnotherLayoutIsRejected) {
     const std::string text = refusalOf(kFolder + "other_layout.so");
     EXPECT_NE(text.find("was built for component ABI"), std::string::npos) << text;
 }
 
-TEST(Library, WithThreadLocalsThatAllocateInTheCycleIsRefused) {
+TEST(Library, WithThreadLocalsThatAllocateInTheCycleIsRejected) {
     const std::string text = refusalOf(kFolder + "thread_local_lazy.so");
     EXPECT_NE(text.find("thread_local"), std::string::npos) << text;
     EXPECT_NE(text.find("-ftls-model=initial-exec"), std::string::npos) << text;
     EXPECT_EQ(refusalOf(kFolder + "thread_local_static.so"), "");
 }
 
-TEST(Library, ThatIsNoLibraryIsRefused) {
+TEST(Library, InvalidLibraryIsRejected) {
     const std::string text = refusalOf("/etc/passwd");
     EXPECT_NE(text.find("does not load"), std::string::npos) << text;
 }
 
-// Each time anew it would cost a descriptor and a mapping, for the life of a loop.
-TEST(Library, ThatIsRefusedLeavesNothingOpen) {
+// Otherwise each attempt would cost a descriptor and a mapping for the life of a loop.
+TEST(Library, RejectedLibraryLeavesNothingOpen) {
     const auto open_files = [] {
         const std::filesystem::directory_iterator files("/proc/self/fd");
         return std::distance(begin(files), end(files));
@@ -124,7 +124,7 @@ TEST(LibraryStore, LoadsARebuiltFileBesideTheOldCode) {
     LibraryStore store;
     std::filesystem::copy_file(kFolder + "versioned_1.so", path);
     const auto before = store.open(path);
-    // In place, as a linker does it: the same file with other bytes.
+    // In place, like a linker: the same file with other bytes.
     std::filesystem::copy_file(kFolder + "versioned_2.so", path,
                                std::filesystem::copy_options::overwrite_existing);
     const auto after = store.open(path);

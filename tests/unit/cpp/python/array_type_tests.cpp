@@ -1,5 +1,5 @@
-// Arrays of components in Python: by a table of any size they are the types that C++ components
-// have by a template.
+// Arrays of Python components: their types, made from a table for any size, equal the template
+// types of C++ components.
 #include "array_type.hpp"
 
 #include <gtest/gtest.h>
@@ -37,7 +37,7 @@ constexpr Scalar scalarOf() {
     return std::is_signed_v<T> ? kSigned.at(place) : kUnsigned.at(place);
 }
 
-// Elements, and what C++ has: for the port and for the state.
+// Elements, and C++'s types for the port and for the state.
 template <typename Element, std::size_t Count>
 struct Numbers {
     using Scalar = Element;
@@ -55,7 +55,7 @@ struct Matrix {
     static constexpr std::int64_t kRows = Rows, kColumns = Columns;
 };
 
-// As rtcf-compile makes them.
+// As created by rtcf-compile.
 template <typename Shape>
 struct Table {
     using Element = typename Shape::Scalar;
@@ -97,7 +97,7 @@ class PythonArray : public testing::Test {
     using Element = typename Shape::Scalar;
     static constexpr auto kCount = static_cast<std::size_t>(Shape::kRows * Shape::kColumns);
 
-    // Values at the bounds, and any.
+    // Values at the bounds, and random ones.
     std::array<Element, kCount> draw() {
         std::array<Element, kCount> values{};
         for (Element& value : values) {
@@ -113,7 +113,7 @@ class PythonArray : public testing::Test {
         return values;
     }
 
-    // Two slots with the same value, the real one and ours.
+    // Two slots with the same value: C++'s type, and the table's.
     void fill(const std::array<Element, kCount>& values) {
         ASSERT_EQ(sizeof(Port), sizeof values);
         std::memcpy(static_cast<void*>(&real_slot_.value), values.data(), sizeof values);
@@ -153,7 +153,7 @@ TYPED_TEST_SUITE(PythonArray, Shapes, );
 
 }  // namespace
 
-TYPED_TEST(PythonArray, IsTheTypeOfCpp) {
+TYPED_TEST(PythonArray, EqualsTheTypeOfCpp) {
     EXPECT_STREQ(this->ours_.name, this->real_.name);
     EXPECT_STREQ(this->ours_.md5, this->real_.md5);
     EXPECT_EQ(this->ours_.size, this->real_.size);
@@ -184,7 +184,7 @@ TYPED_TEST(PythonArray, HasTheMessagesAndTextsOfCpp) {
     }
 }
 
-TYPED_TEST(PythonArray, IsFiniteWhereThatOfCppIs) {
+TYPED_TEST(PythonArray, IsFiniteIfThatOfCppIs) {
     auto values = this->draw();
     this->fill(values);
     EXPECT_TRUE(this->ours_.finite(*this->our_slot_));
@@ -200,11 +200,11 @@ TYPED_TEST(PythonArray, IsFiniteWhereThatOfCppIs) {
     }
 }
 
-TYPED_TEST(PythonArray, IsCopiedAndExchangedAsThatOfCpp) {
+TYPED_TEST(PythonArray, IsCopiedAndExchangedLikeThatOfCpp) {
     this->fill(this->draw());
     this->our_slot_->sequence = 7;
     this->our_slot_->time_ns = 9;
-    // Our functions work on slots of C++, and the other way round: they are connected.
+    // The table's functions work on slots of C++, and vice versa, since the two can be connected.
     Slot<typename TypeParam::Port> other;
     this->ours_.copy(other, *this->our_slot_);
     EXPECT_EQ(other.sequence, 7U);
@@ -223,7 +223,7 @@ TYPED_TEST(PythonArray, IsCopiedAndExchangedAsThatOfCpp) {
               0U);
 }
 
-TYPED_TEST(PythonArray, IsTheStateOfCpp) {
+TYPED_TEST(PythonArray, EqualsTheStateOfCpp) {
     using Real = typename TypeParam::State;
     const StateDeclaration ours = python::stateOf(Table<TypeParam>::table);
     EXPECT_EQ(ours.type, StateType<Real>::name());
@@ -237,7 +237,7 @@ TYPED_TEST(PythonArray, IsTheStateOfCpp) {
     EXPECT_EQ(ours.print(values.data()), text);
 }
 
-TYPED_TEST(PythonArray, LiesRowByRowInTheRecord) {
+TYPED_TEST(PythonArray, IsRowMajorInTheRecord) {
     const python::ValueCopy copy(Table<TypeParam>::table);
     const auto values = this->draw();
     this->fill(values);
@@ -265,7 +265,7 @@ using Elements =
                    std::uint16_t, std::uint32_t, std::uint64_t, float, double>;
 TYPED_TEST_SUITE(PythonNumber, Elements, );
 
-TYPED_TEST(PythonNumber, IsTheTypeAndTheStateOfCpp) {
+TYPED_TEST(PythonNumber, EqualsTheTypeAndTheStateOfCpp) {
     const TypeTable table{scalarOf<TypeParam>(), 0, 0};
     EXPECT_EQ(&python::typeInfoOf(table), &typeInfo<TypeParam>());
     const StateDeclaration ours = python::stateOf(table);

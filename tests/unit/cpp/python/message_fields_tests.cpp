@@ -1,4 +1,4 @@
-// Numbers of ROS messages between a message and the record of a component in Python.
+// Numbers of ROS messages, copied between a message and the record of a Python component.
 #include "message_fields.hpp"
 
 #include <geometry_msgs/TwistStamped.h>
@@ -80,7 +80,7 @@ TEST_F(Stamped, NumbersAreCopiedBothWays) {
               typeInfo<Message>().print(Slot<Message>{{}, message_}));
 }
 
-TEST_F(Stamped, ATimeBeyondItsRangeIsTheNearest) {
+TEST_F(Stamped, ATimeOutOfRangeIsClamped) {
     put(record_, 8, std::int64_t{-1});
     fields_.toMessage(&message_, record_.data());
     EXPECT_EQ(message_.header.stamp, ros::Time(0, 999'999'999));

@@ -1,4 +1,4 @@
-// A component made of tables, whose hooks are functions here.
+// A component made from tables, whose hooks are functions in this file.
 #include "python_component.hpp"
 
 #include <gtest/gtest.h>
@@ -43,13 +43,13 @@ const void* start(void* memory) {
     return nullptr;
 }
 
-// As machine code finds it.
+// At the offset used by machine code.
 template <typename T>
 T& placeIn(void* memory, std::size_t offset) {
     return *reinterpret_cast<T*>(static_cast<std::byte*>(memory) + offset);
 }
 
-// Writes u * gain where u is new, and raises where it is negative.
+// Writes u * gain if u is new, and raises if it is negative.
 const void* update(void* memory, void* const* ports) {
     constexpr PortPlaces places = AbiProbe::portPlaces();
     Record& record = *static_cast<Record*>(memory);
@@ -114,7 +114,7 @@ class PythonComponents : public testing::Test {
     PythonComponent component_{kTable};
 };
 
-TEST_F(PythonComponents, DeclaresWhatItsTableHas) {
+TEST_F(PythonComponents, DeclaresTheContentOfItsTable) {
     EXPECT_EQ(component_.inputs().front()->name(), "u");
     EXPECT_EQ(component_.outputs().front()->unit(), "m");
     const ParameterDeclaration& gain = component_.parameters().front()->declaration();
@@ -125,7 +125,7 @@ TEST_F(PythonComponents, DeclaresWhatItsTableHas) {
     EXPECT_EQ(component_.states().front().type, "int64");
 }
 
-TEST_F(PythonComponents, WritesInACycleAlone) {
+TEST_F(PythonComponents, WritesOnlyInACycle) {
     ASSERT_TRUE(component_.start());
     component_.update();
     EXPECT_EQ(written().sequence, 0U);
@@ -137,7 +137,7 @@ TEST_F(PythonComponents, WritesInACycleAlone) {
     EXPECT_EQ(written().sequence, 1U);
 }
 
-TEST_F(PythonComponents, AParameterCountsFromItsCommitOn) {
+TEST_F(PythonComponents, AParameterTakesEffectAtItsCommit) {
     ParameterBase& gain = *component_.parameters().front();
     ++source_->sequence;
     gain.stage(10.0);
@@ -177,7 +177,7 @@ TEST(PythonParameters, AnEnumIsSetByName) {
     EXPECT_EQ(*count, -4);
 }
 
-TEST_F(PythonComponents, WhatRaisesWritesNothingAndSaysWhere) {
+TEST_F(PythonComponents, AnExceptionWritesNothingAndHasItsPlace) {
     source_->value = -1.0;
     ++source_->sequence;
     std::string said;
@@ -193,7 +193,7 @@ TEST_F(PythonComponents, WhatRaisesWritesNothingAndSaysWhere) {
     EXPECT_EQ(written().sequence, 0U);
 }
 
-TEST_F(PythonComponents, StateIsThatOfItsRecord) {
+TEST_F(PythonComponents, StateIsInItsRecord) {
     component_.update();
     component_.update();
     const StateDeclaration& count = component_.states().front();

@@ -45,8 +45,8 @@ TEST_F(CpuClaimTest, SpreadsLoopsOverTheCpus) {
         taken.insert(loops.back()->cpu());
     }
     EXPECT_EQ(taken.size(), loops.size());
-    EXPECT_EQ(loops.front()->cpu(), processCpus().back()) << "the first has the last";
-    // And again, one for each.
+    EXPECT_EQ(loops.front()->cpu(), processCpus().back()) << "the first loop gets the last CPU";
+    // And again, a second loop for each.
     taken.clear();
     for (std::size_t i = 0; i < processCpus().size(); ++i) {
         loops.push_back(std::make_unique<CpuClaim>(-1, names()));
@@ -54,13 +54,13 @@ TEST_F(CpuClaimTest, SpreadsLoopsOverTheCpus) {
         taken.insert(loops.back()->cpu());
     }
     EXPECT_EQ(taken.size(), processCpus().size());
-    // Where one has gone there are the fewest.
+    // The CPU of an ended loop has the fewest.
     const int left = loops.back()->cpu();
     loops.pop_back();
     EXPECT_EQ(CpuClaim(-1, names()).cpu(), left);
 }
 
-TEST_F(CpuClaimTest, PrefersCpusThatAreIsolatedAndThenTheLast) {
+TEST_F(CpuClaimTest, PrefersIsolatedCpusAndThenTheLast) {
     const std::vector<int> cpus{0, 1, 2, 3, 5, 12};
     using Order = std::vector<int>;
     EXPECT_EQ(byPreference(cpus, ""), (Order{12, 5, 3, 2, 1, 0}));
@@ -71,7 +71,7 @@ TEST_F(CpuClaimTest, PrefersCpusThatAreIsolatedAndThenTheLast) {
     EXPECT_TRUE(byPreference({}, "1").empty());
 }
 
-TEST_F(CpuClaimTest, ThatEndsIsFreeAgain) {
+TEST_F(CpuClaimTest, IsFreeAfterItsEnd) {
     const int last = processCpus().back();
     {
         const CpuClaim loop(-1, names());
@@ -81,7 +81,7 @@ TEST_F(CpuClaimTest, ThatEndsIsFreeAgain) {
     EXPECT_TRUE(next.alone());
     const CpuClaim chosen(last, names());
     EXPECT_EQ(chosen.cpu(), last);
-    EXPECT_FALSE(chosen.alone()) << "it is where it was told to be, and knows of the other";
+    EXPECT_FALSE(chosen.alone()) << "it uses its configured CPU, and sees the other loop";
 }
 
 TEST_F(CpuClaimTest, LeavesNoFileBehind) {
@@ -95,7 +95,7 @@ TEST_F(CpuClaimTest, LeavesNoFileBehind) {
     EXPECT_TRUE(files().empty());
 }
 
-TEST_F(CpuClaimTest, OfAProcessThatWasKilledIsFreeAgain) {
+TEST_F(CpuClaimTest, OfAKilledProcessIsFreeAgain) {
     const int last = processCpus().back();
     const pid_t child = ::fork();
     ASSERT_GE(child, 0);
@@ -104,25 +104,25 @@ TEST_F(CpuClaimTest, OfAProcessThatWasKilledIsFreeAgain) {
         ::raise(SIGKILL);
     }
     ASSERT_EQ(::waitpid(child, nullptr, 0), child);
-    EXPECT_EQ(files().size(), 1U) << "its file is there";
+    EXPECT_EQ(files().size(), 1U) << "its claim file exists";
     EXPECT_TRUE(CpuClaim(last, names()).alone());
 }
 
-TEST_F(CpuClaimTest, IsForNobodyElseToHold) {
+TEST_F(CpuClaimTest, CannotBeHeldByAnotherUser) {
     const CpuClaim loop(-1, names());
     const auto file = *std::filesystem::directory_iterator(names());
     struct stat found{};
     ASSERT_EQ(::stat(file.path().c_str(), &found), 0);
     EXPECT_EQ(found.st_mode & 0777U, 0600U);
-    // Nor by what is there in its place.
+    // Nor by a file in its place.
     const int last = processCpus().back();
     const std::string other = names() + "/cpu-" + std::to_string(last) + "-1";
     ASSERT_EQ(::symlink(file.path().c_str(), other.c_str()), 0);
     EXPECT_EQ(CpuClaim(last, names()).cpu(), last);
-    EXPECT_EQ(files().count("cpu-" + std::to_string(last) + "-2"), 0U) << "it is free again";
+    EXPECT_EQ(files().count("cpu-" + std::to_string(last) + "-2"), 0U) << "the claim is free";
 }
 
-TEST_F(CpuClaimTest, WithoutAFolderKnowsOfNobody) {
+TEST_F(CpuClaimTest, WithoutAFolderSeesNoOtherLoops) {
     for (const std::string& folder : {std::string(), names() + "/none"}) {
         const CpuClaim first(-1, folder);
         const CpuClaim second(-1, folder);
@@ -132,12 +132,12 @@ TEST_F(CpuClaimTest, WithoutAFolderKnowsOfNobody) {
     }
 }
 
-TEST_F(CpuClaimTest, OfManyProcessesThatComeAndGoIsOneAtATime) {
+TEST_F(CpuClaimTest, OfManyProcessesIsHeldByOneAtATime) {
     constexpr int kProcesses = 4;
     constexpr int kClaims = 500;
-    constexpr int kNever = 2;  // exit status of who was never alone
+    constexpr int kNever = 2;  // exit status of a process that was never alone
     const int last = processCpus().back();
-    // Who is alone makes a file that must not be there.
+    // The only holder creates a file that must not exist.
     const std::string mark = names() + "/alone";
     std::array<pid_t, kProcesses> children{};
     for (pid_t& child : children) {
@@ -161,7 +161,7 @@ TEST_F(CpuClaimTest, OfManyProcessesThatComeAndGoIsOneAtATime) {
         int status = 0;
         ASSERT_EQ(::waitpid(child, &status, 0), child);
         ASSERT_TRUE(WIFEXITED(status));
-        // One may come late each time.
+        // A process may be late each time.
         EXPECT_TRUE(WEXITSTATUS(status) == 0 || WEXITSTATUS(status) == kNever);
         any = any || WEXITSTATUS(status) == 0;
     }

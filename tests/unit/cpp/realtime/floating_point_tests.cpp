@@ -1,4 +1,4 @@
-// What a library does to the floating-point environment when it is loaded stays its own business.
+// Changes of the floating-point environment by a loaded library do not affect the loop.
 #include <gtest/gtest.h>
 
 #include "support/runner_fixture.hpp"
@@ -17,7 +17,7 @@ class FloatingPoint : public RunnerFixture {
     }
 };
 
-TEST_F(FloatingPoint, IsThatOfAPlainProgramInTheLoop) {
+TEST_F(FloatingPoint, IsTheDefaultInTheLoop) {
     start();
     ASSERT_TRUE(runs());
     stop();

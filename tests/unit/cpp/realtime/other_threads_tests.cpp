@@ -1,4 +1,4 @@
-// Who keeps off the CPU of a loop: everybody but those that have chosen their CPUs themselves.
+// All threads keep off the CPU of a loop, except those with an explicit affinity.
 #include "realtime/other_threads.hpp"
 
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ namespace {
 using namespace executor;
 using Cpus = std::set<int>;
 
-// A thread that does what it is asked, as long as the test goes on.
+// A thread that executes requests until the end of the test.
 class Worker {
    public:
     explicit Worker(std::function<void()> first = [] {})
@@ -85,7 +85,7 @@ class OtherThreadsTest : public ::testing::Test {
     int last = 0;
 };
 
-TEST_F(OtherThreadsTest, KeepOffTheLoopsCpuAsLongAsItIsThere) {
+TEST_F(OtherThreadsTest, KeepOffTheLoopsCpuWhileItRuns) {
     const Worker worker;
     const Worker loop;
     others.keepOff(last, loop.id);
@@ -93,17 +93,17 @@ TEST_F(OtherThreadsTest, KeepOffTheLoopsCpuAsLongAsItIsThere) {
     EXPECT_EQ(cpusOf(loop.id), all);
     const Worker made_later;
     EXPECT_EQ(cpusOf(made_later.id), without(last));
-    others.keepOff(first, loop.id);  // a loop that has moved
+    others.keepOff(first, loop.id);  // a loop that moved
     EXPECT_EQ(cpusOf(worker.id), without(first));
     EXPECT_EQ(cpusOf(made_later.id), without(first));
     EXPECT_EQ(Cpus(processCpus().begin(), processCpus().end()), all)
-        << "it is still known what there was";
+        << "the original affinity is still known";
     others.release();
     EXPECT_EQ(cpusOf(worker.id), all);
     EXPECT_EQ(cpusOf(made_later.id), all);
 }
 
-// As the kernel takes a CPU that goes offline from all threads.
+// The kernel removes a CPU that goes offline from all threads' affinities.
 TEST_F(OtherThreadsTest, OfAProcessThatHasLostACpuKeepOffToo) {
     const Worker worker;
     pin(::getpid(), last);
@@ -116,7 +116,7 @@ TEST_F(OtherThreadsTest, OfAProcessThatHasLostACpuKeepOffToo) {
     EXPECT_EQ(cpusOf(::getpid()), all);
 }
 
-TEST_F(OtherThreadsTest, ThatAComponentHasPinnedStayWhereTheyAre) {
+TEST_F(OtherThreadsTest, PinnedByAComponentStayOnTheirCpu) {
     const Worker to_the_loops([this] { pin(0, last); });
     const Worker to_another([this] { pin(0, first); });
     others.keepOff(last, 0);
@@ -127,10 +127,10 @@ TEST_F(OtherThreadsTest, ThatAComponentHasPinnedStayWhereTheyAre) {
     EXPECT_EQ(cpusOf(to_another.id), Cpus{first});
     others.release();
     EXPECT_EQ(cpusOf(to_the_loops.id), Cpus{last});
-    EXPECT_EQ(cpusOf(to_another.id), Cpus{first}) << "also where those that are kept off were";
+    EXPECT_EQ(cpusOf(to_another.id), Cpus{first}) << "even if others were kept off that CPU";
 }
 
-TEST_F(OtherThreadsTest, ThatPinThemselvesToTheLoopsCpuMeanwhileStayThere) {
+TEST_F(OtherThreadsTest, ThatPinThemselvesToTheLoopsCpuStayThere) {
     others.keepOff(last, 0);
     const Worker pinned([this] { pin(0, last); });
     others.release();

@@ -1,4 +1,4 @@
-// What a loop lacks for real time on the CPU that it has.
+// Missing real-time conditions of a loop on its CPU.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 namespace rtcf::test {
 namespace {
 
-// Before the fixture, which works with it.
+// Constructed before the fixture, which uses it.
 class ClaimsFolder {
    protected:
     TemporaryFolder temporary_;
@@ -28,7 +28,7 @@ class Placement : protected ClaimsFolder, public RunnerFixture {
     }
 };
 
-TEST_F(Placement, ThatIsMendedWhileTheLoopRunsIsNotLackedAnyMore) {
+TEST_F(Placement, CorrectedWhileTheLoopRunsIsReportedNoLonger) {
     if (executor::processCpus().size() < 2) GTEST_SKIP() << "one CPU";
     const int shared = executor::processCpus().back();
     const executor::CpuClaim other(shared, folder_);
@@ -40,7 +40,7 @@ TEST_F(Placement, ThatIsMendedWhileTheLoopRunsIsNotLackedAnyMore) {
         settings.loop.realtime.cpu = executor::processCpus().front();
     });
     EXPECT_FALSE(lacks("also runs another loop"));
-    EXPECT_TRUE(lacks("memory is not locked")) << "as it was at the start";
+    EXPECT_TRUE(lacks("memory is not locked")) << "as at the start";
     EXPECT_TRUE(runs());
 }
 

@@ -1,4 +1,4 @@
-// Memory that is not locked although the process locks all of its own.
+// Memory that is not locked although the process locks all of its memory.
 #include "realtime/unlocked_memory.hpp"
 
 #include <gtest/gtest.h>
@@ -27,7 +27,7 @@ std::size_t lockedKb() {
     return 0;
 }
 
-TEST(UnlockedMemory, IsNotLockedWhatIsMappedBeforeAndAfterLocking) {
+TEST(UnlockedMemory, IsUnlockedWhenMappedBeforeOrAfterLocking) {
     UnlockedMemory memory;
     const auto before = memory.allocate(20 * kMega);
     ASSERT_TRUE(before);
@@ -42,7 +42,7 @@ TEST(UnlockedMemory, IsNotLockedWhatIsMappedBeforeAndAfterLocking) {
     munlockall();
 }
 
-TEST(UnlockedMemory, IsUsedAgainAndBounded) {
+TEST(UnlockedMemory, IsReusedAndBounded) {
     UnlockedMemory memory;
     EXPECT_FALSE(memory.allocate(2 * UnlockedMemory::kMost));
     std::vector<std::shared_ptr<std::uint8_t[]>> blocks;
@@ -52,7 +52,7 @@ TEST(UnlockedMemory, IsUsedAgainAndBounded) {
     const std::uint8_t* last = blocks.back().get();
     blocks.pop_back();
     EXPECT_EQ(memory.allocate(kMega - 5).get(), last);
-    // What is free in one size makes room for another.
+    // Freed memory of one size makes room for another.
     blocks.clear();
     EXPECT_EQ(memory.used(), 0U);
     EXPECT_TRUE(memory.allocate(100 * kMega));

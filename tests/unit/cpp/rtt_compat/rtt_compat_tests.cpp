@@ -1,5 +1,5 @@
-// Components that are written for RTCF 2021, in a real runner. In the build with
-// RealtimeSanitizer every one of these tests is a test of real-time safety too.
+// Components written for RTCF 2021, in a real runner. In the build with RealtimeSanitizer
+// each of these tests also tests real-time safety.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -32,7 +32,7 @@ class RttCompat : public RunnerFixture {
             [&] { return runner().load(component, library, [](const std::string&) {}); });
     }
 
-    // What a component has said, in order.
+    // The log messages of a component, in order.
     std::vector<std::string> said(const std::string& component) {
         std::vector<std::string> lines;
         for (const LogEntry& entry : logged()) {
@@ -46,7 +46,7 @@ class RttCompat : public RunnerFixture {
     }
 };
 
-TEST_F(RttCompat, PortsOfConstructorAndConfigureHookAreThere) {
+TEST_F(RttCompat, PortsOfConstructorAndConfigureHookExist) {
     loadOld("Reader", "R");
     std::vector<std::string> names;
     const auto snapshot = runner().snapshot();
@@ -61,12 +61,12 @@ TEST_F(RttCompat, PortsAreFrozenAfterConfigureHook) {
               "configure()");
 }
 
-TEST_F(RttCompat, PortAddedTwiceIsRefused) {
+TEST_F(RttCompat, PortAddedTwiceIsRejected) {
     EXPECT_EQ(refusal([this] { loadOld("Twice", "T"); }),
               "/T (rtcf_unit_test/Twice): configure failed: it threw: port 'port' is added twice");
 }
 
-TEST_F(RttCompat, ReadTellsWhetherDataAreThereAndNew) {
+TEST_F(RttCompat, ReadReturnsWhetherDataExistAndAreNew) {
     loadOld("Reader", "R", {{"in", "thirds"}});
     step(1);
     EXPECT_EQ(value("/R", "flow"), kNoData);
@@ -81,14 +81,14 @@ TEST_F(RttCompat, ReadTellsWhetherDataAreThereAndNew) {
     EXPECT_EQ(value("/R", "connected"), 1.0);
     step(1);
     EXPECT_EQ(value("/R", "flow"), kOldData);
-    EXPECT_EQ(value("/R", "copied"), -1.0);  // old data were not asked for
+    EXPECT_EQ(value("/R", "copied"), -1.0);  // old data were not requested
     EXPECT_EQ(value("/R", "copied_old"), 0.0);
     step(2);
     EXPECT_EQ(value("/R", "flow"), kNewData);
     EXPECT_EQ(value("/R", "copied"), 3.0);
 }
 
-TEST_F(RttCompat, OutputKnowsWhetherAnybodyReadsIt) {
+TEST_F(RttCompat, OutputKnowsWhetherItIsRead) {
     loadOld("Third", "T", {{"out", "thirds"}});
     step(1);
     EXPECT_EQ(value("/T", "heard"), 0.0);
@@ -100,7 +100,7 @@ TEST_F(RttCompat, OutputKnowsWhetherAnybodyReadsIt) {
     EXPECT_EQ(value("/T", "heard"), 0.0);
     configure([](RunnerSettings& settings) { settings.whitelist = "/thirds"; });
     step(3);
-    EXPECT_EQ(value("/T", "heard"), 1.0);  // by a topic
+    EXPECT_EQ(value("/T", "heard"), 1.0);  // read by a topic
 }
 
 TEST_F(RttCompat, StatesFollowTheHooks) {
@@ -144,14 +144,14 @@ TEST_F(RttCompat, ComponentKnowsTheLoopsTime) {
     EXPECT_TRUE(hasSaid("/T", "period 0.002 s, 500 Hz, iteration 2, time 0.004000000"));
 }
 
-TEST_F(RttCompat, LogKeepsEachTextAsItIs) {
+TEST_F(RttCompat, LogKeepsEachTextUnchanged) {
     loadOld("Writer", "W");
     step(1);
     const std::vector<std::string> lines = said("/W");
     const std::string long_text = std::string(1000, 'x') + "...";
     std::vector<std::string> expected{"100 % as it is: {} %d", "a std::string",
                                       "a number 0.333 ff 1", "arm has 7 joints of 0.50 m", "100 %"};
-    // A text that takes several records, twice.
+    // A text that needs several records, twice.
     for (int round = 0; round < 2; ++round) {
         for (std::size_t at = 0; at < long_text.size(); at += 318)
             expected.push_back(long_text.substr(at, 318));
@@ -160,7 +160,7 @@ TEST_F(RttCompat, LogKeepsEachTextAsItIs) {
     EXPECT_EQ(lines, expected);
 }
 
-TEST_F(RttCompat, LogHasLevelAndPlaceOfTheCall) {
+TEST_F(RttCompat, LogHasLevelAndSourceLineOfTheCall) {
     loadOld("Writer", "W");
     step(1);
     const std::vector<LogEntry> entries = logged();
@@ -174,20 +174,20 @@ TEST_F(RttCompat, LogHasLevelAndPlaceOfTheCall) {
     EXPECT_TRUE(found->realtime);
 }
 
-TEST_F(RttCompat, MessagesThatGrowWithinTheSampleAreWritten) {
+TEST_F(RttCompat, MessagesThatFitTheSampleAreWritten) {
     loadOld("Grower", "G");
     step(400);
     EXPECT_EQ(iteration(), 400U);
 }
 
-TEST_F(RttCompat, ExtensionInAConstructorIsRefused) {
+TEST_F(RttCompat, ExtensionInAConstructorIsRejected) {
     EXPECT_EQ(refusal([this] { loadOld("TooEarly", "E"); }),
               "/E (rtcf_unit_test/TooEarly): constructor failed: it threw: RtcfExtension does not "
               "work in a constructor: use it from configureHook() on, in a component that "
               "ORO_CREATE_COMPONENT registers");
 }
 
-TEST_F(RttCompat, NodeHandleWithoutANodeIsRefused) {
+TEST_F(RttCompat, NodeHandleWithoutANodeIsRejected) {
     const std::string why = refusal([this] { loadOld("NeedsRos", "N"); });
     EXPECT_NE(why.find("configure failed"), std::string::npos) << why;
     EXPECT_NE(why.find("nodeHandle()"), std::string::npos) << why;
@@ -203,7 +203,7 @@ TEST_F(RttCompat, PortsCarryStructsEnumsArraysStringsAndVectors) {
         hasSaid("/R", "7 0.5 2 3 a text that is longer than what a string holds in itself 99"));
 }
 
-TEST_F(RttCompat, TypesOfAComponentsOwnStayInTheRunnerAndThatIsSaid) {
+TEST_F(RttCompat, OwnTypesStayInTheRunnerWithANote) {
     configure([](RunnerSettings& settings) { settings.whitelist = ".*"; });
     const ChangeOutcome outcome = loadApi("Receiver", "R");
     EXPECT_NE(std::find(outcome.notes.begin(), outcome.notes.end(),
@@ -212,7 +212,7 @@ TEST_F(RttCompat, TypesOfAComponentsOwnStayInTheRunnerAndThatIsSaid) {
               outcome.notes.end());
 }
 
-TEST_F(RttCompat, LogsOfEachKindArriveThoseOfConstructorsToo) {
+TEST_F(RttCompat, LogsOfEachKindArriveIncludingConstructors) {
     loadApi("Logger", "L");
     step(1);
     EXPECT_EQ(said("/L"),
@@ -220,7 +220,7 @@ TEST_F(RttCompat, LogsOfEachKindArriveThoseOfConstructorsToo) {
                                         "configured", "updated", "and again"}));
 }
 
-TEST_F(RttCompat, LogOfAConstructorThatFailsArrives) {
+TEST_F(RttCompat, LogOfAFailingConstructorArrives) {
     EXPECT_NE(refusal([this] { loadApi("Unlucky", "U"); }).find("no luck"), std::string::npos);
     EXPECT_TRUE(hasSaid("/U", "about to fail"));
 }
@@ -232,7 +232,7 @@ TEST_F(RttCompat, ErrorHookRunsInsteadOfUpdateHookUntilItRecovers) {
               (std::vector<std::string>{"update 0", "update 1", "error 2", "error 3", "update 4"}));
 }
 
-TEST_F(RttCompat, PortsAreFoundCallBackAndMayBeClearedAndDisconnected) {
+TEST_F(RttCompat, PortsCanBeFoundClearedDisconnectedAndCallBack) {
     loadOld("Third", "T", {{"out", "thirds"}});
     loadApi("Listener", "L", {{"in", "thirds"}});
     step(7);
@@ -242,8 +242,8 @@ TEST_F(RttCompat, PortsAreFoundCallBackAndMayBeClearedAndDisconnected) {
                                         "called by in", "3: 2", "4: 1", "5: 0", "6: 0"}));
 }
 
-// Those that a constructor adds are there for the loader, also by way of a service.
-TEST_F(RttCompat, PropertiesAreParametersThatTheirVariablesFollow) {
+// A constructor's properties are available to the loader, also through a service.
+TEST_F(RttCompat, PropertiesAreParametersThatSetTheirVariables) {
     ComponentDefinition component = definition("Property21", "P");
     component.parameters = {{"gain", 1.5}, {"label", std::string("given")}};
     const auto load = [&] {
@@ -256,7 +256,7 @@ TEST_F(RttCompat, PropertiesAreParametersThatTheirVariablesFollow) {
     step(1);
     EXPECT_EQ(value("/P", "gain_seen"), 1.5);
     step(2);
-    EXPECT_EQ(value("/P", "gain_seen"), 7.0);  // the component's own
+    EXPECT_EQ(value("/P", "gain_seen"), 7.0);  // the component's own value
     setParameters("/P", {{"gain", 2.0}, {"late", 0.25}, {"label", std::string("late")}});
     step(1);
     EXPECT_EQ(value("/P", "gain_seen"), 2.25);
@@ -264,20 +264,20 @@ TEST_F(RttCompat, PropertiesAreParametersThatTheirVariablesFollow) {
     EXPECT_TRUE(hasSaid("/P", "stopped with late"));
 }
 
-TEST_F(RttCompat, PropertiesAfterTheConstructorAreRefused) {
+TEST_F(RttCompat, PropertiesAfterTheConstructorAreRejected) {
     EXPECT_EQ(refusal([this] { loadApi("LateProperty", "L"); }),
               "/L (rtcf_unit_test/LateProperty): configure failed: it threw: property 'late' is "
               "added too late: add it in the constructor");
 }
 
-TEST_F(RttCompat, OperationsCompileAndAreSaidToBeOfNoUse) {
+TEST_F(RttCompat, OperationsCompileAndAreReportedAsUnsupported) {
     loadApi("Property21", "P");
     EXPECT_TRUE(hasSaid("/P",
                         "operation 'reset' cannot be called in rtcf: offer a ROS service by "
                         "getNodeHandle() instead"));
 }
 
-TEST_F(RttCompat, TheLoopIsActiveInTheCycleOnly) {
+TEST_F(RttCompat, TheLoopIsActiveOnlyInTheCycle) {
     loadApi("Property21", "P");
     step(1);
     stop();

@@ -1,4 +1,4 @@
-// Changes of a graph while its loop runs: whole, at one boundary, or not at all.
+// Changes of a graph while its loop runs: completely, at one boundary, or not at all.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -23,7 +23,7 @@ class Change : public RunnerFixture {
         ASSERT_TRUE(runs());
     }
 
-    // A change that fails has left everything as it was.
+    // Checks that a failed change left everything unchanged.
     void expectUnchanged(const std::vector<std::string>& order_before,
                          std::uint64_t generation_before) {
         EXPECT_EQ(order(), order_before);
@@ -46,8 +46,8 @@ TEST_F(Change, LoadedComponentRunsAndOthersKeepTheirState) {
     EXPECT_EQ(journal().count("/B start"), 1U);
 }
 
-// A crash of what is loaded would end the loop that runs.
-TEST_F(Change, ATypeThatDiesOfWhatIsNoneIsLoaded) {
+// A crash of the loaded component would end the running loop.
+TEST_F(Change, ATypeThatCrashesOnInvalidValuesIsLoaded) {
     startWithA();
     load(definition("Gearbox", "G"));
     EXPECT_TRUE(runs());
@@ -57,7 +57,7 @@ TEST_F(Change, ATypeThatDiesOfWhatIsNoneIsLoaded) {
     unload("/G");
 }
 
-TEST_F(Change, WhatCannotBePublishedWithoutAllocationIsRefused) {
+TEST_F(Change, TypesThatAllocateWhenPublishedAreRejected) {
     configure([](RunnerSettings& settings) { settings.whitelist = "/trace"; });
     startWithA();
     const auto order_before = order();
@@ -84,12 +84,12 @@ TEST_F(Change, UnloadedComponentIsStoppedAndCleanedUpAfterItLeftTheLoop) {
     unload("/B");
     EXPECT_EQ(journal().count("/B stop"), 1U);
     EXPECT_EQ(journal().count("/B cleanup"), 1U);
-    EXPECT_EQ(journal().count("/B safe"), 1U) << "though the loop goes on";
+    EXPECT_EQ(journal().count("/B safe"), 1U) << "although the loop continues";
     EXPECT_EQ(order(), std::vector<std::string>{"/A"});
     EXPECT_TRUE(runs());
 }
 
-TEST_F(Change, EachCycleOfAComponentThatStaysIsCounted) {
+TEST_F(Change, EachCycleOfAnUnchangedComponentIsCounted) {
     startWithA();
     for (int i = 0; i < 10; ++i) {
         load(recorder("B"));
@@ -97,7 +97,7 @@ TEST_F(Change, EachCycleOfAComponentThatStaysIsCounted) {
     }
     stop();
     EXPECT_EQ(value("/A", "out"), static_cast<double>(iteration()))
-        << "one update in every cycle, none twice";
+        << "exactly one update per cycle";
 }
 
 TEST_F(Change, ReplacementTakesOverAtTheBoundary) {
@@ -106,14 +106,14 @@ TEST_F(Change, ReplacementTakesOverAtTheBoundary) {
     ASSERT_TRUE(runs());
     stop();
     EXPECT_EQ(value("/A", "out"), static_cast<double>(iteration()))
-        << "it counts on from its predecessor's count";
+        << "it continues its predecessor's count";
     EXPECT_EQ(journal().notes(),
               (std::vector<std::string>{"/A configure", "/A start", "/A update", "/A configure",
                                         "/A start", "/A takeOver", "/A safe", "/A stop",
                                         "/A cleanup", "/A safe", "/A stop"}));
 }
 
-// Of what it replaces it has no state: its first update() is noted as such.
+// A new component has no state from the replaced one: its first update() is recorded as such.
 TEST_F(Change, ReplacementTakesOverBeforeItsFirstUpdate) {
     load(definition("Ticker", "T"));
     start();
@@ -133,7 +133,7 @@ TEST_F(Change, ReplacementByAnotherNameTakesOverToo) {
     EXPECT_GT(value("/B", "out"), 0.0);
 }
 
-TEST_F(Change, ReplacementThatIsRefusedLeavesTheOldOneRunning) {
+TEST_F(Change, RejectedReplacementLeavesTheOldOneRunning) {
     startWithA();
     const auto before = generation();
     ComponentDefinition bad = recorder("A");
@@ -141,11 +141,11 @@ TEST_F(Change, ReplacementThatIsRefusedLeavesTheOldOneRunning) {
     EXPECT_NE(refusal([&] { replace("/A", bad); }), "");
     expectUnchanged({"/A"}, before);
     EXPECT_EQ(journal().count("/A takeOver"), 0U);
-    EXPECT_EQ(journal().count("/A cleanup"), 1U) << "the new one's";
+    EXPECT_EQ(journal().count("/A cleanup"), 1U) << "of the new component";
     EXPECT_EQ(journal().count("/A stop"), 0U);
 }
 
-TEST_F(Change, ConfigureThatRefusesIsToldAndUndone) {
+TEST_F(Change, FailingConfigureIsReportedAndUndone) {
     startWithA();
     const auto before = generation();
     ComponentDefinition bad = recorder("B");
@@ -157,7 +157,7 @@ TEST_F(Change, ConfigureThatRefusesIsToldAndUndone) {
     EXPECT_EQ(journal().count("/B start"), 0U);
 }
 
-TEST_F(Change, ConfigureThatThrowsIsToldAndUndone) {
+TEST_F(Change, ThrowingConfigureIsReportedAndUndone) {
     startWithA();
     const auto before = generation();
     ComponentDefinition bad = recorder("B");
@@ -168,7 +168,7 @@ TEST_F(Change, ConfigureThatThrowsIsToldAndUndone) {
     EXPECT_EQ(journal().count("/B cleanup"), 1U);
 }
 
-TEST_F(Change, StartThatRefusesIsToldAndUndone) {
+TEST_F(Change, FailingStartIsReportedAndUndone) {
     startWithA();
     const auto before = generation();
     ComponentDefinition bad = recorder("B");
@@ -176,11 +176,11 @@ TEST_F(Change, StartThatRefusesIsToldAndUndone) {
     EXPECT_NE(refusal([&] { load(bad); }).find("start failed"), std::string::npos);
     expectUnchanged({"/A"}, before);
     EXPECT_EQ(journal().count("/B cleanup"), 1U);
-    EXPECT_EQ(journal().count("/B stop"), 0U) << "it never started";
+    EXPECT_EQ(journal().count("/B stop"), 0U) << "it was not started";
     EXPECT_EQ(journal().count("/B update"), 0U);
 }
 
-TEST_F(Change, LoopOfConnectionsIsRefusedAndTheNewComponentCleanedUpOnce) {
+TEST_F(Change, LoopOfConnectionsIsRejectedAndTheNewComponentCleanedUpOnce) {
     startWithA();
     const auto before = generation();
     ComponentDefinition closing = recorder("B");
@@ -193,7 +193,7 @@ TEST_F(Change, LoopOfConnectionsIsRefusedAndTheNewComponentCleanedUpOnce) {
     EXPECT_EQ(journal().count("/B start"), 0U);
 }
 
-TEST_F(Change, UnbreakThatWouldCloseALoopIsRefused) {
+TEST_F(Change, UnbreakThatWouldCloseALoopIsRejected) {
     startWithA();
     ComponentDefinition closing = recorder("B");
     closing.remaps = {{"in", "A_out"}, {"out", "A_in"}};
@@ -205,7 +205,7 @@ TEST_F(Change, UnbreakThatWouldCloseALoopIsRefused) {
     expectUnchanged({"/B", "/A"}, before);
 }
 
-TEST_F(Change, BreaksMoveTheOrderOfARunningLoop) {
+TEST_F(Change, BreaksChangeTheOrderOfARunningLoop) {
     startWithA();
     ComponentDefinition closing = recorder("B");
     closing.remaps = {{"in", "A_out"}, {"out", "A_in"}};
@@ -219,7 +219,7 @@ TEST_F(Change, BreaksMoveTheOrderOfARunningLoop) {
     EXPECT_EQ(value("/A", "out"), static_cast<double>(iteration()));
 }
 
-TEST_F(Change, TakenNameIsRefusedBeforeAnythingIsConstructed) {
+TEST_F(Change, TakenNameIsRejectedBeforeConstruction) {
     startWithA();
     const auto before = generation();
     const std::string text = refusal([&] { load(recorder("A")); });
@@ -228,13 +228,13 @@ TEST_F(Change, TakenNameIsRefusedBeforeAnythingIsConstructed) {
     expectUnchanged({"/A"}, before);
 }
 
-TEST_F(Change, UnknownTypeIsRefusedWithTheTypesThereAre) {
+TEST_F(Change, UnknownTypeIsRejectedWithTheExistingTypes) {
     const std::string text = refusal([&] { load(definition("Nothing", "N")); });
     EXPECT_NE(text.find("no component type Nothing; it has"), std::string::npos) << text;
     EXPECT_NE(text.find("Recorder"), std::string::npos) << text;
 }
 
-TEST_F(Change, BadLoadTimeParameterIsRefusedBeforeConfigure) {
+TEST_F(Change, BadLoadTimeParameterIsRejectedBeforeConfigure) {
     startWithA();
     ComponentDefinition bad = recorder("B");
     bad.parameters = {{"gain", 11.0}};
@@ -250,7 +250,7 @@ TEST_F(Change, BatchOfParametersIsSetInOneCycle) {
     EXPECT_EQ(value("/A", "out"), 2.0 * static_cast<double>(iteration()));
 }
 
-// A graph of thousands is not planned anew for a number.
+// A change of one number must not replan a graph of thousands of components.
 TEST_F(Change, ValuesOfParametersNeedNoNewSchedule) {
     startWithA();
     const std::size_t before = builtPlans().count;
@@ -258,7 +258,7 @@ TEST_F(Change, ValuesOfParametersNeedNoNewSchedule) {
     setParameters("/A", {{"gain", 3.0}, {"limit", 4.0}});
     EXPECT_EQ(builtPlans().count, before);
     load(recorder("B"));
-    EXPECT_EQ(builtPlans().count, before + 1) << "which is how one sees it";
+    EXPECT_EQ(builtPlans().count, before + 1) << "a change of the graph is planned again";
 }
 
 TEST_F(Change, BatchWithABadValueSetsNothing) {
@@ -288,7 +288,7 @@ TEST_F(Change, FrequencyChangesWhileTheLoopRuns) {
     EXPECT_EQ(journal().count("/A start"), 1U);
 }
 
-TEST_F(Change, AFrequencyThatChangesLeavesElapsedWhatTimeHasGoneOnBy) {
+TEST_F(Change, ElapsedStaysConsistentWhenTheFrequencyChanges) {
     load(definition("Stopwatch", "W"));
     start();
     for (const double frequency : {10.0, 1000.0, 300.0, 1000.0}) {
@@ -299,7 +299,7 @@ TEST_F(Change, AFrequencyThatChangesLeavesElapsedWhatTimeHasGoneOnBy) {
     }
 }
 
-TEST_F(Change, AFrequencyThatChangesBetweenStepsIsThatOfTheNextOne) {
+TEST_F(Change, AFrequencyChangedBetweenStepsAppliesToTheNextOne) {
     load(definition("Stopwatch", "W"));
     for (const double frequency : {1000.0, 10.0, 1000.0}) {
         configure([&](RunnerSettings& settings) { settings.frequency_hz = frequency; });
@@ -309,7 +309,7 @@ TEST_F(Change, AFrequencyThatChangesBetweenStepsIsThatOfTheNextOne) {
     }
 }
 
-TEST_F(Change, BadSettingsAreRefusedAndTheOldOnesStay) {
+TEST_F(Change, BadSettingsAreRejectedAndTheOldOnesStay) {
     startWithA();
     EXPECT_NE(refusal([&] { configure([](RunnerSettings& s) { s.frequency_hz = std::nan(""); }); }),
               "");
@@ -330,10 +330,10 @@ TEST_F(Change, TopicsFollowTheWhitelistOfARunningLoop) {
     EXPECT_TRUE(eventually(
         [&] { return tap->pop([](const std::uint8_t*, std::uint32_t, std::int64_t) {}); }));
     load(recorder("B"));
-    EXPECT_EQ(bridge().tap("/A_out"), tap) << "what stays goes on undisturbed";
+    EXPECT_EQ(bridge().tap("/A_out"), tap) << "unchanged topics keep their taps";
 }
 
-// A writer inside the loop takes an input from ROS, and gives it back when it leaves.
+// A writer in the loop ends an input's subscription; its unload restores it.
 TEST_F(Change, InputIsSubscribedOnlyWithoutAWriter) {
     startWithA();
     configure([](RunnerSettings& settings) { settings.whitelist = "/A_in"; });
@@ -348,7 +348,7 @@ TEST_F(Change, InputIsSubscribedOnlyWithoutAWriter) {
     EXPECT_TRUE(runs());
 }
 
-// One number in two clothes: a connection between them costs nothing, and no component in between.
+// The same number in two types: a connection between them needs neither conversion nor component.
 TEST_F(Change, OutputOfADoubleFeedsAFloat64) {
     ComponentDefinition writer = definition("Stateful", "A");
     writer.remaps = {{"out", "x"}};
@@ -363,7 +363,7 @@ TEST_F(Change, OutputOfADoubleFeedsAFloat64) {
     EXPECT_EQ(value("/B", "in"), 4.0);
 }
 
-// 16 values of it, not the 500 of half a second: rings are locked memory.
+// 16 values, not the 500 of half a second: rings are locked memory.
 TEST_F(Change, RingOfALargeTypeIsBoundedInBytes) {
     configure([](RunnerSettings& settings) {
         settings.whitelist = ".*";
@@ -380,7 +380,7 @@ TEST_F(Change, RingOfALargeTypeIsBoundedInBytes) {
 }
 
 // 8 MiB each.
-TEST_F(Change, RingsAreBoundedTogether) {
+TEST_F(Change, RingsAreBoundedInTotal) {
     configure([](RunnerSettings& settings) {
         settings.whitelist = ".*";
         settings.frequency_hz = 2000.0;
@@ -393,7 +393,7 @@ TEST_F(Change, RingsAreBoundedTogether) {
     for (int number = 1; number <= 32; ++number) load(camera(number));
     try {
         load(camera(33));
-        FAIL() << "it is not refused";
+        FAIL() << "no error";
     } catch (const Refusal& refused) {
         EXPECT_EQ(refused.kind(), executor::RefusalKind::ResourceExhausted);
         const std::string text = refused.what();

@@ -30,7 +30,7 @@ class Fault : public RunnerFixture {
     }
 };
 
-TEST_F(Fault, ExceptionStopsTheLoopAndIsTold) {
+TEST_F(Fault, ExceptionStopsTheLoopAndIsReported) {
     load(recorder("A", -1));
     load(recorder("B", 10));
     load(recorder("C", -1));
@@ -89,8 +89,8 @@ TEST_F(Fault, GraphCanBeChangedAfterIt) {
     EXPECT_TRUE(runs());
 }
 
-// The loop ends while the graph thread is busy; then what threw is unloaded at once.
-TEST_F(Fault, CulpritThatIsUnloadedAtOnceIsStillNamed) {
+// The loop ends while the graph thread is busy; then the culprit is unloaded immediately.
+TEST_F(Fault, CulpritUnloadedImmediatelyIsStillNamed) {
     load(recorder("B", 10));
     start();
     onGraphThread([this] {
@@ -119,7 +119,7 @@ TEST_F(Fault, ComponentLoadedRightAfterItIsNotStarted) {
     EXPECT_EQ(journal().count("/C start"), 0U);
 }
 
-TEST_F(Fault, StartRightAfterItStartsAllAgain) {
+TEST_F(Fault, StartRightAfterItRestartsAll) {
     load(recorder("A", -1));
     load(recorder("B", 10));
     start();
@@ -135,7 +135,7 @@ TEST_F(Fault, StartRightAfterItStartsAllAgain) {
     EXPECT_EQ(journal().count("/A stop"), 1U);
 }
 
-TEST_F(Fault, StopOfAFaultedRunnerSaysNothing) {
+TEST_F(Fault, StopOfAFaultedRunnerIsSilent) {
     load(recorder("B", 10));
     start();
     ASSERT_TRUE(waitForFault());
@@ -143,7 +143,7 @@ TEST_F(Fault, StopOfAFaultedRunnerSaysNothing) {
     EXPECT_EQ(journal().count("/B stop"), 1U);
 }
 
-// A component that faults in every cycle has its own place for that.
+// A component that faults in every cycle has a separate queue entry.
 TEST_F(Fault, NoFaultIsLostInAFloodOfOthers) {
     for (const std::string name : {"N1", "N2"}) {
         ComponentDefinition flooding = definition("Controller", name);
@@ -155,7 +155,7 @@ TEST_F(Fault, NoFaultIsLostInAFloodOfOthers) {
     ComponentDefinition late = recorder("Z", 300);
     late.optional = true;
     load(late);
-    // Nobody takes reports while the graph thread is busy.
+    // No reports are taken while the graph thread is busy.
     onGraphThread([this] {
         runner().start([](const std::string&) {});
         return eventually([this] { return iteration() > 400; });
@@ -173,7 +173,7 @@ TEST_F(Fault, NoFaultIsLostInAFloodOfOthers) {
     EXPECT_EQ(state(), RunnerState::Running);
 }
 
-TEST_F(Fault, OfALoopBeforeAreNotCounted) {
+TEST_F(Fault, OfAnEarlierRunAreNotCounted) {
     ComponentDefinition flooding = definition("Controller", "N");
     flooding.parameters = {{"nan_from", std::int64_t{0}}};
     load(flooding);
@@ -188,7 +188,7 @@ TEST_F(Fault, OfALoopBeforeAreNotCounted) {
     start();
     ASSERT_TRUE(eventually([&] { return told().size() == 1; }));
     stop();
-    // More of them than the first loop had, before the graph thread takes the first.
+    // More faults than in the first run, before the graph thread takes the first report.
     onGraphThread([this] {
         runner().start([](const std::string&) {});
         return eventually([this] { return iteration() > 400; });
@@ -198,7 +198,7 @@ TEST_F(Fault, OfALoopBeforeAreNotCounted) {
 }
 
 TEST_F(Fault, LongExceptionTextIsCut) {
-    // The text of Recorder is short; the culprit's name makes the message long.
+    // Recorder's text is short; the culprit's name makes the message long.
     const std::string name = "B" + std::string(230, 'b');
     load(recorder(name, 3));
     start();
@@ -225,7 +225,7 @@ TEST_F(Fault, StatesAreNumbered) {
     step(1);
     EXPECT_EQ(number(), 4U);
     ASSERT_EQ(ends().size(), 1U);
-    EXPECT_EQ(ends()[0].state.number, 4U) << "an event tells which state it is about";
+    EXPECT_EQ(ends()[0].state.number, 4U) << "an event has the number of its state";
     EXPECT_EQ(ends()[0].state.state, RunnerState::Faulted);
 }
 

@@ -1,4 +1,4 @@
-// Snapshots of a runner: that a restored one goes on with the same bits, and what is refused.
+// Snapshots of a runner: a restored one continues with the same bits; unsuitable ones are rejected.
 #include "image/image.hpp"
 
 #include <gtest/gtest.h>
@@ -34,7 +34,7 @@ class Image : public RunnerFixture {
         return result;
     }
 
-    // Four in a ring with loop breaks of both kinds, some of which skip cycles.
+    // Four components in a ring with loop breaks of both kinds, some of which skip cycles.
     void loadRing() {
         ComponentDefinition p = chaos("P", "S_x", "R_checked");
         p.first = true;
@@ -55,7 +55,7 @@ class Image : public RunnerFixture {
     ChangeOutcome restore(const RunnerImage& image) {
         return onGraphThread([&] { return runner().restore(image, [](const std::string&) {}); });
     }
-    // All that there is, but for when it was looked at.
+    // The whole snapshot, except the time at which it was taken.
     static std::string bytesOf(RunnerImage image) {
         image.taken_ns = 0;
         return imageToFile(image);
@@ -66,7 +66,7 @@ class Image : public RunnerFixture {
         for (const char* name : {"/P", "/Q", "/R", "/S"})
             setParameters(name, {{"ask", static_cast<std::int64_t>(cycle)}});
     }
-    // What the components had made of everything up to a cycle that has been.
+    // The components' digests at an earlier cycle.
     std::vector<double> digestsAt(std::uint64_t cycle) {
         ask(cycle);
         EXPECT_TRUE(runs(9));
@@ -82,7 +82,7 @@ class Image : public RunnerFixture {
         return eventually([&] { return iteration() >= cycle; });
     }
 
-    // That it is refused, with these words, and changes nothing.
+    // Checks that it is rejected with these words, and changes nothing.
     void expectRefused(const RunnerImage& image, const std::string& words) {
         const std::string before = now();
         const std::string text = refusal([&] { restore(image); });
@@ -91,7 +91,7 @@ class Image : public RunnerFixture {
     }
 };
 
-TEST_F(Image, RestoredStepsGoOnWithTheSameBits) {
+TEST_F(Image, RestoredStepsContinueWithTheSameBits) {
     loadRing();
     for (const char* name : {"/P", "/Q", "/R", "/S"}) setParameters(name, {{"timed", true}});
     step(123);
@@ -106,7 +106,7 @@ TEST_F(Image, RestoredStepsGoOnWithTheSameBits) {
     EXPECT_EQ(now(), end);
 }
 
-TEST_F(Image, RestoredLoopGoesOnWithTheSameBits) {
+TEST_F(Image, RestoredLoopContinuesWithTheSameBits) {
     configure([](RunnerSettings& settings) {
         settings.frequency_hz = 4000.0;
         settings.loop.period_ns = 250'000;
@@ -126,7 +126,7 @@ TEST_F(Image, RestoredLoopGoesOnWithTheSameBits) {
     EXPECT_EQ(state(), RunnerState::Running);
 }
 
-TEST_F(Image, OfARunningLoopIsTheOneOfItsSteps) {
+TEST_F(Image, OfARunningLoopCanBeStepped) {
     loadRing();
     start();
     ASSERT_TRUE(runs());
@@ -142,7 +142,7 @@ TEST_F(Image, OfARunningLoopIsTheOneOfItsSteps) {
     EXPECT_EQ(now(), end);
 }
 
-TEST_F(Image, GoesIntoAnotherRunnerWithTheSameGraphWhateverItsPast) {
+TEST_F(Image, FitsAnotherRunnerWithTheSameGraph) {
     loadRing();
     step(100);
     const RunnerImage image = take();
@@ -150,7 +150,7 @@ TEST_F(Image, GoesIntoAnotherRunnerWithTheSameGraphWhateverItsPast) {
     const std::string end = now();
     for (const char* name : {"/S", "/R", "/Q", "/P"}) unload(name);
     stop();
-    // Other connections before, other phases, parameters and values.
+    // Other connections first, other phases, parameters and values.
     load(chaos("S", "Q_checked", "Q_checked"));
     ComponentDefinition r = chaos("R", "Q_checked", "P_x");
     r.every = 4;
@@ -172,8 +172,8 @@ TEST_F(Image, GoesIntoAnotherRunnerWithTheSameGraphWhateverItsPast) {
     EXPECT_EQ(now(), end);
 }
 
-// What an input has of a writer that has gone, or that it does not read any more.
-TEST_F(Image, KeepsWhatInputsHaveOfEarlierWriters) {
+// The value of an input from an unloaded writer, or from a connection that it no longer reads.
+TEST_F(Image, KeepsInputValuesOfEarlierWriters) {
     load(chaos("P", "Q_x", "Q_x"));
     setBreak("/P", "a", true);
     setBreak("/P", "b", true);
@@ -187,7 +187,7 @@ TEST_F(Image, KeepsWhatInputsHaveOfEarlierWriters) {
     ComponentDefinition late = chaos("Q", "P_x", "P_checked");
     late.every = 7;
     late.phase = 5;
-    load(late);  // P and R keep what the first Q wrote until this one writes
+    load(late);  // P and R keep the first Q's value until this one writes
     const RunnerImage with_kept = take();
     step(kMany);
     const std::string end = now();
@@ -205,7 +205,7 @@ TEST_F(Image, KeepsWhatInputsHaveOfEarlierWriters) {
     replace("/R", chaos("R", "Q_x", "P_x"));
     restore(with_left);
     step(kMany);
-    EXPECT_EQ(now(), alone) << "also into inputs that never had a writer";
+    EXPECT_EQ(now(), alone) << "also for inputs that never had a writer";
 }
 
 TEST_F(Image, HasTheLastValueFromOutside) {
@@ -231,7 +231,7 @@ TEST_F(Image, HasTheLastValueFromOutside) {
     EXPECT_EQ(now(), end);
 }
 
-TEST_F(Image, BringsParametersBack) {
+TEST_F(Image, RestoresParameters) {
     loadRing();
     setParameters("/P", {{"rate", 3.75}});
     const RunnerImage image = take();
@@ -249,7 +249,7 @@ TEST_F(Image, BringsParametersBack) {
     EXPECT_EQ(rate("/S"), 3.9);
 }
 
-TEST_F(Image, ThatDoesNotFitIsRefusedWhole) {
+TEST_F(Image, UnsuitableOneIsRejectedCompletely) {
     loadRing();
     step(50);
     const RunnerImage image = take();
@@ -332,7 +332,7 @@ TEST_F(Image, OfAnotherBuildFitsByNameAndType) {
     EXPECT_EQ(value("/A", "out"), 11.0);
 }
 
-TEST_F(Image, ThatACycleHasNoTimeForIsRefusedWithTheBound) {
+TEST_F(Image, TooLargeForACycleIsRejectedWithTheLimit) {
     load(definition("Camera", "C"));
     const RunnerImage image = take();
     start();
@@ -348,7 +348,7 @@ TEST_F(Image, ThatACycleHasNoTimeForIsRefusedWithTheBound) {
     restore(image);
 }
 
-TEST_F(Image, LargerThanReservedIsRefusedInTheCycle) {
+TEST_F(Image, LargerThanReservedIsRejectedInTheCycle) {
     loadRing();
     RunnerImage image = take();
     image.components[0].outputs[3].value.bytes =
@@ -363,7 +363,7 @@ TEST_F(Image, LargerThanReservedIsRefusedInTheCycle) {
     restore(image);
 }
 
-TEST_F(Image, OfWhatWasTakenOutIsRefused) {
+TEST_F(Image, OfATakenOutComponentIsRejected) {
     loadRing();
     const RunnerImage before = take();
     ComponentDefinition throwing = definition("Controller", "C");
@@ -379,20 +379,20 @@ TEST_F(Image, OfWhatWasTakenOutIsRefused) {
     restore(before);
 }
 
-// A cycle that came late has an elapsed() of its own; the steps after it have not.
+// A late cycle has a larger elapsed(); the steps after it do not.
 TEST_F(Image, AfterAMissedCycleStepsHaveOnePeriodEach) {
     load(definition("Spinner", "S"));
     step(5);
     RunnerImage image = take();
-    image.clock.elapsed_ns = 3 * image.period_ns;  // as of a loop that had just missed two
+    image.clock.elapsed_ns = 3 * image.period_ns;  // as in a loop that just missed two
     const double before = value("/S", "periods");
     restore(image);
     step(11);
     EXPECT_EQ(value("/S", "periods"), before + 3.0 + 10.0);
 }
 
-// A topic that is taken away leaves its last value, and so does its image.
-TEST_F(Image, KeepsWhatATopicLeft) {
+// A removed topic leaves its last value in the input, and in the snapshot.
+TEST_F(Image, KeepsTheLastValueOfARemovedTopic) {
     configure([](RunnerSettings& settings) { settings.whitelist = "/outside"; });
     ComponentDefinition relay = definition("Relay", "P");
     relay.remaps = {{"in", "/outside"}};
@@ -417,7 +417,7 @@ TEST_F(Image, KeepsWhatATopicLeft) {
     expectOld("in an input that never had a writer");
 }
 
-// To be run with AddressSanitizer: the input's value is freed by the next change.
+// For AddressSanitizer: the next change frees the input's value.
 TEST_F(Image, AKeptValueOutlivesTheNextChange) {
     ComponentDefinition ticker = definition("Ticker", "W");
     ticker.remaps = {{"out", "/w"}};
@@ -428,14 +428,14 @@ TEST_F(Image, AKeptValueOutlivesTheNextChange) {
     step(4);
     const double kept = value("/P", "out");
     configure([](RunnerSettings& settings) { settings.whitelist = "/w"; });
-    unload("/W");  // P turns to the topic, on which nothing comes,
-    configure([](RunnerSettings& settings) { settings.whitelist = ""; });  // which then goes too
+    unload("/W");  // P now reads the topic, which has no messages,
+    configure([](RunnerSettings& settings) { settings.whitelist = ""; });  // which is removed, too
     const RunnerImage image = take();
     replace("/P", relay);
     restore(image);
     step(1);
     ASSERT_EQ(value("/P", "out"), kept);
-    for (const char* name : {"X", "Y", "Z"}) {  // its memory is used again
+    for (const char* name : {"X", "Y", "Z"}) {  // its memory is reused
         ComponentDefinition other = definition("Ticker", name);
         other.remaps = {{"out", std::string("/") + name}};
         load(other);
@@ -444,10 +444,10 @@ TEST_F(Image, AKeptValueOutlivesTheNextChange) {
     EXPECT_EQ(value("/P", "out"), kept);
 }
 
-// Fewer bytes on the wire are not less memory: here a dimension that nothing is reserved for. The
-// sanitizer of the cycle says whether it allocates.
+// Fewer bytes on the wire do not mean less memory: here a dimension without reserved memory. The
+// sanitizer detects an allocation in the cycle.
 TEST_F(Image, OfAnotherShapeAllocatesNothingInTheCycle) {
-    load(chaos("P", "S_x", "R_checked"));  // nobody reads it late, and copies it for that
+    load(chaos("P", "S_x", "R_checked"));  // no reader with a loop break, which would copy it
     RunnerImage image = take();
     const auto word = [](std::uint32_t number) {
         return std::string(reinterpret_cast<const char*>(&number), sizeof number);
@@ -463,7 +463,7 @@ TEST_F(Image, OfAnotherShapeAllocatesNothingInTheCycle) {
     EXPECT_EQ(take().components[0].outputs[3].value.bytes, other);
 }
 
-TEST_F(Image, WithAClockThatIsNoneIsRefused) {
+TEST_F(Image, WithAnInvalidClockIsRejected) {
     loadRing();
     step(5);
     const RunnerImage image = take();
@@ -473,7 +473,7 @@ TEST_F(Image, WithAClockThatIsNoneIsRefused) {
              [](RunnerImage& other) { other.clock.time_ns = INT64_MIN; },
              [](RunnerImage& other) { other.clock.time_ns = INT64_MAX; },
              [](RunnerImage& other) { other.clock.total_elapsed_ns = INT64_MIN; },
-             // More seconds than a ros::Time has: whoever publishes the cycle would throw.
+             // More seconds than ros::Time can hold: publishing the cycle would throw.
              [](RunnerImage& other) { other.clock.stamp_ns = 5'000'000'000'000'000'000; }}) {
         RunnerImage other = image;
         change(other);
@@ -481,8 +481,8 @@ TEST_F(Image, WithAClockThatIsNoneIsRefused) {
     }
 }
 
-// What a stopped runner refuses runs no hook of its components.
-TEST_F(Image, ThatIsRefusedStartsNothing) {
+// A rejected snapshot of a stopped runner runs no hooks.
+TEST_F(Image, RejectedOneStartsNothing) {
     load(definition("Recorder", "C"));
     RunnerImage image = take();
     for (auto& [name, value] : image.components[0].parameters) {
@@ -490,10 +490,10 @@ TEST_F(Image, ThatIsRefusedStartsNothing) {
     }
     const std::uint32_t before = runner().numberedState().number;
     EXPECT_NE(refusal([&] { restore(image); }), "");
-    EXPECT_EQ(runner().numberedState().number, before) << "it was started, made safe and stopped";
+    EXPECT_EQ(runner().numberedState().number, before) << "it must not be started";
 }
 
-TEST_F(Image, FileThatIsNotAsItWasWrittenIsRefused) {
+TEST_F(Image, AlteredFileIsRejected) {
     loadRing();
     step(5);
     const std::string file = imageToFile(take());
@@ -515,7 +515,7 @@ TEST_F(Image, FileThatIsNotAsItWasWrittenIsRefused) {
     EXPECT_NE(told(file + "x").find("is damaged"), std::string::npos);
 }
 
-TEST_F(Image, SaysWhatDeclaresNoState) {
+TEST_F(Image, ListsComponentsWithoutState) {
     load(definition("Controller", "C"));
     const auto notes = onGraphThread([&] { return runner().takeImage().notes; });
     ASSERT_EQ(notes.size(), 1U);

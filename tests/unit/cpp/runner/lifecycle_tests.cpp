@@ -1,4 +1,4 @@
-// The order of the hooks, and that stop never waits for one.
+// The order of the hooks; stop never waits for a hook.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -25,7 +25,7 @@ class Lifecycle : public RunnerFixture {
         return result;
     }
 
-    // Of the notes, those of one hook.
+    // The notes of one hook.
     std::vector<std::string> notesOf(const std::string& hook) {
         std::vector<std::string> result;
         for (const std::string& note : journal().notes()) {
@@ -70,7 +70,7 @@ TEST_F(Lifecycle, ComponentCanBeStartedAgain) {
     EXPECT_EQ(journal().count("/A safe"), 3U);
 }
 
-TEST_F(Lifecycle, StartAndSafeFollowTheScheduleAndStopGoesBackwards) {
+TEST_F(Lifecycle, StartAndSafeFollowTheScheduleAndStopReversesIt) {
     loadChain();
     EXPECT_EQ(order(), (std::vector<std::string>{"/C", "/B", "/A"}));
     start();
@@ -81,7 +81,7 @@ TEST_F(Lifecycle, StartAndSafeFollowTheScheduleAndStopGoesBackwards) {
     EXPECT_EQ(notesOf("stop"), (std::vector<std::string>{"/A", "/B", "/C"}));
 }
 
-TEST_F(Lifecycle, StartThatIsRefusedStopsWhatHadStarted) {
+TEST_F(Lifecycle, FailedStartStopsTheStartedComponents) {
     loadChain();
     setParameters("/A", {{"refuses", std::string("start")}});
     const std::string text = refusal([this] { start(); });
@@ -135,7 +135,7 @@ TEST_F(Lifecycle, QueriesAreAnsweredWhileAHookBlocks) {
     EXPECT_EQ(order(), (std::vector<std::string>{"/A", "/B"}));
 }
 
-TEST_F(Lifecycle, LoopStopsWhileAHookBlocksAndWhatIsLoadedThenIsNotStarted) {
+TEST_F(Lifecycle, LoopStopsWhileAHookBlocksAndTheNewComponentIsNotStarted) {
     load(definition("Recorder", "A"));
     start();
     ASSERT_TRUE(runs());
@@ -192,10 +192,10 @@ TEST_F(Lifecycle, StopWhileStartHooksRunIsFinal) {
     EXPECT_EQ(journal().count("/A stop"), 1U);
     EXPECT_EQ(journal().count("/B stop"), 1U);
     start();
-    EXPECT_TRUE(runs()) << "what is asked for after it starts again";
+    EXPECT_TRUE(runs()) << "a later start runs the loop";
 }
 
-TEST_F(Lifecycle, StopVoidsStartsAndStepsThatWait) {
+TEST_F(Lifecycle, StopCancelsQueuedStartsAndSteps) {
     load(definition("Recorder", "A"));
     journal().gate_open = false;
     const ComponentDefinition slow = blocker("B", "configure");
@@ -210,12 +210,12 @@ TEST_F(Lifecycle, StopVoidsStartsAndStepsThatWait) {
     EXPECT_NE(refusal([&] { starting.get(); }), "");
     EXPECT_NE(refusal([&] { stepping.get(); }), "");
     stopping.get();
-    EXPECT_EQ(journal().count("/A safe"), 0U) << "nothing had run";
+    EXPECT_EQ(journal().count("/A safe"), 0U) << "no cycle had run";
     last.get();
     EXPECT_TRUE(runs());
 }
 
-TEST_F(Lifecycle, WhatHooksLogComesWithTheComponentsName) {
+TEST_F(Lifecycle, LogRecordsOfHooksHaveTheComponentsName) {
     load(definition("Chatter", "A"));
     start();
     ASSERT_TRUE(runs());
@@ -227,14 +227,14 @@ TEST_F(Lifecycle, WhatHooksLogComesWithTheComponentsName) {
         const std::string kind = entry.message.substr(0, entry.message.find(' '));
         if (kinds.empty() || kinds.back() != kind) kinds.push_back(kind);
     }
-    // The loop's own ring is emptied beside the other one, so that those two are in no order to
-    // each other.
+    // The loop's ring is emptied separately from the other one, so the order of these two records
+    // is undefined.
     std::sort(kinds.begin(), kinds.end());
     EXPECT_EQ(kinds, (std::vector<std::string>{"cleanup", "configure", "safe", "start", "stop",
                                                "update"}));
 }
 
-TEST_F(Lifecycle, WhatARefusedComponentLoggedIsNotLost) {
+TEST_F(Lifecycle, LogRecordsOfARejectedComponentAreNotLost) {
     ComponentDefinition chatter = definition("Chatter", "A");
     chatter.parameters = {{"refuses", true}};
     EXPECT_NE(refusal([&] { load(chatter); }), "");
@@ -246,7 +246,7 @@ TEST_F(Lifecycle, WhatARefusedComponentLoggedIsNotLost) {
     EXPECT_EQ(messages, (std::vector<std::string>{"configure", "cleanup"}));
 }
 
-TEST_F(Lifecycle, WhatIsLoggedAtTheEndOfTheRunnerIsNotLost) {
+TEST_F(Lifecycle, LogRecordsAtTheEndOfTheRunnerAreNotLost) {
     load(definition("Chatter", "A"));
     endRunner();
     const std::vector<LogEntry> entries = logged();

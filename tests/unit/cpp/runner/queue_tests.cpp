@@ -1,4 +1,4 @@
-// Queues in a graph: messages of components and from outside, each one and in order. Stepped, so
+// Queues in a graph: each message of components and from outside arrives, in order. Stepped, so
 // that each cycle is known.
 #include <gtest/gtest.h>
 
@@ -38,7 +38,7 @@ class Queues : public RunnerFixture {
     }
 };
 
-TEST_F(Queues, MessagesFromOutsideAllComeInOrder) {
+TEST_F(Queues, MessagesFromOutsideArriveInOrder) {
     loadOutside();
     for (const double number : {1.0, 2.0, 3.0}) send(number);
     step(1);
@@ -49,7 +49,7 @@ TEST_F(Queues, MessagesFromOutsideAllComeInOrder) {
     EXPECT_EQ(value("/C", "dropped"), 0.0);
 }
 
-TEST_F(Queues, WhatThereIsNoRoomForIsCounted) {
+TEST_F(Queues, DroppedMessagesAreCounted) {
     loadOutside();
     for (int number = 1; number <= 7; ++number) send(number);
     step(1);
@@ -67,7 +67,7 @@ TEST_F(Queues, WhatThereIsNoRoomForIsCounted) {
     EXPECT_EQ(value("/C", "order"), 12345675.0);
 }
 
-TEST_F(Queues, TextsComeWholeAndTheirMemoryIsUsedAgain) {
+TEST_F(Queues, TextsArriveCompletelyAndTheirMemoryIsReused) {
     loadOutside();
     double letters = 0.0;
     for (int round = 0; round < 20; ++round) {
@@ -80,7 +80,7 @@ TEST_F(Queues, TextsComeWholeAndTheirMemoryIsUsedAgain) {
     }
 }
 
-TEST_F(Queues, AComponentThatSkipsCyclesGetsWhatWasWrittenInThem) {
+TEST_F(Queues, AComponentGetsMessagesOfItsSkippedCycles) {
     load(definition("Digits", "D"));
     ComponentDefinition slow = collector("out");
     slow.every = 4;
@@ -97,10 +97,10 @@ TEST_F(Queues, ALoopBreakIsACycleLateAndLosesNothing) {
     early.breaks = {"in"};
     load(early);
     step(5);
-    EXPECT_EQ(value("/C", "order"), 123.0) << "what cycle 4 has written comes in cycle 5";
+    EXPECT_EQ(value("/C", "order"), 123.0) << "the value of cycle 4 arrives in cycle 5";
 }
 
-TEST_F(Queues, ASuccessorGetsNoMessageAgain) {
+TEST_F(Queues, ASuccessorGetsNoMessageTwice) {
     load(definition("Digits", "D"));
     load(collector("out"));
     step(3);
@@ -110,7 +110,7 @@ TEST_F(Queues, ASuccessorGetsNoMessageAgain) {
     EXPECT_EQ(value("/C", "order"), 1234.0);
 }
 
-TEST_F(Queues, OneThatTurnsToAnotherWriterKeepsWhatWaits) {
+TEST_F(Queues, AQueueKeepsItsMessagesWhenItsWriterChanges) {
     loadOutside();
     setParameters("/C", {{"takes", false}});
     send(1.0);
@@ -130,7 +130,7 @@ TEST_F(Queues, OneThatTurnsToAnotherWriterKeepsWhatWaits) {
     EXPECT_EQ(value("/C", "order"), 12125.0);
 }
 
-TEST_F(Queues, ASnapshotHasNoMessagesThatWait) {
+TEST_F(Queues, ASnapshotHasNoQueuedMessages) {
     loadOutside();
     setParameters("/C", {{"takes", false}});
     send(1.0);

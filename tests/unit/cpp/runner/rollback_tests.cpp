@@ -1,4 +1,4 @@
-// What is refused, or fails in any way, leaves nothing behind and ends nothing.
+// Rejected and failed changes leave nothing behind and end nothing.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -37,8 +37,8 @@ class Rollback : public RunnerFixture {
     }
 };
 
-// Its records refer to its name: they are handed on before that goes.
-TEST_F(Rollback, RefusedComponentHasSaidAllThatItLogged) {
+// Its records refer to its name: they are forwarded before the name is freed.
+TEST_F(Rollback, LogRecordsOfARejectedComponentAreForwarded) {
     ComponentDefinition refused = definition("Recorder", "A");
     refused.parameters = {{"refuses", std::string("prepare")}};
     EXPECT_NE(refusal([&] { load(refused); }).find("told to refuse prepare"), std::string::npos);
@@ -46,7 +46,7 @@ TEST_F(Rollback, RefusedComponentHasSaidAllThatItLogged) {
     const auto said = std::find_if(entries.begin(), entries.end(), [](const LogEntry& entry) {
         return entry.message == "refuses to prepare";
     });
-    ASSERT_NE(said, entries.end()) << "it still waits, and its component's name is gone";
+    ASSERT_NE(said, entries.end()) << "the record must be forwarded before its component is freed";
     EXPECT_EQ(said->component, "/A");
 }
 
@@ -66,7 +66,7 @@ TEST_F(Rollback, ParameterGoesBackToItsInfiniteDefault) {
     EXPECT_EQ(parameter("/A", "limit"), ParameterValue(std::numeric_limits<double>::infinity()));
 }
 
-TEST_F(Rollback, OtherInfiniteValuesStayRefused) {
+TEST_F(Rollback, OtherInfiniteValuesAreRejected) {
     load(definition("Recorder", "A"));
     const double infinity = std::numeric_limits<double>::infinity();
     EXPECT_EQ(refusal([&] { setParameters("/A", {{"gain", infinity}}); }),
@@ -75,7 +75,7 @@ TEST_F(Rollback, OtherInfiniteValuesStayRefused) {
               "/A: parameter limit must be finite");
 }
 
-TEST_F(Rollback, ReplayOfAGraphWithInfiniteDefaultBegins) {
+TEST_F(Rollback, ReplayOfAGraphWithInfiniteDefaultStarts) {
     load(definition("Recorder", "A"));
     ReplayChunk chunk;
     chunk.begin = true;
@@ -85,15 +85,15 @@ TEST_F(Rollback, ReplayOfAGraphWithInfiniteDefaultBegins) {
               "");
 }
 
-// Memory that runs out in the middle of a change, say.
-TEST_F(Rollback, AnyExceptionTakesTheWholeChangeBack) {
+// For example memory that runs out during a change.
+TEST_F(Rollback, AnyExceptionUndoesTheWholeChange) {
     WantedComponent writer = wanted("Touchy", "A");
     WantedComponent reader = wanted("Touchy", "B");
     reader.definition.remaps = {{"in", "A_out"}, {"out", "B_out"}};
     apply({writer, reader});
     const auto before = generation();
     writer.definition.parameters = {{"gain", 2.0}};
-    reader.definition.breaks = {"in"};  // which needs a copy of the value
+    reader.definition.breaks = {"in"};  // requires a copy of the value
     journal().copies_throw = true;
     const bool thrown = onGraphThread([&] {
         try {
@@ -107,10 +107,10 @@ TEST_F(Rollback, AnyExceptionTakesTheWholeChangeBack) {
     EXPECT_TRUE(thrown);
     EXPECT_EQ(generation(), before);
     EXPECT_EQ(parameter("/A", "gain"), ParameterValue(1.0));
-    EXPECT_EQ(apply({writer, reader}).differences.size(), 2U) << "neither has happened yet";
+    EXPECT_EQ(apply({writer, reader}).differences.size(), 2U) << "both loads were undone";
 }
 
-// Of a value that outgrew what its component has reserved, say.
+// For example a value that outgrew the memory reserved by its component.
 TEST_F(Rollback, NoMemoryInTheCycleEndsTheLoopInOrder) {
     WantedComponent writer = wanted("Touchy", "A");
     WantedComponent reader = wanted("Touchy", "B");
@@ -156,7 +156,7 @@ TEST_F(Rollback, NoMemoryForAnOptionalComponentsValueTakesItOut) {
     stop();
 }
 
-// Who reads late has a copy, which is made before the components' turns.
+// A reader with a loop break has a copy, made before the components run.
 TEST_F(Rollback, NoMemoryBeforeTheComponentsRunIsNoCycle) {
     WantedComponent writer = wanted("Touchy", "A");
     WantedComponent reader = wanted("Touchy", "B");
@@ -198,7 +198,7 @@ TEST_F(Rollback, NoExceptionInAChangeByRosEndsTheProcess) {
     EXPECT_EQ(stop().order, std::vector<std::string>{"/A"});
 }
 
-// Said or not: the loop ends in order.
+// With or without a report, the loop ends in order.
 TEST_F(Rollback, FaultThatCannotBeReportedEndsTheLoopInOrder) {
     ComponentDefinition failing = definition("Recorder", "A");
     failing.parameters = {{"throws_at", std::int64_t{10}}};

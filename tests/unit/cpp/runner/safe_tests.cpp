@@ -1,5 +1,5 @@
-// The last cycle: what safe() writes, who reads it, and when it is called. Think of a driver that
-// is left without its controller.
+// The last cycle: values written by safe(), their readers, and the time of the call. The typical
+// case is a driver that loses its controller.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -31,7 +31,7 @@ class Safe : public RunnerFixture {
         return result;
     }
 
-    // From here on, in a loop that is so slow that no ring is full before the test looks into it.
+    // Maps everything, in a loop so slow that no ring fills up before the test reads it.
     void mapEverything() {
         configure([](RunnerSettings& settings) {
             settings.whitelist = ".*";
@@ -39,7 +39,7 @@ class Safe : public RunnerFixture {
         });
     }
 
-    // The newest value that a tap has for the ROS node.
+    // The newest value of a tap for the ROS node.
     std::optional<double> published(const std::shared_ptr<executor::Tap>& tap) {
         std::optional<double> last;
         while (tap->pop([&](const std::uint8_t* bytes, std::uint32_t size, std::int64_t) {
@@ -68,7 +68,7 @@ class Safe : public RunnerFixture {
     }
 };
 
-TEST_F(Safe, WhatTheControllerWritesReachesTheDriverAndRos) {
+TEST_F(Safe, CommandsOfTheControllerReachTheDriverAndRos) {
     load(controller("C"));
     load(driver());
     start();
@@ -76,7 +76,7 @@ TEST_F(Safe, WhatTheControllerWritesReachesTheDriverAndRos) {
     EXPECT_EQ(applied(), 5.0);
     mapEverything();
     stop();
-    EXPECT_EQ(applied(), 0.0) << "its safe() comes after the controller's, and reads";
+    EXPECT_EQ(applied(), 0.0) << "its safe() reads after the controller's";
     EXPECT_EQ(value("/D", "zeros"), 1.0);
     EXPECT_EQ(published(bridge().tap("/command")), 0.0);
     EXPECT_EQ(published(bridge().tap("/D_applied")), 0.0);
@@ -91,7 +91,7 @@ TEST_F(Safe, CheckedOutputsAreCommitted) {
     EXPECT_EQ(applied(), 0.0);
 }
 
-TEST_F(Safe, WhatIsNotFiniteIsHeldBackAndTold) {
+TEST_F(Safe, NonFiniteValuesAreHeldBackAndReported) {
     ComponentDefinition wild = controller("C", "checked");
     wild.parameters = {{"wild", true}};
     load(wild);
@@ -104,8 +104,8 @@ TEST_F(Safe, WhatIsNotFiniteIsHeldBackAndTold) {
     EXPECT_TRUE(toldNotFinite("checked"));
 }
 
-// Its outputs may end the loop that it is part of, not the one that it leaves.
-TEST_F(Safe, WhatALeavingComponentGetsWrongDoesNotEndTheLoop) {
+// Its outputs can end the loop that it belongs to, but not after it left.
+TEST_F(Safe, FaultsOfALeavingComponentDoNotEndTheLoop) {
     ComponentDefinition wild = controller("C", "vital");
     wild.parameters = {{"wild", true}};
     load(wild);
@@ -120,10 +120,10 @@ TEST_F(Safe, WhatALeavingComponentGetsWrongDoesNotEndTheLoop) {
     EXPECT_EQ(journal().count("/C safe"), 2U);
     EXPECT_EQ(applied(), 5.0) << "the last finite one";
     EXPECT_EQ(state(), RunnerState::Running);
-    EXPECT_TRUE(toldNotFinite("checked")) << "the first of its outputs that is not";
+    EXPECT_TRUE(toldNotFinite("checked")) << "the first non-finite output";
 }
 
-TEST_F(Safe, IsCalledOnTheCulpritToo) {
+TEST_F(Safe, IsCalledOnTheCulprit) {
     ComponentDefinition throwing = controller("C");
     throwing.parameters = {{"throws_at", std::int64_t{15}}};
     load(throwing);
@@ -135,7 +135,7 @@ TEST_F(Safe, IsCalledOnTheCulpritToo) {
     EXPECT_EQ(applied(), 0.0);
 }
 
-TEST_F(Safe, InputOfThePreviousCycleIsRightInTheLastOne) {
+TEST_F(Safe, InputOfThePreviousCycleIsCorrectInTheLastOne) {
     load(controller("C"));
     ComponentDefinition early = driver();
     early.first = true;
@@ -143,7 +143,7 @@ TEST_F(Safe, InputOfThePreviousCycleIsRightInTheLastOne) {
     ASSERT_EQ(order(), (std::vector<std::string>{"/D", "/C"}));
     step(3);
     stop();
-    // It comes before the controller: what it has is the command of the cycle before, as always.
+    // It runs before the controller, so it has the command of the previous cycle, as always.
     EXPECT_EQ(applied(), 5.0);
     EXPECT_EQ(value("/C", "effort"), 0.0);
 }
@@ -169,7 +169,7 @@ TEST_F(Safe, UnloadFromARunningLoopLeavesTheDriverASafeCommand) {
 TEST_F(Safe, UnloadLeavesASafeCommandInTheCycleBefore) {
     load(controller("C"));
     load(driver());
-    setBreak("/D", "command", true);  // it reads the value latched before the controller ran
+    setBreak("/D", "command", true);  // it reads the value from before the controller ran
     start();
     ASSERT_TRUE(runs());
     unload("/C");
@@ -177,7 +177,7 @@ TEST_F(Safe, UnloadLeavesASafeCommandInTheCycleBefore) {
     EXPECT_EQ(applied(), 0.0);
 }
 
-TEST_F(Safe, ReplacedControllerHandsOverWithoutADip) {
+TEST_F(Safe, ReplacedControllerHandsOverWithoutAnInterruption) {
     load(controller("C"));
     load(driver());
     start();
@@ -188,11 +188,11 @@ TEST_F(Safe, ReplacedControllerHandsOverWithoutADip) {
     EXPECT_EQ(value("/D", "lowest"), 5.0) << "the successor writes in the same cycle";
     const auto notes = journal().notes();
     EXPECT_LT(position(notes, "/C takeOver"), position(notes, "/C safe"))
-        << "the successor sees the state before it is made safe";
+        << "the successor sees the state before safe()";
     EXPECT_EQ(journal().count("/C safe"), 1U);
 }
 
-TEST_F(Safe, ReplacedBySilenceLeavesASafeCommand) {
+TEST_F(Safe, ReplacementThatWritesNothingLeavesASafeCommand) {
     load(controller("C"));
     load(driver());
     start();
@@ -227,7 +227,7 @@ TEST_F(Safe, OfALeavingComponentSeesTheTimeOfItsOwnCycle) {
     EXPECT_EQ(journal().count("/A safe later"), 1U) << "between two steps";
     EXPECT_EQ(journal().count("/B safe later"), 2U) << "at the end of the steps, and in the loop";
     EXPECT_EQ(journal().count("/C safe later"), 2U);
-    EXPECT_EQ(value("/D", "furthest_off"), 0.0) << "those that stay see no other time for it";
+    EXPECT_EQ(value("/D", "furthest_off"), 0.0) << "other components see the same times";
 }
 
 TEST_F(Safe, IsNotCalledAgainOnceTheLoopHasEnded) {
@@ -258,8 +258,8 @@ TEST_F(Safe, OptionalControllerThatThrowsMakesSafeInTheSameCycle) {
     EXPECT_EQ(journal().count("/D safe"), 1U);
 }
 
-// What most components do not have costs a cycle only while one of them has it.
-TEST_F(Safe, OnceAnOptionalComponentIsUnloadedCyclesTakeTheShortWayAgain) {
+// A feature of few components costs time in a cycle only while one of them is loaded.
+TEST_F(Safe, CyclesAreFastAgainAfterTheUnloadOfAnOptionalComponent) {
     ComponentDefinition plain = definition("Ticker", "T");
     load(plain);
     EXPECT_FALSE(builtPlans().selective);
@@ -270,7 +270,7 @@ TEST_F(Safe, OnceAnOptionalComponentIsUnloadedCyclesTakeTheShortWayAgain) {
     load(throwing);
     EXPECT_TRUE(builtPlans().selective);
     step(20);
-    ASSERT_EQ(journal().count("/C safe"), 1U) << "it is taken out";
+    ASSERT_EQ(journal().count("/C safe"), 1U) << "the component is taken out";
     unload("/C");
     EXPECT_FALSE(builtPlans().selective);
     step(5);
@@ -278,8 +278,8 @@ TEST_F(Safe, OnceAnOptionalComponentIsUnloadedCyclesTakeTheShortWayAgain) {
     EXPECT_EQ(value("/T", "out"), 24.0);
 }
 
-// What it had written before it threw is never seen: `other` by write(), `effort` in place.
-TEST_F(Safe, HalfOfWhatAThrowingOptionalComponentWritesIsNotSeen) {
+// Values written before the throw are never seen: `other` by write(), `effort` in place.
+TEST_F(Safe, PartialOutputOfAThrowingOptionalComponentIsNotSeen) {
     for (const std::string port : {"effort", "other", "checked"}) {
         ComponentDefinition throwing = controller("C_" + port, port);
         throwing.optional = true;
@@ -296,8 +296,8 @@ TEST_F(Safe, HalfOfWhatAThrowingOptionalComponentWritesIsNotSeen) {
     }
 }
 
-// The loop ends: the last that it reads, in safe(), is the command of the cycle before.
-TEST_F(Safe, HalfOfWhatAThrowingControllerWritesReachesNoDriver) {
+// The loop ends: the driver's last input, in safe(), is the command of the previous cycle.
+TEST_F(Safe, PartialOutputOfAThrowingControllerReachesNoDriver) {
     for (const std::string port : {"effort", "other", "checked"}) {
         ComponentDefinition throwing = controller("C_" + port, port);
         throwing.parameters = {{"throws_at", std::int64_t{3}}, {"keeps", true}};
@@ -315,7 +315,7 @@ TEST_F(Safe, HalfOfWhatAThrowingControllerWritesReachesNoDriver) {
     }
 }
 
-TEST_F(Safe, HalfOfWhatIsWrittenInTheFirstCycleIsNoValue) {
+TEST_F(Safe, PartialOutputOfTheFirstCycleIsNoValue) {
     ComponentDefinition throwing = controller("C", "other");
     throwing.parameters = {{"throws_at", std::int64_t{0}}, {"keeps", true}};
     load(throwing);
@@ -325,7 +325,7 @@ TEST_F(Safe, HalfOfWhatIsWrittenInTheFirstCycleIsNoValue) {
     EXPECT_EQ(value("/D", "last_status"), static_cast<double>(DataStatus::None));
 }
 
-TEST_F(Safe, HalfOfATextOrALargeValueIsNotRead) {
+TEST_F(Safe, PartialTextsAndLargeValuesAreNotRead) {
     ComponentDefinition throwing = definition("Author", "A");
     throwing.parameters = {{"throws_at", std::int64_t{3}}};
     load(throwing);
@@ -337,8 +337,8 @@ TEST_F(Safe, HalfOfATextOrALargeValueIsNotRead) {
     EXPECT_EQ(value("/C", "whole"), 2.0);
 }
 
-// What nobody watches is put back, too.
-TEST_F(Safe, HalfOfACommandIsNotReadWithoutFrames) {
+// Unwatched values are restored, too.
+TEST_F(Safe, PartialOutputIsNotReadWithoutFrames) {
     configure([](RunnerSettings& settings) { settings.frame_bytes = 0; });
     ComponentDefinition throwing = controller("C", "effort");
     throwing.parameters = {{"throws_at", std::int64_t{3}}, {"keeps", true}};
@@ -349,8 +349,8 @@ TEST_F(Safe, HalfOfACommandIsNotReadWithoutFrames) {
     EXPECT_EQ(value("/D", "held"), 5.0);
 }
 
-// Of what nobody has taken it is the same: no topic or queue gets it as a message.
-TEST_F(Safe, HalfOfWhatAThrowingControllerWritesIsNoMessage) {
+// The same for values not taken yet: no topic and no queue gets them as a message.
+TEST_F(Safe, PartialOutputOfAThrowingControllerIsNoMessage) {
     ComponentDefinition throwing = controller("C", "other");
     throwing.parameters = {{"throws_at", std::int64_t{3}}, {"keeps", true}};
     load(throwing);
@@ -368,7 +368,7 @@ TEST_F(Safe, HalfOfWhatAThrowingControllerWritesIsNoMessage) {
     EXPECT_EQ(value("/Q", "waiting"), 0.0);
 }
 
-TEST_F(Safe, NothingIsTakenOverFromWhatThrew) {
+TEST_F(Safe, NothingIsTakenOverFromAThrowingComponent) {
     ComponentDefinition throwing = controller("C");
     throwing.optional = true;
     throwing.parameters = {{"throws_at", std::int64_t{15}}};
@@ -383,7 +383,7 @@ TEST_F(Safe, NothingIsTakenOverFromWhatThrew) {
     EXPECT_EQ(journal().count("/C takeOver"), 1U);
 }
 
-// The component of docs/components.md, as it stands there.
+// The component of docs/components.md, verbatim.
 TEST_F(Safe, ExampleOfTheDocumentationCommandsZero) {
     ComponentDefinition pi = definition("Pi", "pi");
     pi.remaps = {{"effort", "command"}, {"setpoint", "C_effort"}, {"measured", "C_other"}};

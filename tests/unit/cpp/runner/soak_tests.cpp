@@ -1,6 +1,6 @@
-// Many changes at random while the loop runs, other threads ask, and topics flow in and out: for
-// ThreadSanitizer and AddressSanitizer, which see what no counter shows. What the graph must be is
-// a map here; tests/integration/test_soak.py has the whole model.
+// Random changes while the loop runs, other threads query, and topics flow in and out: for
+// ThreadSanitizer and AddressSanitizer, which find errors that no counter shows. The expected graph
+// is a map here; tests/integration/test_soak.py has the complete model.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -32,7 +32,7 @@ class Soak : public RunnerFixture {
 
     int chance(int n) { return std::uniform_int_distribution<int>(0, n - 1)(random_); }
 
-    // Reads a topic that it may close a loop with, or none.
+    // Reads a topic with which it may close a loop, or none.
     ComponentDefinition randomComponent(const std::string& name) {
         ComponentDefinition result = definition(chance(3) == 0 ? "Relay" : "Recorder", name);
         const std::string topic(1, static_cast<char>('A' + chance(kNames + 2)));
@@ -46,7 +46,7 @@ class Soak : public RunnerFixture {
         return result;
     }
 
-    // Works on a copy of what there shall be, which counts unless the change is refused.
+    // Works on a copy of the expected graph, which applies unless the change fails.
     void changeSomething() {
         Wanted next = wanted_;
         const std::string name(1, static_cast<char>('B' + chance(kNames)));
@@ -101,7 +101,7 @@ class Soak : public RunnerFixture {
         ASSERT_EQ(names, expected);
     }
 
-    // Some go, some come, some stay.
+    // Some components are removed, some added, some stay.
     void apply(Wanted& next) {
         std::vector<executor::WantedComponent> components{{steady(), kLibrary}};
         for (int i = 0; i < 2; ++i) {
@@ -124,7 +124,7 @@ class Soak : public RunnerFixture {
         return result;
     }
 
-    // What the server's, the log's and the ROS node's threads do all the time.
+    // The continuous work of the server's, the log's and the ROS node's threads.
     void startHelpers() {
         helpers_.emplace_back([this] {
             while (!over_.load()) {
@@ -177,7 +177,7 @@ class Soak : public RunnerFixture {
     std::vector<std::thread> helpers_;
 };
 
-TEST_F(Soak, RandomChangesRaceWithNothing) {
+TEST_F(Soak, RandomChangesCauseNoRace) {
     load(steady());
     start();
     ASSERT_TRUE(runs());
@@ -191,7 +191,7 @@ TEST_F(Soak, RandomChangesRaceWithNothing) {
     endHelpers();
     stop();
     EXPECT_EQ(value("/A", "out"), static_cast<double>(iteration()))
-        << "what stays is updated in each cycle";
+        << "unchanged components are updated in each cycle";
     EXPECT_GT(refusals_, kChanges / 20);
     EXPECT_LT(refusals_, kChanges * 3 / 4);
 }

@@ -1,4 +1,4 @@
-// Declared state: kept over a replacement, shown, reset.
+// Declared state: kept by a replacement, shown, reset.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -39,7 +39,7 @@ class DeclaredState : public RunnerFixture {
     }
 };
 
-TEST_F(DeclaredState, GoesOverToARebuiltComponentInARunningLoop) {
+TEST_F(DeclaredState, IsKeptByARebuiltComponentInARunningLoop) {
     loadVersion(1);
     start();
     ASSERT_TRUE(runs());
@@ -47,7 +47,7 @@ TEST_F(DeclaredState, GoesOverToARebuiltComponentInARunningLoop) {
     ASSERT_TRUE(runs());
     stop();
     EXPECT_EQ(value("/A", "out"), static_cast<double>(iteration()))
-        << "one update in every cycle, counted in one count";
+        << "exactly one update per cycle, in one counter";
     EXPECT_EQ(value("/A", "skipped"), 0.0);
     EXPECT_EQ(state("new_name"), "7.5") << "handed over by takeOver()";
     EXPECT_NE(state("fresh"), "0.25") << "the output's last value, by takeOver()";
@@ -60,7 +60,7 @@ TEST_F(DeclaredState, GoesOverToARebuiltComponentInARunningLoop) {
     EXPECT_EQ(notes.size(), 5U) << "and that new_name is new";
 }
 
-TEST_F(DeclaredState, GoesOverUnchangedWithoutNotes) {
+TEST_F(DeclaredState, IsKeptUnchangedWithoutNotes) {
     loadVersion(1);
     step(10);
     EXPECT_TRUE(replaceBy(1).empty());
@@ -69,7 +69,7 @@ TEST_F(DeclaredState, GoesOverUnchangedWithoutNotes) {
     EXPECT_EQ(state("delay"), "{now: 14, before: 13}");
 }
 
-TEST_F(DeclaredState, WithoutAnyBeforeTheAnswerSaysSo) {
+TEST_F(DeclaredState, MissingInTheOldComponentIsReported) {
     load(definition("Camera", "B"));
     const auto notes = onGraphThread([&] {
                            return runner().replace("/B", definition("Recorder", "B"),
@@ -108,7 +108,7 @@ TEST_F(DeclaredState, IsResetAtABoundaryOfARunningLoop) {
     EXPECT_GT(value("/A", "out"), 0.0);
 }
 
-TEST_F(DeclaredState, ThatIsNotThereCannotBeReset) {
+TEST_F(DeclaredState, WithoutDeclarationCannotBeReset) {
     load(definition("Camera", "B"));
     EXPECT_EQ(refusal([&] { onGraphThread([&] { return runner().reset("/B"); }); }),
               "/B declares no state (rtcf::State) to reset");
@@ -144,8 +144,8 @@ TEST_F(DeclaredState, IsSetExactlyOrNotAtAll) {
     EXPECT_NE(set("gain", 1.0).find("stop it to set state"), std::string::npos);
 }
 
-// A graph file that names a rebuilt library replaces too.
-TEST_F(DeclaredState, GoesOverInAnApplyToo) {
+// A graph file with a rebuilt library also replaces components.
+TEST_F(DeclaredState, IsKeptByApply) {
     loadVersion(1);
     step(10);
     const auto outcome = onGraphThread([&] {

@@ -1,4 +1,4 @@
-// Cycles on a simulated clock: the same graph gives the same values, every time.
+// Cycles on a simulated clock: the same graph always gives the same values.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -37,10 +37,10 @@ class Stepping : public RunnerFixture {
     }
 };
 
-// The five sums of Fig. 1 by themselves.
+// The five sums of Fig. 1, computed separately.
 class Fig1Model {
    public:
-    // @param g2 what R2.in4 reads in this cycle. @return R3's output
+    // @param g2 value of R2.in4 in this cycle. @return R3's output
     double cycle(double g2) {
         const double h1 = limited(first_ ? 1.0 : r3_ + r1_);
         const double f1 = limited(h1);
@@ -81,7 +81,7 @@ TEST_F(Stepping, InjectedValueIsReadInTheNextCycleOnly) {
     model.cycle(0.0);
     model.cycle(0.0);
     deliver("/G2_R2", 1.0);
-    deliver("/G2_R2", 0.25);  // the newest counts
+    deliver("/G2_R2", 0.25);  // the newest applies
     taken("/R3_G2H1");
     step(2);
     const std::vector<double> expected{model.cycle(0.25), model.cycle(0.0)};
@@ -106,7 +106,7 @@ TEST_F(Stepping, RunsExactlyAsManyCyclesAsAsked) {
     EXPECT_EQ(value("/T", "out"), 41.0);
 }
 
-TEST_F(Stepping, BeginsAnewAfterStop) {
+TEST_F(Stepping, StartsOverAfterStop) {
     load(definition("Ticker", "T"));
     step(10);
     stop();
@@ -125,7 +125,7 @@ TEST_F(Stepping, CallsTheHooksOnceAndSafeAtItsEnd) {
                                                            "/A safe", "/A stop"}));
 }
 
-TEST_F(Stepping, IsRefusedWhileTheLoopRuns) {
+TEST_F(Stepping, IsRejectedWhileTheLoopRuns) {
     load(definition("Ticker", "T"));
     start();
     const std::string text = refusal([this] { step(1); });
@@ -133,7 +133,7 @@ TEST_F(Stepping, IsRefusedWhileTheLoopRuns) {
     EXPECT_TRUE(runs());
 }
 
-TEST_F(Stepping, GoesOverIntoRunning) {
+TEST_F(Stepping, CanBeFollowedByRunning) {
     load(definition("Recorder", "A"));
     step(5);
     start();
@@ -143,7 +143,7 @@ TEST_F(Stepping, GoesOverIntoRunning) {
     EXPECT_EQ(journal().count("/A start"), 2U);
 }
 
-TEST_F(Stepping, EndsByRequest) {
+TEST_F(Stepping, EndsOnRequest) {
     load(definition("Ticker", "T"));
     auto endless =
         begin([this] { return runner().step(std::uint64_t{1} << 60, [](const std::string&) {}); });
@@ -153,7 +153,7 @@ TEST_F(Stepping, EndsByRequest) {
     EXPECT_EQ(state(), RunnerState::Stopped);
 }
 
-TEST_F(Stepping, PausesWhereItIsGivenUp) {
+TEST_F(Stepping, PausesWhenItsCallerLeaves) {
     load(definition("Ticker", "T"));
     std::atomic<bool> given_up{false};
     auto endless = begin([&] {
@@ -166,7 +166,7 @@ TEST_F(Stepping, PausesWhereItIsGivenUp) {
     EXPECT_EQ(state(), RunnerState::Stepping);
     const std::uint64_t before = iteration();
     step(5);
-    EXPECT_EQ(iteration(), before + 5) << "it goes on from there";
+    EXPECT_EQ(iteration(), before + 5) << "the next step continues there";
 }
 
 TEST_F(Stepping, EndsWithItsRunner) {
@@ -179,7 +179,7 @@ TEST_F(Stepping, EndsWithItsRunner) {
     auto queued = begin(endless);
     ASSERT_TRUE(eventually([this] { return iteration() > 100; }));
     endRunner();
-    SUCCEED() << "and what waited is not begun";
+    SUCCEED() << "and queued steps do not start";
 }
 
 TEST_F(Stepping, StopsInTheCycleThatFails) {
@@ -194,8 +194,8 @@ TEST_F(Stepping, StopsInTheCycleThatFails) {
     EXPECT_EQ(value("/T", "out"), 2.0) << "the cycle ended where it failed";
 }
 
-// What takes values out for ROS does so at its leisure: it must never have held a replay's taps.
-TEST_F(Stepping, ReplayHasThePortsToItself) {
+// The ROS node reads values out at any time: it must never have held a replay's taps.
+TEST_F(Stepping, ReplayHasExclusiveUseOfThePorts) {
     loadFig1();
     mapPapersTopics();
     const std::size_t given = bridge().everGiven("/R3_G2H1");
@@ -219,7 +219,7 @@ TEST_F(Stepping, ReplayHasThePortsToItself) {
               static_cast<std::ptrdiff_t>(outcome.cycles));
     chunk.end = true;
     replay(chunk);
-    EXPECT_EQ(taken("/R3_G2H1"), std::vector<double>{}) << "ROS sees nothing of it";
+    EXPECT_EQ(taken("/R3_G2H1"), std::vector<double>{}) << "ROS receives nothing of the replay";
     EXPECT_NE(bridge().injector("/G2_R2"), nullptr);
 }
 

@@ -1,5 +1,5 @@
-// thread_local variables of libraries that components link against: the thread of the cycles has
-// their memory before the first one.
+// thread_local variables of libraries linked by components: the thread of the cycles has their
+// memory before the first cycle.
 #include <dlfcn.h>
 #include <gtest/gtest.h>
 
@@ -37,14 +37,14 @@ class ThreadLocals : public RunnerFixture {
     }
 };
 
-TEST_F(ThreadLocals, OfWhatIsLinkedAreThereInTheFirstCycle) {
+TEST_F(ThreadLocals, OfLinkedLibrariesExistInTheFirstCycle) {
     loadLinked("A");
     start();
     ASSERT_TRUE(runs());
     expectMemoryFromTheFirstCycleOn("/A");
 }
 
-TEST_F(ThreadLocals, AreThereInEachThreadThatTheLoopHas) {
+TEST_F(ThreadLocals, ExistInEachThreadOfTheLoop) {
     loadLinked("A");
     for (int round = 0; round < 3; ++round) {
         start();
@@ -56,13 +56,13 @@ TEST_F(ThreadLocals, AreThereInEachThreadThatTheLoopHas) {
     }
 }
 
-TEST_F(ThreadLocals, AreThereInTheFirstStep) {
+TEST_F(ThreadLocals, ExistInTheFirstStep) {
     loadLinked("A");
     step(1);
     expectMemoryFromTheFirstCycleOn("/A");
 }
 
-TEST_F(ThreadLocals, AreThereInTheStepAfterALoad) {
+TEST_F(ThreadLocals, ExistInTheStepAfterALoad) {
     load(definition("Ticker", "T"));
     step(1);
     loadLinked("A");
@@ -70,7 +70,7 @@ TEST_F(ThreadLocals, AreThereInTheStepAfterALoad) {
     expectMemoryFromTheFirstCycleOn("/A");
 }
 
-TEST_F(ThreadLocals, ThatALoopHasNoMemoryOfAreRefusedUntilItIsStopped) {
+TEST_F(ThreadLocals, NewToTheLoopAreRejectedUntilItIsStopped) {
     startTicking();
     const auto before = order();
     const auto generation_before = generation();
@@ -95,7 +95,7 @@ TEST_F(ThreadLocals, ThatALoopHasNoMemoryOfAreRefusedUntilItIsStopped) {
     expectMemoryFromTheFirstCycleOn("/B");
 }
 
-TEST_F(ThreadLocals, ThatTheLoopHasAlreadyLoadWhileItRuns) {
+TEST_F(ThreadLocals, KnownToTheLoopLoadWhileItRuns) {
     loadLinked("A");
     start();
     ASSERT_TRUE(runs());
@@ -105,7 +105,7 @@ TEST_F(ThreadLocals, ThatTheLoopHasAlreadyLoadWhileItRuns) {
     expectMemoryFromTheFirstCycleOn("/B");
 }
 
-TEST_F(ThreadLocals, WithMemoryBesideEachThreadLoadWhileTheLoopRuns) {
+TEST_F(ThreadLocals, InStaticTlsLoadWhileTheLoopRuns) {
     startTicking();
     loadLinked("A", kFolder + "linked_thread_local_static.so");
     onGraphThread([this] {
@@ -116,14 +116,14 @@ TEST_F(ThreadLocals, WithMemoryBesideEachThreadLoadWhileTheLoopRuns) {
     EXPECT_GT(value("/A", "count"), 0.0);
 }
 
-TEST_F(ThreadLocals, AreNoObstacleWithoutRealTime) {
+TEST_F(ThreadLocals, AreAllowedWithoutRealTime) {
     load(definition("Ticker", "T"));
     step(1);
     EXPECT_EQ(refusal([this] { loadLinked("A", kLate); }), "");
 }
 
-// Its number would go to the next library, which would seem to be known.
-TEST_F(ThreadLocals, StayWhereTheyAreAsLongAsTheLoopHasMemoryOfThem) {
+// Its module number would be reused for the next library, which would seem to be known.
+TEST_F(ThreadLocals, StayLoadedWhileTheLoopHasTheirMemory) {
     const std::string file = RTCF_UNIT_CLOSED_LIBRARY;
     const auto loaded = [&file] {
         void* const library = dlopen(file.c_str(), RTLD_LAZY | RTLD_NOLOAD);

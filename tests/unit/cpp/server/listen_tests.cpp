@@ -18,7 +18,7 @@
 namespace rtcf {
 namespace {
 
-// All descriptors that a process may have, but for so many.
+// Uses up all descriptors of the process, except for a few.
 class FewDescriptors {
    public:
     explicit FewDescriptors(std::size_t left) {
@@ -51,7 +51,7 @@ int connectTo(const std::string& path) {
     return fd;
 }
 
-TEST(Listener, LetsOneInWhenNoDescriptorIsLeftAndTheOthersWait) {
+TEST(Listener, AcceptsOneWithoutFreeDescriptorsAndTheOthersWait) {
     const std::string path = ::testing::TempDir() + "listener-" + std::to_string(::getpid());
     executor::Listener listener(path, 8);
     const int first = connectTo(path);
@@ -60,7 +60,7 @@ TEST(Listener, LetsOneInWhenNoDescriptorIsLeftAndTheOthersWait) {
     EXPECT_EQ(listener.events(), POLLIN);
     const int accepted = listener.accept();
     EXPECT_GE(accepted, 0);
-    // To poll for what cannot be taken would come back at once, for ever.
+    // Polling for connections that cannot be accepted would return immediately, forever.
     EXPECT_EQ(listener.events(), 0);
     EXPECT_EQ(listener.accept(), -1);
     ::close(accepted);
@@ -72,7 +72,7 @@ TEST(Listener, LetsOneInWhenNoDescriptorIsLeftAndTheOthersWait) {
     ::close(second);
 }
 
-TEST(Listener, MakesItsSocketAnewWhereSomebodyHasRemovedIt) {
+TEST(Listener, RecreatesItsSocketIfItWasRemoved) {
     const std::string path = ::testing::TempDir() + "renewed-" + std::to_string(::getpid());
     constexpr std::int64_t kSecond = 1'000'000'000;
     struct stat made{};
@@ -88,7 +88,7 @@ TEST(Listener, MakesItsSocketAnewWhereSomebodyHasRemovedIt) {
         const int accepted = listener.accept();
         EXPECT_GE(accepted, 0);
         for (const int fd : {before, after, accepted}) ::close(fd);
-        // It looks once a second, as a call of the system is one.
+        // It checks once a second, since a check is a system call.
         ::unlink(path.c_str());
         listener.renew(5 * kSecond + 1);
         EXPECT_NE(::stat(path.c_str(), &made), 0);
@@ -98,7 +98,7 @@ TEST(Listener, MakesItsSocketAnewWhereSomebodyHasRemovedIt) {
     EXPECT_NE(::stat(path.c_str(), &made), 0);
 }
 
-TEST(Listener, LeavesAloneWhatAnotherHasPutInItsPlace) {
+TEST(Listener, KeepsAnotherSocketInItsPlace) {
     const std::string path = ::testing::TempDir() + "others-" + std::to_string(::getpid());
     std::optional<executor::Listener> first(std::in_place, path, 8);
     executor::Listener second(path, 8);
@@ -111,7 +111,7 @@ TEST(Listener, LeavesAloneWhatAnotherHasPutInItsPlace) {
     ::close(client);
 }
 
-TEST(Listener, WaitsForItsFolderToBeThereAgain) {
+TEST(Listener, WaitsForItsFolderToExistAgain) {
     const std::string folder = ::testing::TempDir() + "folder-" + std::to_string(::getpid());
     ASSERT_EQ(::mkdir(folder.c_str(), 0700), 0);
     executor::Listener listener(folder + "/socket", 8);

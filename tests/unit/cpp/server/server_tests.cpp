@@ -1,4 +1,4 @@
-// The executor's socket, from connect() on, before a real runner.
+// The executor's socket, from connect() on, with a real runner.
 #include "server/server.hpp"
 
 #include <gtest/gtest.h>
@@ -60,7 +60,7 @@ class ServerTest : public ::testing::Test {
 
     ~ServerTest() override {
         journal().gate_open = true;
-        // Clients of the test are gone by now, so that there is room for this one.
+        // The test's clients have disconnected, so that there is room for this one.
         EXPECT_TRUE(eventually([this] {
             ExecutorClient last(socket_);
             Request hello;
@@ -90,7 +90,7 @@ class ServerTest : public ::testing::Test {
     std::thread thread_;
 };
 
-TEST_F(ServerTest, HelloTellsRunnerAndProtocol) {
+TEST_F(ServerTest, HelloReportsRunnerAndProtocol) {
     ExecutorClient client(socket_);
     Request request;
     request.mutable_hello()->set_protocol(1);
@@ -109,8 +109,8 @@ TEST_F(ServerTest, NothingIsAnsweredBeforeHello) {
     EXPECT_TRUE(client.ask(getStatus()).has_status());
 }
 
-// Whoever reads frames hangs up on one that is larger than any may be.
-TEST_F(ServerTest, AnswerThatIsLargerThanAFrameIsRefused) {
+// A reader closes the connection for a message above the maximum size.
+TEST_F(ServerTest, AnswerAboveTheMaximumSizeIsReplacedByAnError) {
     ExecutorClient client(socket_);
     client.hello();
     Request large = load("Recorder", "L");
@@ -130,7 +130,7 @@ TEST_F(ServerTest, AnswerThatIsLargerThanAFrameIsRefused) {
     EXPECT_TRUE(client.ask(list).has_components());
 }
 
-TEST_F(ServerTest, FrameMayComeInPieces) {
+TEST_F(ServerTest, MessageMayArriveInPieces) {
     ExecutorClient client(socket_);
     client.hello();
     Request request = getStatus();
@@ -139,7 +139,7 @@ TEST_F(ServerTest, FrameMayComeInPieces) {
     EXPECT_TRUE(client.answerTo(77).has_status());
 }
 
-TEST_F(ServerTest, ManyFramesMayComeAtOnce) {
+TEST_F(ServerTest, ManyMessagesMayArriveAtOnce) {
     ExecutorClient client(socket_);
     client.hello();
     std::string bytes;
@@ -156,10 +156,10 @@ TEST_F(ServerTest, ManyFramesMayComeAtOnce) {
     }
 }
 
-TEST_F(ServerTest, FrameThatIsTooLargeEndsTheConnection) {
+TEST_F(ServerTest, TooLargeMessageEndsTheConnection) {
     ExecutorClient client(socket_);
     client.hello();
-    client.sendBytes(std::string("\x01\x00\x00\x01", 4));  // 16 MiB and a byte
+    client.sendBytes(std::string("\x01\x00\x00\x01", 4));  // 16 MiB plus one byte
     EXPECT_TRUE(client.isClosed());
 }
 
@@ -173,13 +173,13 @@ TEST_F(ServerTest, GarbageEndsTheConnectionAndNoOther) {
     EXPECT_TRUE(other.ask(getStatus()).has_status());
 }
 
-TEST_F(ServerTest, RequestOfUnknownKindIsRefused) {
+TEST_F(ServerTest, RequestOfUnknownKindIsRejected) {
     ExecutorClient client(socket_);
     client.hello();
     EXPECT_TRUE(client.ask(Request()).has_error());
 }
 
-TEST_F(ServerTest, PeersBeyondTheLimitAreTurnedAway) {
+TEST_F(ServerTest, PeersBeyondTheLimitAreDisconnected) {
     std::vector<std::unique_ptr<ExecutorClient>> clients;
     for (int i = 0; i < 8; ++i) {
         clients.push_back(std::make_unique<ExecutorClient>(socket_));
@@ -218,7 +218,7 @@ TEST_F(ServerTest, ChangeIsAnsweredWithProgressAndOutcome) {
               (std::vector<std::string>{"loading /A", "configuring /A", "adopting the change"}));
 }
 
-TEST_F(ServerTest, AnswersAndEventsTellTheNumberOfTheState) {
+TEST_F(ServerTest, AnswersAndEventsHaveTheNumberOfTheState) {
     ExecutorClient client(socket_);
     client.hello();
     const Response begun = client.ask(start());
@@ -233,8 +233,8 @@ TEST_F(ServerTest, AnswersAndEventsTellTheNumberOfTheState) {
     EXPECT_EQ(status.state(), stopped.state());
 }
 
-// What reaches the socket before a stop cannot start the loop after it.
-TEST_F(ServerTest, StopVoidsAStartWhoseHooksRun) {
+// A start that arrives before a stop cannot start the loop after it.
+TEST_F(ServerTest, StopCancelsAStartWhoseHooksRun) {
     ExecutorClient client(socket_);
     client.hello();
     Request slow = load("Blocker", "B");
@@ -249,7 +249,7 @@ TEST_F(ServerTest, StopVoidsAStartWhoseHooksRun) {
     Request stop;
     stop.mutable_stop();
     const std::uint64_t stopping = client.send(stop);
-    (void)client.ask(getStatus());  // it has been read
+    (void)client.ask(getStatus());  // so the request has been read
     journal().gate_open = true;
     EXPECT_TRUE(client.answerTo(starting).has_error());
     EXPECT_TRUE(client.answerTo(stopping).has_change());
@@ -257,7 +257,7 @@ TEST_F(ServerTest, StopVoidsAStartWhoseHooksRun) {
     EXPECT_EQ(journal().count("/B update"), 0U);
 }
 
-TEST_F(ServerTest, RefusalCarriesItsCodeAndText) {
+TEST_F(ServerTest, ErrorHasItsCodeAndText) {
     ExecutorClient client(socket_);
     client.hello();
     const Response response = client.ask(unload("X"));
@@ -265,8 +265,8 @@ TEST_F(ServerTest, RefusalCarriesItsCodeAndText) {
     EXPECT_EQ(response.error().message(), "no component /X in this runner; loaded: none");
 }
 
-// 2000 characters in an expression or a name once were more than the graph thread's stack holds.
-TEST_F(ServerTest, NamesAndExpressionsThatAreTooLongAreRefusedShortly) {
+// 2000 characters in an expression or a name once overflowed the graph thread's stack.
+TEST_F(ServerTest, TooLongNamesAndExpressionsGetAShortError) {
     ExecutorClient client(socket_);
     client.hello();
     const std::string long_name(2000, 'a');
@@ -278,7 +278,7 @@ TEST_F(ServerTest, NamesAndExpressionsThatAreTooLongAreRefusedShortly) {
     ignoring.mutable_load()->mutable_component()->set_ignore(long_name);
     Request whitelist;
     whitelist.mutable_configure()->mutable_ros()->set_whitelist(long_name);
-    // Two names that are long enough together.
+    // Two names whose combined length exceeds the limit.
     Request mapped = load("Recorder", "B");
     mapped.mutable_load()->mutable_component()->set_ns(long_name.substr(0, 252));
     for (const Request& request :
@@ -312,7 +312,7 @@ TEST_F(ServerTest, QueriesAreAnsweredWhileAHookBlocks) {
     info.mutable_get_component()->set_component("A");
     const Response component = client.ask(info);
     EXPECT_EQ(component.component().full_name(), "/A")
-        << "without the values of its ports, but at once";
+        << "immediately, without values of its ports";
     journal().gate_open = true;
     EXPECT_TRUE(client.answerTo(loading).has_change());
 }
@@ -334,8 +334,8 @@ TEST_F(ServerTest, StopEndsTheLoopWhileAHookBlocks) {
     EXPECT_TRUE(client.answerTo(stopping).has_change());
 }
 
-// Takes the ten seconds that a hook has.
-TEST_F(ServerTest, ChangeThatWasGivenUpDoesNotHappenLater) {
+// Takes ten seconds, the time limit of a hook.
+TEST_F(ServerTest, AbandonedChangeIsNotMadeLater) {
     ExecutorClient client(socket_);
     client.hello();
     journal().gate_open = false;
@@ -347,7 +347,7 @@ TEST_F(ServerTest, ChangeThatWasGivenUpDoesNotHappenLater) {
     EXPECT_TRUE(client.answerTo(queued).has_error());
     EXPECT_EQ(client.ask(getStatus()).status().state(), rtcf::v1::RUNNER_STATE_STUCK);
     EXPECT_TRUE(client.ask(load("Recorder", "D")).has_error())
-        << "only stop and restart are taken now";
+        << "only stop and restart are accepted now";
     journal().gate_open = true;
     ASSERT_TRUE(eventually([] { return journal().count("/B cleanup") == 1; }));
     ASSERT_TRUE(eventually([&] { return client.ask(load("Recorder", "E")).has_change(); }))
@@ -398,7 +398,7 @@ TEST_F(ServerTest, LogRecordsWaitForADaemon) {
     }
 }
 
-TEST_F(ServerTest, StatisticsBeginAnewWithEachStart) {
+TEST_F(ServerTest, StatisticsRestartWithEachStart) {
     ExecutorClient client(socket_);
     client.hello();
     ASSERT_TRUE(client.ask(load("Ticker", "T")).has_change());
@@ -418,7 +418,7 @@ TEST_F(ServerTest, StatisticsBeginAnewWithEachStart) {
     }
 }
 
-TEST_F(ServerTest, ResetStatisticsCountFromThere) {
+TEST_F(ServerTest, StatisticsCountFromTheReset) {
     ExecutorClient client(socket_);
     client.hello();
     ASSERT_TRUE(client.ask(load("Ticker", "T")).has_change());
@@ -438,8 +438,8 @@ TEST_F(ServerTest, ResetStatisticsCountFromThere) {
     EXPECT_EQ(client.ask(getStatus()).status().iteration(), 1010U);
 }
 
-// Its cycles leave no time between them: what is read is never of one cycle by chance.
-TEST_F(ServerTest, ResetIsOneInstantOfALoopThatIsAlwaysLate) {
+// Its cycles follow each other without a pause, so no read matches one cycle by chance.
+TEST_F(ServerTest, ResetOfALateLoopIsOneInstant) {
     ExecutorClient client(socket_);
     client.hello();
     Request spinner = load("Spinner", "S");
@@ -474,7 +474,7 @@ TEST_F(ServerTest, ResetIsOneInstantOfALoopThatIsAlwaysLate) {
             const std::uint64_t before = total();
             ASSERT_TRUE(eventually([&] { return total() > before; }));
             ASSERT_TRUE(client.ask(reset).has_done());
-            // None is below 0, which would be a large number.
+            // A negative difference would wrap to a large number.
             const std::uint64_t of_status = client.ask(getStatus()).status().overruns();
             ASSERT_LE(of_status, total());
             const std::uint64_t of_statistics = client.ask(statistics).statistics().overruns();
@@ -500,7 +500,7 @@ TEST_F(ServerTest, ResetIsOneInstantOfALoopThatIsAlwaysLate) {
     }
 }
 
-// The reset is refused, or nobody waits for it any more: then the figures go on.
+// The reset fails or is abandoned: then the statistics continue.
 TEST_F(ServerTest, ResetWaitsForTheEndOfACycleInWhichAComponentDoesNotReturn) {
     ExecutorClient client(socket_);
     client.hello();
@@ -541,20 +541,20 @@ TEST_F(ServerTest, ResetWaitsForTheEndOfACycleInWhichAComponentDoesNotReturn) {
         leaving.send(getStatus());
         ASSERT_TRUE(leaving.receive().has_value()) << "queries are answered meanwhile";
     }
-    // By the second answer it has been seen who left before the first was asked for.
+    // By the second answer, the disconnect before the first request has been noticed.
     for (int i = 0; i < 2; ++i) ASSERT_TRUE(client.ask(getStatus()).has_status());
     journal().gate_open = true;
     EXPECT_TRUE(counts_again());
 
     ASSERT_TRUE(shut());
     const std::uint64_t waiting = client.send(reset);
-    ASSERT_TRUE(client.ask(getStatus()).has_status()) << "it has been taken";
+    ASSERT_TRUE(client.ask(getStatus()).has_status()) << "the request has been received";
     journal().gate_open = true;
     EXPECT_TRUE(client.answerTo(waiting).has_done());
     EXPECT_TRUE(counts_again());
 }
 
-// A thread of the ROS node that asks for something, as long as it waits.
+// A thread of the ROS node that makes a call and waits.
 class Asking {
    public:
     Asking(executor::Server& server, const executor::OutsideCall& call)
@@ -568,7 +568,7 @@ class Asking {
     std::future<executor::OutsideAnswer> answer_;
 };
 
-// The next call that a daemon gets.
+// The next call that a daemon receives.
 executor::v1::ServiceCall nextCall(ExecutorClient& client) {
     for (;;) {
         const auto response = client.receive();
@@ -577,7 +577,7 @@ executor::v1::ServiceCall nextCall(ExecutorClient& client) {
     }
 }
 
-TEST_F(ServerTest, CallFromOutsideIsAnsweredByTheDaemonThatCameLast) {
+TEST_F(ServerTest, CallFromOutsideIsAnsweredByTheLatestDaemon) {
     ExecutorClient first(socket_);
     first.hello();
     ExecutorClient client(socket_);
@@ -600,14 +600,14 @@ TEST_F(ServerTest, CallFromOutsideIsAnsweredByTheDaemonThatCameLast) {
     const executor::OutsideAnswer got = asking.get();
     EXPECT_TRUE(got.success);
     EXPECT_EQ(got.message, "as you like it");
-    // The other one has not heard of it.
+    // The other daemon did not receive it.
     first.send(getStatus());
     const auto next = first.receive();
     ASSERT_TRUE(next.has_value());
     EXPECT_TRUE(next->has_status());
 }
 
-TEST_F(ServerTest, CallFromOutsideWithoutADaemonFailsAtOnce) {
+TEST_F(ServerTest, CallFromOutsideWithoutADaemonFailsImmediately) {
     Asking asking(server_, {});
     EXPECT_EQ(asking.get().message, "no rtcfd is connected to this executor: is it running?");
 }
@@ -623,14 +623,14 @@ TEST_F(ServerTest, CallFromOutsideFailsWithItsDaemon) {
     EXPECT_EQ(got.message, "rtcfd has disconnected; it may have carried out the request");
 }
 
-TEST_F(ServerTest, CallFromOutsideCanBeGivenUp) {
+TEST_F(ServerTest, CallFromOutsideCanBeAbandoned) {
     ExecutorClient client(socket_);
     client.hello();
     Asking asking(server_, {});
     const std::uint64_t number = nextCall(client).call();
     asking.cancel();
     EXPECT_EQ(asking.get().message, "the executor is ending");
-    // An answer that comes too late is no error.
+    // A late answer is no error.
     Request answer;
     answer.mutable_service_answer()->set_call(number);
     EXPECT_TRUE(client.ask(answer).has_done());

@@ -28,19 +28,19 @@ TEST(Counting, IsReadBetweenTurns) {
     EXPECT_TRUE(counting.read([] {}));
 }
 
-TEST(Counting, IsReadAnewIfATurnBeganMeanwhile) {
+TEST(Counting, IsReadAgainIfATurnBeganMeanwhile) {
     Counting counting;
     EXPECT_FALSE(counting.read([&] { const Counting::Turn turn(counting); }));
     std::optional<Counting::Turn> turn;
     EXPECT_FALSE(counting.read([&] { turn.emplace(counting); }));
 }
 
-TEST(Counting, TurnsThatBeginWhileItIsHeldDoNotCount) {
+TEST(Counting, TurnsThatStartWhileItIsHeldDoNotCount) {
     Counting counting;
     {
         const Counting::Turn begun(counting);
         counting.hold();
-        EXPECT_TRUE(counting.counts()) << "that one goes on";
+        EXPECT_TRUE(counting.counts()) << "the turn continues";
         EXPECT_FALSE(counting.read([] {}));
     }
     {
@@ -48,13 +48,13 @@ TEST(Counting, TurnsThatBeginWhileItIsHeldDoNotCount) {
         EXPECT_FALSE(counting.counts());
         EXPECT_TRUE(counting.read([] {}));
         counting.release();
-        EXPECT_FALSE(counting.counts()) << "a turn counts whole, or not at all";
+        EXPECT_FALSE(counting.counts()) << "a turn counts completely or not at all";
     }
     const Counting::Turn turn(counting);
     EXPECT_TRUE(counting.counts());
 }
 
-// One turn after another without a break, as in a loop that is always late.
+// Consecutive turns without a pause, as in a loop that is always late.
 TEST(Counting, AllCountersAreOfTheSameTurns) {
     Counting counting;
     std::array<Counter, 64> counters;

@@ -16,7 +16,7 @@ using namespace executor;
 
 constexpr double kError = 0.03;
 
-TEST(Histogram, EachBucketBeginsWhereTheLastOneEnds) {
+TEST(Histogram, EachBucketStartsAtTheEndOfThePreviousOne) {
     for (std::size_t i = 0; i + 1 < Histogram::kBuckets; ++i) {
         ASSERT_EQ(Histogram::lowerBound(i) + Histogram::width(i), Histogram::lowerBound(i + 1))
             << i;
@@ -40,19 +40,19 @@ TEST(Histogram, HasLessThan3PercentErrorUpTo10Seconds) {
     }
 }
 
-TEST(Histogram, TakesValuesOutsideItsRange) {
+TEST(Histogram, AcceptsValuesOutOfRange) {
     EXPECT_EQ(Histogram::bucketOf(-5), 0U);
     EXPECT_EQ(Histogram::bucketOf(std::numeric_limits<std::int64_t>::max()),
               Histogram::kBuckets - 1);
 }
 
-// The value of rank ceil(q n), as quantiles are defined.
+// The value of rank ceil(q n), by the definition of quantiles.
 double exactQuantile(const std::vector<std::int64_t>& sorted, double q) {
     const auto rank = static_cast<std::size_t>(std::ceil(q * static_cast<double>(sorted.size())));
     return static_cast<double>(sorted[rank - 1]);
 }
 
-TEST(Histogram, GivesTheQuantilesOfWhatWasAdded) {
+TEST(Histogram, ReturnsTheQuantilesOfTheValues) {
     std::mt19937_64 random(1);
     for (const double spread : {0.2, 1.0, 3.0}) {
         std::lognormal_distribution<double> durations(9.0, spread);
@@ -76,7 +76,7 @@ TEST(Histogram, GivesTheQuantilesOfWhatWasAdded) {
     }
 }
 
-TEST(Histogram, OrdersItsFiguresAlsoForOneValue) {
+TEST(Histogram, OrdersItsQuantilesEvenForOneValue) {
     for (const std::int64_t value : {0, 1, 65, 97, 12345, 1'000'000'007}) {
         Histogram histogram;
         histogram.add(value);
@@ -89,14 +89,14 @@ TEST(Histogram, OrdersItsFiguresAlsoForOneValue) {
     }
 }
 
-TEST(Histogram, OfNothingIsAllZero) {
+TEST(Histogram, WithoutValuesIsAllZero) {
     const DistributionSummary summary = summarize(Histogram().snapshot(), 1.0);
     EXPECT_EQ(summary.count, 0U);
     EXPECT_EQ(summary.max, 0.0);
 }
 
-// Of 4000 components 37 MB otherwise, which the process keeps locked from the first look on.
-TEST(Histogram, ASnapshotTakesNoMemoryForBucketsWithoutValues) {
+// Otherwise 4000 components would need 37 MB of locked memory from the first query on.
+TEST(Histogram, ASnapshotStoresNoEmptyBuckets) {
     Histogram histogram;
     for (int i = 0; i < 1000; ++i) histogram.add(100 + 1'000'000 * (i % 3));
     const HistogramSnapshot snapshot = histogram.snapshot();
@@ -107,7 +107,7 @@ TEST(Histogram, ASnapshotTakesNoMemoryForBucketsWithoutValues) {
     EXPECT_EQ(summarize(since, 1.0).max, 100.0);
 }
 
-TEST(Histogram, ScalesItsFigures) {
+TEST(Histogram, ScalesItsResults) {
     Histogram histogram;
     histogram.add(40);
     const DistributionSummary summary = summarize(histogram.snapshot(), 0.5);
@@ -116,7 +116,7 @@ TEST(Histogram, ScalesItsFigures) {
     EXPECT_DOUBLE_EQ(summary.max, 20.0);
 }
 
-TEST(HistogramDifference, CountsWhatCameSince) {
+TEST(HistogramDifference, CountsLaterValues) {
     Histogram histogram;
     for (int i = 0; i < 100; ++i) histogram.add(1000);
     const HistogramSnapshot before = histogram.snapshot();
@@ -125,10 +125,10 @@ TEST(HistogramDifference, CountsWhatCameSince) {
     EXPECT_EQ(since.count, 10U);
     EXPECT_DOUBLE_EQ(since.mean, 10.0);
     EXPECT_DOUBLE_EQ(since.p999, 10.0);
-    EXPECT_DOUBLE_EQ(since.max, 10.0) << "the older maximum does not count";
+    EXPECT_DOUBLE_EQ(since.max, 10.0) << "the older maximum is excluded";
 }
 
-TEST(HistogramDifference, ToNothingIsAll) {
+TEST(HistogramDifference, ToAnEmptyHistogramIsEverything) {
     Histogram histogram;
     histogram.add(5);
     EXPECT_EQ(difference(histogram.snapshot(), {}).count, 1U);

@@ -1,5 +1,5 @@
 /// @file
-/// A component to hang ports and parameters on, attached to a clock that the
+/// A component without hooks, for ports and parameters, attached to a clock that the
 /// test sets. For tests of the API alone.
 #pragma once
 

@@ -1,6 +1,6 @@
 /// @file
-/// The test's end of the executor's bridge: holds the taps and injectors that
-/// a graph offers, in place of the ROS node.
+/// The test's side of the executor's bridge: holds the taps and injectors of a
+/// graph, in place of the ROS node.
 #pragma once
 
 #include <memory>
@@ -12,16 +12,16 @@
 
 namespace rtcf::test {
 
-/// What a bridge was given; shared by the bridge, which the runner owns, and the test.
+/// The objects given to a bridge; shared by the test and the bridge, which the runner owns.
 class BridgeRecord {
    public:
-    /// @return null if there is none of that topic
+    /// @return the tap of a topic, or null
     std::shared_ptr<executor::Tap> tap(const std::string& topic) const;
     std::shared_ptr<executor::Injector> injector(const std::string& topic) const;
     void set(std::shared_ptr<const executor::BridgeTable> table);
-    /// Taps of that topic that the bridge was given, ever.
+    /// The number of taps of that topic given to the bridge so far.
     std::size_t everGiven(const std::string& topic) const;
-    /// By which the test asks for a change of parameters, as ROS does.
+    /// Used by the test to request a change of parameters, as ROS does.
     executor::ParameterRequest request;
 
    private:

@@ -6,7 +6,7 @@
 
 #include "ordering/plan.hpp"
 
-// buildPlan() as the linker knows it: another signature is an undefined symbol, and told.
+// buildPlan()'s symbol name: a changed signature is an undefined symbol at link time.
 #define RTCF_BUILD_PLAN                                                \
     "_ZN4rtcf8executor9buildPlanENS0_5GraphENS0_6WiringERKNS0_4PlanEd" \
     "RNS0_8AdoptionERKNS0_14BridgeSettingsE"

@@ -1,16 +1,16 @@
 /// @file
-/// What the executor's plans looked like when they were built: the linker hands each call of
-/// buildPlan() of this program on by way of here (see --wrap in CMakeLists.txt).
+/// Counts the executor's plans when they are built: the linker redirects each call of
+/// buildPlan() in this program to here (see --wrap in CMakeLists.txt).
 #pragma once
 
 #include <cstddef>
 
 namespace rtcf::test {
 
-/// Of all runners of the program; any thread.
+/// Plans of all runners of the program; any thread.
 struct BuiltPlans {
     std::size_t count = 0;   ///< so far
-    bool selective = false;  ///< the last one's cycles take the long way
+    bool selective = false;  ///< whether the last one's cycles can take components out
 };
 
 BuiltPlans builtPlans();

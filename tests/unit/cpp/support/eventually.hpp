@@ -1,5 +1,5 @@
 /// @file
-/// Waiting for what another thread does, with a deadline.
+/// Waits for another thread's action, with a deadline.
 #pragma once
 
 #include <chrono>
@@ -8,7 +8,7 @@
 
 namespace rtcf::test {
 
-/// Asks until it is so, for at most a minute. @return whether it came to be
+/// Polls `condition` for at most a minute. @return whether it became true
 inline bool eventually(const std::function<bool()>& condition) {
     const auto deadline = std::chrono::steady_clock::now() + std::chrono::minutes(1);
     while (!condition()) {

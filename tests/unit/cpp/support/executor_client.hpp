@@ -1,5 +1,5 @@
 /// @file
-/// The test's end of an executor's socket: sends frames, also broken ones, and
+/// The test's end of an executor's socket: sends messages, also invalid ones, and
 /// waits for answers.
 #pragma once
 
@@ -19,7 +19,7 @@ class ExecutorClient {
     ExecutorClient(const ExecutorClient&) = delete;
     ExecutorClient& operator=(const ExecutorClient&) = delete;
 
-    /// A request as it stands on the wire.
+    /// A request as sent, with framing.
     static std::string frame(const executor::v1::Request& request);
 
     void sendBytes(const std::string& bytes) const;
@@ -27,10 +27,10 @@ class ExecutorClient {
     std::uint64_t send(executor::v1::Request request);
     void hello();
 
-    /// The next message, or none if the connection has ended. Fails the test if nothing comes in
-    /// time.
+    /// The next message, or none if the connection has ended. Fails the test at the
+    /// deadline.
     std::optional<executor::v1::Response> receive();
-    /// The answer to request `id`, past progress, events and other answers.
+    /// The answer to request `id`; skips progress, events and other answers.
     executor::v1::Response answerTo(std::uint64_t id);
     executor::v1::Response ask(const executor::v1::Request& request) {
         return answerTo(send(request));

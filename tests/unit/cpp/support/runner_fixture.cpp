@@ -126,7 +126,7 @@ double RunnerFixture::value(const std::string& component, const std::string& por
     const auto snapshot = runner_->snapshot();
     const auto& ports = snapshot->get(component).ports;
     std::vector<executor::Probe::Value> values;
-    // A look waits 0.1 s for the loop, which others may hold up for longer.
+    // A query waits 0.1 s for the loop, which other load may delay longer.
     EXPECT_TRUE(eventually([&] {
         values = onGraphThread([&] { return runner_->probe(component); });
         return !values.empty();

@@ -1,7 +1,7 @@
 /// @file
-/// A real runner for a test, with a loop at 1 kHz, and short words for what one
-/// asks of it. Changes run on the runner's graph thread, as the server has them
-/// run; refusals are thrown here.
+/// A real runner for a test, with a loop at 1 kHz and short functions for its
+/// operations. Changes run on the runner's graph thread, as for the server; errors are
+/// thrown here.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -38,15 +38,15 @@ using executor::RunnerState;
 /// A component of package rtcf_unit_test; remaps and parameters are added by the caller.
 ComponentDefinition definition(const std::string& type, const std::string& name);
 
-/// What came of work on the graph thread. A refusal is passed on by value: libstdc++ counts the
-/// owners of an exception where ThreadSanitizer does not see it.
+/// The result of work on the graph thread. An error is passed on by value: libstdc++ counts the
+/// owners of an exception in a way that ThreadSanitizer does not see.
 template <typename Result>
 struct Answer {
     std::optional<Result> result;
     std::optional<std::pair<executor::RefusalKind, std::string>> refusal;
 };
 
-/// Work on the graph thread that one has not waited for yet.
+/// Work on the graph thread that may still be running.
 template <typename Result>
 class Pending {
    public:
@@ -64,20 +64,20 @@ class Pending {
 
 class RunnerFixture : public ::testing::Test {
    protected:
-    /// @param cpu_claims folder of the claims of CPUs; empty = other loops are not known of
+    /// @param cpu_claims folder of CPU claims; empty = other loops are unknown
     explicit RunnerFixture(std::string cpu_claims = {});
     ~RunnerFixture() override;
 
-    /// Runs `work` on the graph thread. @throws what it throws
+    /// Runs `work` on the graph thread. @throws its exceptions
     template <typename Work>
     auto onGraphThread(Work work) -> decltype(work());
 
-    /// Posts `work` and does not wait for it.
+    /// Posts `work` without waiting for it.
     template <typename Work>
     auto begin(Work work) -> Pending<decltype(work())>;
 
     ChangeOutcome load(const ComponentDefinition& component);
-    /// Loads without waiting for the end of it.
+    /// Loads without waiting for the end.
     Pending<ChangeOutcome> beginLoad(const ComponentDefinition& component);
     ChangeOutcome loadExample(const std::string& type, const std::string& name,
                               executor::Remaps remaps, bool first = false);
@@ -94,14 +94,14 @@ class RunnerFixture : public ::testing::Test {
     /// Changes settings, starting from the present ones.
     void configure(const std::function<void(RunnerSettings&)>& change);
 
-    /// What the refusal of `work` says; empty if it is not refused.
+    /// The error text of `work`; empty if it succeeds.
     template <typename Work>
     std::string refusal(Work&& work);
 
-    /// Newest value of a port that carries a std_msgs number. @return NaN without a value
+    /// Newest value of a port with a std_msgs number. @return NaN without a value
     double value(const std::string& component, const std::string& port);
     std::uint64_t iteration() const { return runner_->loop().figures().iteration.load(); }
-    /// Waits until the loop has executed `cycles` more. @return false if it does not
+    /// Waits until the loop has run `cycles` more. @return false at the deadline
     bool runs(std::uint64_t cycles = 20);
     RunnerState state() const { return runner_->picture().state; }
     std::vector<std::string> order() const;
@@ -109,9 +109,9 @@ class RunnerFixture : public ::testing::Test {
 
     std::vector<RunnerEvent> events() const;
     std::vector<LogEntry> logged();
-    /// What has been handed on so far; what still waits in the log is not.
+    /// The log records forwarded so far, without those still queued.
     std::vector<LogEntry> handedOn() const;
-    /// From here on events cannot be taken.
+    /// From now on events are lost.
     void loseEvents() { events_are_lost_ = true; }
     rtcf_unit_test::Journal& journal() { return *rtcf_unit_test_journal(); }
     BridgeRecord& bridge() { return *bridge_; }

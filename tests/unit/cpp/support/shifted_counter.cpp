@@ -24,7 +24,7 @@ struct sigaction previous{};
 void findVdso() {
     vdso_begin = getauxval(AT_SYSINFO_EHDR);
     if (vdso_begin == 0) return;
-    // NOLINTBEGIN(performance-no-int-to-ptr): the kernel gives addresses as numbers
+    // NOLINTBEGIN(performance-no-int-to-ptr): the kernel returns addresses as numbers
     const auto* const header = reinterpret_cast<const ElfW(Ehdr)*>(vdso_begin);
     const auto* segment = reinterpret_cast<const ElfW(Phdr)*>(vdso_begin + header->e_phoff);
     // NOLINTEND(performance-no-int-to-ptr)
@@ -33,8 +33,8 @@ void findVdso() {
     }
 }
 
-// Does what the instruction that trapped was to do: RDTSC, or RDTSCP without the processor's
-// number, which the vdso's clocks do not look at.
+// Emulates the trapped instruction: RDTSC, or RDTSCP without the processor number, which the
+// vdso's clocks ignore.
 void readForIt(int signal, siginfo_t* /*info*/, void* context) {
     auto& registers = static_cast<ucontext_t*>(context)->uc_mcontext.gregs;
     const auto at = static_cast<std::uintptr_t>(registers[REG_RIP]);
@@ -43,7 +43,7 @@ void readForIt(int signal, siginfo_t* /*info*/, void* context) {
     const bool rdtsc = code[0] == 0x0f && code[1] == 0x31;
     const bool rdtscp = code[0] == 0x0f && code[1] == 0x01 && code[2] == 0xf9;
     if (!rdtsc && !rdtscp) {
-        ::sigaction(signal, &previous, nullptr);  // a crash after all
+        ::sigaction(signal, &previous, nullptr);  // a real crash
         return;
     }
     prctl(PR_SET_TSC, PR_TSC_ENABLE, 0, 0, 0);

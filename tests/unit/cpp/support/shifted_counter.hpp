@@ -1,14 +1,14 @@
 /// @file
-/// The processor's cycle counter as a thread finds it after a suspend of the machine: it has gone
-/// on, or begun anew, while CLOCK_MONOTONIC stood still.
+/// The processor's cycle counter as seen by a thread after a suspend of the machine: it has
+/// continued, or restarted, while CLOCK_MONOTONIC stood still.
 #pragma once
 
 #include <cstdint>
 
 namespace rtcf::test {
 
-/// Traps the counter's readings (PR_SET_TSC(2const)); those of the clocks in the vdso stay right.
-/// One at a time.
+/// Traps reads of the counter (PR_SET_TSC(2const)); the vdso's clocks stay correct. One at a
+/// time.
 class ShiftedCounter {
    public:
     ShiftedCounter();
@@ -16,9 +16,9 @@ class ShiftedCounter {
     ShiftedCounter(const ShiftedCounter&) = delete;
     ShiftedCounter& operator=(const ShiftedCounter&) = delete;
 
-    /// This machine can show it.
+    /// Whether this machine supports it.
     static bool possible() noexcept;
-    /// From here on, in the calling thread. @param ticks may be negative
+    /// Shifts the counter from now on, in the calling thread. @param ticks may be negative
     void shift(std::int64_t ticks) noexcept;
 };
 

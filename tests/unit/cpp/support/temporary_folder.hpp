@@ -1,5 +1,5 @@
 /// @file
-/// A folder that lives as long as a test.
+/// A folder that exists as long as a test.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// Minima and maxima of values without their types, and where their numbers lie.
+// Minima and maxima of values without their types, and the offsets of their numbers.
 #include "watch/extremes.hpp"
 
 #include <geometry_msgs/TwistStamped.h>
@@ -81,7 +81,7 @@ TEST(NumberFields, OfListsAsLongAsInTheSample) {
     EXPECT_EQ(count(numbersOf(array)), 2U * 2U + 1U + 3U);
 }
 
-TEST(NumberFields, RefuseAMessageThatIsNotAsItsDefinitionSays) {
+TEST(NumberFields, RejectAMessageThatContradictsItsDefinition) {
     EXPECT_THROW(numbersOfMessage("float64 data\n", std::string(7, '\0')), std::invalid_argument);
     EXPECT_THROW(numbersOfMessage("float64 data\n", std::string(9, '\0')), std::invalid_argument);
     EXPECT_THROW(numbersOfMessage("float64[] data\n", std::string(4, '\xff')),
@@ -96,7 +96,7 @@ TEST(NumberFields, OfStates) {
     EXPECT_TRUE(numbersOfState("{a: double}", 8).empty());
 }
 
-TEST(Extremes, TellEachNumberAndWhereItWasFirst) {
+TEST(Extremes, HaveEachNumberAndItsFirstCycle) {
     Extremes extremes({{NumberKind::Float64, 0, 2}});
     extremes.add(bytesOf<double>({1.0, 5.0}), 3);
     extremes.add(bytesOf<double>({-2.0, 5.0}), 4);
@@ -107,7 +107,7 @@ TEST(Extremes, TellEachNumberAndWhereItWasFirst) {
     EXPECT_EQ(numbersIn<double>(values), (std::vector<double>{-2.0, 5.0, 1.0, 9.0}));
     EXPECT_EQ(numbersIn<std::uint32_t>(places), (std::vector<std::uint32_t>{4, 3, 3, 7}));
     EXPECT_EQ(values.size() + places.size(), extremes.bytes(16));
-    // The next one begins anew.
+    // The next window starts again.
     values.clear();
     places.clear();
     extremes.add(bytesOf<double>({0.0, 0.0}), 1);
@@ -115,7 +115,7 @@ TEST(Extremes, TellEachNumberAndWhereItWasFirst) {
     EXPECT_EQ(numbersIn<double>(values), std::vector<double>(4, 0.0));
 }
 
-TEST(Extremes, HideNoNumberThatIsNone) {
+TEST(Extremes, IncludeNan) {
     constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
     for (const auto& order : {std::vector<double>{1.0, kNone}, {kNone, 1.0}}) {
         Extremes extremes({{NumberKind::Float64, 0, 1}});
@@ -144,7 +144,7 @@ void expectEnds(NumberKind kind) {
     EXPECT_EQ(numbersIn<std::uint32_t>(places), (std::vector<std::uint32_t>{2, 1}));
 }
 
-TEST(Extremes, KnowAllKindsOfNumbers) {
+TEST(Extremes, SupportAllTypesOfNumbers) {
     expectEnds<std::int8_t>(NumberKind::Int8);
     expectEnds<std::uint8_t>(NumberKind::UInt8);
     expectEnds<std::int16_t>(NumberKind::Int16);

@@ -1,4 +1,4 @@
-// How long a time the frames of a loop hold, and who is told if it is not long.
+// The time span that a loop's frames hold, and the note for a short one.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -27,7 +27,7 @@ class FrameTables : public RunnerFixture {
     }
 };
 
-TEST_F(FrameTables, ThatHoldLessThanASecondAreTold) {
+TEST_F(FrameTables, HoldingLessThanASecondAreReported) {
     load(definition("Ticker", "T"));
     EXPECT_TRUE(warnings().empty());
     keep(kMega);
@@ -39,14 +39,14 @@ TEST_F(FrameTables, ThatHoldLessThanASecondAreTold) {
               "values, and the ring is limited to 16 MiB: lower frame_kb of the runner, or "
               "watch fewer values");
     load(definition("Chatter", "D"));
-    EXPECT_EQ(warnings().size(), 1U) << "it is as it was";
+    EXPECT_EQ(warnings().size(), 1U) << "no further warning";
     keep(kMega / 16);
     EXPECT_EQ(warnings().size(), 1U);
     keep(kMega);
-    EXPECT_EQ(warnings().size(), 2U) << "anew";
+    EXPECT_EQ(warnings().size(), 2U) << "a new warning";
 }
 
-TEST_F(FrameTables, ThatHoldASecondOfASlowLoopAreNotTold) {
+TEST_F(FrameTables, HoldingASecondOfASlowLoopAreNotReported) {
     configure([](RunnerSettings& settings) { settings.frequency_hz = 16.0; });
     keep(kMega);
     load(definition("Camera", "C"));

@@ -28,7 +28,7 @@ TEST(PortSelection, NamesOnePort) {
     EXPECT_FALSE(selects("/arm/pid.effort", "/arm/pid2.effort"));
 }
 
-TEST(PortSelection, OfAComponentIsAllItHas) {
+TEST(PortSelection, OfAComponentIsAllItsPorts) {
     EXPECT_TRUE(selects("pid", "/pid.effort"));
     EXPECT_TRUE(selects("/arm/pid", "/arm/pid.integral"));
     EXPECT_FALSE(selects("pid", "/arm/pid.effort"));
@@ -44,7 +44,7 @@ TEST(PortSelection, OneStarStopsAtASlashTwoDoNot) {
     EXPECT_TRUE(selects("/arm*", "/arm1.x"));
 }
 
-TEST(PortSelection, TakesOneCharacterAndSets) {
+TEST(PortSelection, AcceptsSingleCharactersAndSets) {
     EXPECT_TRUE(selects("/joint?.out", "/joint3.out"));
     EXPECT_FALSE(selects("/joint?.out", "/joint13.out"));
     EXPECT_FALSE(selects("/arm?pid.out", "/arm/pid.out"));
@@ -52,22 +52,22 @@ TEST(PortSelection, TakesOneCharacterAndSets) {
     EXPECT_FALSE(selects("/joint[135].out", "/joint2.out"));
     EXPECT_TRUE(selects("/joint[1-4].out", "/joint2.out"));
     EXPECT_FALSE(selects("/joint[1-4].out", "/joint5.out"));
-    EXPECT_TRUE(selects("/joint[1.out", "/joint[1.out")) << "without its end it stands for itself";
+    EXPECT_TRUE(selects("/joint[1.out", "/joint[1.out")) << "an unclosed bracket is literal";
 }
 
-TEST(PortSelection, StarsInARowAreOne) {
+TEST(PortSelection, ConsecutiveStarsAreOne) {
     EXPECT_TRUE(selects("/arm" + std::string(900, '*') + ".out", "/arm/joint/pid.out"));
     EXPECT_TRUE(selects("/***.out", "/arm/pid.out"));
     EXPECT_FALSE(selects("/arm" + std::string(900, '*') + ".out", "/leg/pid.out"));
 }
 
-TEST(PortSelection, HardPatternsEndSoon) {
+TEST(PortSelection, HardPatternsAreFast) {
     std::string pattern = "/";
     for (int i = 0; i < 300; ++i) pattern += "*a";
     EXPECT_FALSE(selects(pattern, "/" + std::string(250, 'a') + ".b"));
 }
 
-TEST(PortSelection, TakesNamesAndPatternsTogether) {
+TEST(PortSelection, AcceptsNamesAndPatternsTogether) {
     const PortSelection selection({"arm/pid.effort", "/leg/*.out", "/arm/pid.error"});
     EXPECT_TRUE(selection.matches("/arm/pid.effort"));
     EXPECT_TRUE(selection.matches("/arm/pid.error"));
@@ -85,7 +85,7 @@ TEST(PortSelection, TakesNamesAndPatternsTogether) {
     EXPECT_EQ(PortSelection({"a.b", "a.*", "a.c"}).rank("/a.c"), 1U) << "the first that matches";
 }
 
-TEST(PortSelection, RefusesWhatIsEmptyOrTooLong) {
+TEST(PortSelection, RejectsEmptyAndTooLongPatterns) {
     EXPECT_THROW(PortSelection({""}), Refusal);
     EXPECT_THROW(PortSelection({std::string(2000, 'a')}), Refusal);
 }

@@ -14,7 +14,7 @@ OROCOS_HEADERS_END
 
 namespace old {
 
-// Multiplies what comes in, and tells by what.
+// Multiplies its input, and writes the factor, too.
 class Scaler : public RTT::TaskContext, public RtcfExtension {
    public:
     explicit Scaler(const std::string& name);
