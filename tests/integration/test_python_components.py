@@ -153,7 +153,7 @@ def test_a_message_longer_than_declared_is_rejected(client: rtcf.Client, daemon:
     client.load(rtcf.component("py", "Arm", name="arm"))
     client.step(5)
     assert _states(client, "arm")["incomplete"] == "5"
-    said = "a message of joints has more elements than declared, and is not taken"
+    said = "a message of joints has more elements than declared and is ignored"
     wait_for(lambda: said in daemon.log(), "the warning")
 
 
@@ -251,7 +251,7 @@ WAYS = {
     3: r"`self\.zero = quotient\(1\.0, self\.zero\)`: ZeroDivisionError: division by zero",
     4: r"`self\.fault\(\"no reply from the drive\"\)`: no reply from the drive",
     5: r"`self\.few\[:\] = np\.ones\(self\.place\)`: ValueError: .* size 3 is set to one of size 5",
-    6: r"`self\.few\[0\] = .*`: MemoryError: temporaries are more than the arena has",
+    6: r"`self\.few\[0\] = .*`: MemoryError: the temporary arrays do not fit into the arena",
     7: r"`self\.place = .*`: ZeroDivisionError: ",
 }
 

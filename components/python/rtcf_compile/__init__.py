@@ -1,1 +1,1 @@
-"""Compiles components written in Python into ordinary libraries of components."""
+"""Compile components written in Python to ordinary component libraries."""

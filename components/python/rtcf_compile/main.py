@@ -1,4 +1,4 @@
-"""`rtcf-compile`: a library of components of Python sources."""
+"""`rtcf-compile`: compile Python sources to a component library."""
 
 import argparse
 import re
@@ -16,32 +16,33 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit code."""
     parser = argparse.ArgumentParser(
         prog="rtcf-compile",
-        description="Makes a library of components of Python sources; it needs no Python to run.",
-        epilog="Exit codes: 0 done, 1 refused, 2 usage, 3 not what the interpreter does.",
+        description="Compile components in Python to a library, which runs without Python.",
+        epilog="Exit codes: 0 success, 1 error, 2 usage error, 3 results differ from the "
+        "interpreter's.",
     )
     parser.add_argument("sources", metavar="SOURCE", nargs="+", type=Path)
-    parser.add_argument("-o", dest="output", metavar="LIB", type=Path, help="the library to write")
+    parser.add_argument("-o", dest="output", metavar="LIB", type=Path, help="write this library")
     parser.add_argument(
         "--verify",
         metavar="CYCLES|SECONDSs",
         nargs="?",
         const="10000",
-        help="compare with the interpreter for so many cycles, or for so much processor time: 1s "
-        "(default: 10000)",
+        help="compare the machine code with the interpreter for this number of cycles, or for this "
+        "processor time: 1s (default: 10000)",
     )
-    parser.add_argument("--seed", metavar="N", type=int, default=1, help="of --verify's inputs")
+    parser.add_argument("--seed", metavar="N", type=int, default=1, help="seed of the inputs")
     args = parser.parse_args(arguments)
     if args.output is None and args.verify is None:
-        parser.error("say what to do with it: -o LIB, --verify")
+        parser.error("give -o LIB, --verify or both")
     if args.verify is not None and not _AMOUNT.fullmatch(args.verify):
-        parser.error(f"--verify {args.verify}: cycles, as 10000, or seconds, as 1s")
+        parser.error(f"--verify {args.verify}: give cycles (10000) or seconds (1s)")
     from rtcf.component import DeclarationError
 
     from rtcf_compile.source.mistake import Mistake
 
     try:
         classes = _classes(args.sources)
-        # numba takes a second to import: only for what is well up to here.
+        # Importing numba takes a second: import it only after the cheap checks.
         from rtcf_compile.library import build, log_text
         from rtcf_compile.machine_code import lowering
 
@@ -80,10 +81,13 @@ def _classes(files: list[Path]) -> list[type]:
         here = source.components(source.load(file))
         if not here:
             raise Mistake(
-                str(file), 0, "has no component", "class Name(Component): with `def update(self):`"
+                str(file),
+                0,
+                "has no component",
+                "define class Name(Component): with `def update(self):`",
             )
         for each in here:
             if each.__name__ in found:
-                raise Mistake(str(file), 0, f"{each.__name__} is there twice", "rename one")
+                raise Mistake(str(file), 0, f"{each.__name__} is defined twice", "rename one")
             found[each.__name__] = each
     return list(found.values())

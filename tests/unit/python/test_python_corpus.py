@@ -28,6 +28,7 @@ _VERBS = (
         "compute",
         "convert",
         "copy",
+        "correct",
         "declare",
     ),
     *("define", "derive", "draw", "exchange", "give", "import", "keep", "leave", "log", "look"),

@@ -54,7 +54,7 @@ FAULTS = {
     ),
     "mask of another size": (
         "self.f = self.z[np.ones(n) > 0.0][0]",
-        "IndexError: a mask of {n} elements for 3",
+        "IndexError: a mask of {n} elements for an array of size 3",
     ),
     "vector of another size": (
         "self.z[:] = np.ones(n)",
@@ -71,7 +71,7 @@ FAULTS = {
     "unpacked": ("a, b = np.ones(n)", "ValueError: {n} values for 2 names"),
     "division": ("self.f = 1 / (n - n)", "ZeroDivisionError: division by zero"),
     "queue": ("self.f = self.q.front", "IndexError: front of an empty queue"),
-    "number that is not known": ("self.f = self.o", "TypeError: None is no number"),
+    "number that is not known": ("self.f = self.o", "TypeError: None is not a number"),
 }
 
 

@@ -167,7 +167,7 @@ def test_a_missing_runtime_is_named(
     from rtcf_compile.library import toolchain
 
     monkeypatch.setenv("RTCF_PYTHON_RUNTIME", str(tmp_path / "absent.a"))
-    with pytest.raises(Mistake, match=r"absent\.a: is not there: sudo apt install librtcf-dev"):
+    with pytest.raises(Mistake, match=r"absent\.a: does not exist: sudo apt install librtcf-dev"):
         toolchain.runtime()
 
 
@@ -213,13 +213,13 @@ def test_a_log_text_determines_how_arguments_are_stored(
 @pytest.mark.parametrize(
     ("text", "types", "said"),
     [
-        ("{} {}", ("int64",), "has more places than arguments"),
-        ("{}", ("int64", "float64"), "has fewer places than arguments"),
+        ("{} {}", ("int64",), "has more placeholders than arguments"),
+        ("{}", ("int64", "float64"), "has fewer placeholders than arguments"),
         ("{", (), r"Single '\{' encountered"),
-        ("{:d}", ("float64",), "does not show a float64"),
-        ("{:,}", ("int64",), r"\{:,\} is not shown"),
-        ("{!r}", ("int64",), "!r is not shown"),
-        ("{speed}", ("float64",), r"\{speed\} has a name"),
+        ("{:d}", ("float64",), "cannot show a float64"),
+        ("{:,}", ("int64",), r"\{:,\} is not supported"),
+        ("{!r}", ("int64",), "!r is not supported"),
+        ("{speed}", ("float64",), r"\{speed\} is named"),
         ("{} {0}", ("float64",), "in one text"),
         ("{0} {0:.1f}", ("int64",), "as an int and as a float"),
     ],

@@ -156,8 +156,8 @@ REFUSED = {
     "np.trapz(f)" if hasattr(np, "trapz") else "np.trapezoid(f)": "np.trap",
 }
 REFUSED_STEPS = {
-    "self.bytes += k": "uint8 are changed to int64",
-    "self.bytes[1:] += k[1:]": "uint8 are changed to int64",
+    "self.bytes += k": "uint8 would become int64",
+    "self.bytes[1:] += k[1:]": "uint8 would become int64",
     "z = u.copy()\nz |= k": r"uint8 \|= a vector of int64",
     "self.bytes[0] = 300": "300 does not fit uint8",
     "self.filtered[0] += 0.1": "a single float32",

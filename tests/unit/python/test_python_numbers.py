@@ -369,14 +369,14 @@ SMALL = [
     "self.k = n if on else 3\nself.f = n",
 ]
 LARGE = {
-    "y = n if on else 0.5  # here\nself.f = y": "is once an int",
-    "y = 0.5\nif on:\n    y = n  # here\nself.f = y": "y is once an int",
-    "y = self.k  # here\nfor i in range(3):\n    y = y * 0.5\nself.f = y": "y is once",
-    "self.f = max(n, 0.5)  # here": "once an int",
-    "self.f = min(x, self.k)  # here": "once an int",
+    "y = n if on else 0.5  # here\nself.f = y": "is an int in one place",
+    "y = 0.5\nif on:\n    y = n  # here\nself.f = y": "y is an int in one place",
+    "y = self.k  # here\nfor i in range(3):\n    y = y * 0.5\nself.f = y": "y is an int in",
+    "self.f = max(n, 0.5)  # here": "an int in one place",
+    "self.f = min(x, self.k)  # here": "an int in one place",
     "y = 1\nfor i in range(9):  # here\n    y = y * 1000\nif on:\n    y = 0.5\nself.f = y": "y is",
-    "y = 1 if on else 0.5\nself.f = y * n % 7  # here": "y is once an int",
-    "self.f = either(on, n)": "is once an int",
+    "y = 1 if on else 0.5\nself.f = y * n % 7  # here": "y is an int in one place",
+    "self.f = either(on, n)": "is an int in one place",
 }
 
 

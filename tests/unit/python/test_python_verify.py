@@ -183,7 +183,7 @@ def test_different_rounding_of_a_sum_is_no_difference(
     monkeypatch.setattr(verify, "HELPERS", HELPERS | backwards)
     assert main.main([written(tmp_path, SUM, "np.float64, 64", "float"), "--verify", "1000"]) == 0
     said = capsys.readouterr().out
-    assert re.search(r"1000 cycles, .*[1-9]\d* farther by rounding: the same", said)
+    assert re.search(r"1000 cycles, .*[1-9]\d* explained by rounding: the same", said)
 
 
 def test_an_error_larger_than_rounding_is_a_difference() -> None:
@@ -272,7 +272,7 @@ def test_seconds_are_processor_time_after_the_minimum_of_cycles(
 def test_an_invalid_amount_is_rejected(capsys: pytest.CaptureFixture[str], amount: str) -> None:
     with pytest.raises(SystemExit):
         main.main(["none.py", f"--verify={amount}"])
-    said = f"--verify {amount}: cycles, as 10000, or seconds, as 1s"
+    said = f"--verify {amount}: give cycles (10000) or seconds (1s)"
     assert said in capsys.readouterr().err
 
 

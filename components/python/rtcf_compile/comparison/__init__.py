@@ -1,1 +1,1 @@
-"""Compiled code beside the interpreter: the same inputs for both."""
+"""Compares compiled code with the interpreter on the same inputs."""

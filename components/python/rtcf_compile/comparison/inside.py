@@ -1,4 +1,4 @@
-"""A component's machine code called from here, without a loop: for comparison and measurement."""
+"""Calls the machine code of a component in this process, for comparison and measurement."""
 
 import ctypes
 import subprocess
@@ -15,7 +15,7 @@ from rtcf_compile.machine_code.lowering import Compiled
 from rtcf_compile.machine_code.raises import hash_of
 from rtcf_compile.source.mistake import Mistake
 
-# Of values of an earlier writer, and of ages, which records have already.
+# Functions of the runtime for earlier writers and ages. Records contain these values already.
 _RUNTIME = f"""extern "C" {{
 long {port_access.READ}(void*) {{ return 0; }}
 void {port_access.READ_MORE}(void*, void*, void*) {{}}
@@ -23,10 +23,10 @@ void {port_access.READ_MORE}(void*, void*, void*) {{}}
 
 
 class Inside:
-    """The hooks of a compiled component, on records of NumPy."""
+    """The hooks of a compiled component, called on NumPy records."""
 
     def __init__(self, compiled: Compiled) -> None:
-        """Load the objects as a library of this process; log calls do nothing."""
+        """Load the objects as a library into this process; log calls do nothing."""
         self._compiled = compiled
         with tempfile.TemporaryDirectory(prefix="rtcf-verify-") as name:
             folder = Path(name)
@@ -50,7 +50,7 @@ class Inside:
             ]
             done = subprocess.run(command, capture_output=True, text=True, check=False)
             if done.returncode != 0:
-                raise Mistake(compiled.file, 0, done.stderr.strip()[:300], "look at the compiler")
+                raise Mistake(compiled.file, 0, done.stderr.strip()[:300], "check the C++ compiler")
             self._library = ctypes.CDLL(str(library))
         self._ports = _Ports(compiled.description)
         self._hooks = {}
@@ -61,9 +61,9 @@ class Inside:
             self._hooks[hook] = function
 
     def call(self, hook: str, record: Any) -> str | None:
-        """Run a hook on a record; return its exception in the loop's words.
+        """Run a hook on a record; return the text of its exception, as in the loop, or None.
 
-        Inputs have the values of the record, which then has those of the outputs.
+        The hook reads inputs from the record and writes outputs to it.
         """
         if hook in REALTIME_HOOKS:
             self._ports.put(record)
@@ -87,7 +87,7 @@ class Inside:
 
 
 class _Ports:
-    """Ports of values without a loop: memory as port.hpp and slot.hpp have it."""
+    """Ports of values without a loop, with the memory layout of port.hpp and slot.hpp."""
 
     def __init__(self, description: Description) -> None:
         self._inputs = [_Port(each) for each in port_access.inputs(description)]
@@ -104,7 +104,7 @@ class _Ports:
         self.address: int = int(self._addresses.ctypes.data)
 
     def put(self, record: Any) -> None:
-        """Give inputs the values of a record."""
+        """Set inputs to the values of a record."""
         for each in self._inputs:
             is_new, is_valid = (bool(record[f"{each.name}__{flag}"]) for flag in ("new", "valid"))
             each.sequence = int(is_new) + int(is_valid)
@@ -112,7 +112,7 @@ class _Ports:
             each.value = record[each.name]
 
     def take(self, record: Any) -> None:
-        """Put the values of written outputs into a record."""
+        """Copy the values of written outputs to a record."""
         for each in self._outputs:
             if each.sequence:
                 record[each.name] = each.value
@@ -132,7 +132,7 @@ class _Port:
 
     @property
     def sequence(self) -> int:
-        """How often it was written."""
+        """The number of writes."""
         return int(self.slot[port_access.SEQUENCE // 8])
 
     @sequence.setter
@@ -141,7 +141,7 @@ class _Port:
 
     @property
     def value(self) -> Any:
-        """In the order of a record."""
+        """The value, in the element order of a record."""
         order = "F" if self._type.is_float else "C"
         return self._elements().reshape(self._type.shape, order=order)
 
@@ -150,7 +150,7 @@ class _Port:
         self._elements()[:] = np.asarray(value).ravel("F" if self._type.is_float else "C")
 
     def _elements(self) -> Any:
-        """As the slot has them: matrices of floats by columns."""
+        """Return the elements in the order of the slot: matrices of floats by columns."""
         memory = self.slot.view(np.uint8)[port_access.SLOT_VALUE :]
         used = self._type.count * self._type.scalar.itemsize
         return memory[:used].view(self._type.scalar)

@@ -1,11 +1,10 @@
-"""Compares compiled code with the interpreter: the same inputs, parameters and state for both.
+"""Compares compiled code with the interpreter on the same inputs, parameters and state.
 
-Inputs are drawn from a seed, values at the bounds among them. After each cycle the state goes on
-from the interpreter's, so that a difference is of one cycle and does not add up. In the interpreter
-`@` and np.linalg are the helpers, which sum in the same order, and so is the division of single
-numbers, of which NumPy's do not raise. Other functions of NumPy may round
-otherwise than the loop's: a difference as large as one in the last place of what the hook reads
-makes is none.
+Inputs are random values from a seed, including special values. After each cycle, both continue from
+the interpreter's state, so that differences do not accumulate. In the interpreter, helpers replace
+`@` and np.linalg, for the same order of sums, and the division of single numbers, because division
+of NumPy numbers does not raise. Other NumPy functions may round differently. A difference no larger
+than the effect of the last place of the values that the hook reads does not count.
 """
 
 import ast
@@ -43,17 +42,18 @@ from rtcf_compile.source.processor_time import HOOK_S, TimeLimitError, loop_line
 
 LARGEST_ULP = 4
 MOST_DIFFERENCES = 10
-# Changes of the last place of the values read, so many, explain a difference so much larger.
+# The number of runs with changed last places, and the factor by which a difference may exceed their
+# effect.
 _TRIES, _ROUNDING = 16, 16.0
-_ANEW = 200  # cycles from one start to the next
+_ANEW = 200  # cycles between restarts
 _EDGES = (0.0, -0.0, 1.0, -1.0, 1e-300, -1e-300, 1e-3, 1e3, 1e12, -1e12, 1e300, np.inf, np.nan)
-# Python raises where IEEE 754 goes on to infinity or NaN.
+# Exceptions that only Python raises; IEEE 754 continues with infinity or NaN.
 _PYTHONS_OWN = (OverflowError,)
 
 
 @dataclass
 class Comparison:
-    """What was found for one component."""
+    """The result for one component."""
 
     name: str
     cycles: int = 0
@@ -65,18 +65,18 @@ class Comparison:
     problem: str = ""  # the first difference, with its file
 
     def __str__(self) -> str:
-        """Return the one line."""
+        """Return the result in one line."""
         more = f", {self.raised} raised in both" if self.raised else ""
         if self.rounded:
-            more += f", {self.rounded} farther by rounding"
+            more += f", {self.rounded} explained by rounding"
         if self.pythons_own:
-            more += f", {self.pythons_own} not compared: Python's own overflow"
+            more += f", {self.pythons_own} not compared: OverflowError only in Python"
         first = f"; {self.differences[0]}" if self.differences else ""
         verdict = f"{len(self.differences)} DIFFER{first}" if self.differences else "the same"
         return f"{self.name}: {self.cycles} cycles, {self.largest_ulp} ulp{more}: {verdict}"
 
     def differ(self, what: str, file: str, line: int = 0) -> None:
-        """Note a difference."""
+        """Record a difference."""
         self.differences.append(what)
         if not self.problem:
             place = (
@@ -85,23 +85,23 @@ class Comparison:
             self.problem = f"{place}: {self.name}: {what}"
 
     def endless(self, hook: str, cycle: int, where: str, file: str, line: int) -> None:
-        """Note a hook that takes too long."""
+        """Record a hook that exceeds the time limit."""
         what = f"{hook}, cycle {cycle}: it did not end within {HOOK_S:g} s of processor time"
         what += f" {where}: bound its loops: for _ in range(…)"
         self.differ(what, file, line)
 
 
 class Bounds(Protocol):
-    """Keeps hooks from running for ever."""
+    """Limits the time of hooks."""
 
     def record(self, dtype: Any) -> Any:
-        """Return the memory of the record that compiled code works on."""
+        """Return the record that compiled code works on."""
 
     def python(self) -> Any:
-        """Bound a hook in the interpreter: raises TimeLimitError."""
+        """Limit a hook in the interpreter; raises TimeLimitError."""
 
     def machine_code(self, hook: int, cycle: int) -> Any:
-        """Bound a compiled hook, by its place in `hooks`."""
+        """Limit a compiled hook, given by its index in `hooks`."""
 
 
 class _Unbounded:
@@ -126,8 +126,10 @@ def compare(
     bounds: Bounds | None = None,
     enough: Callable[[int], bool] | None = None,
 ) -> Comparison:
-    """Run both for that many cycles, or until so many are `enough`; `edges` is the share of inputs
-    that are special values."""
+    """Run compiled code and interpreter for a number of cycles, or until `enough` returns true.
+
+    `edges`: the share of special values among inputs.
+    """
     running = _Comparing(cls, compiled, bounds or _Unbounded())
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")
@@ -137,11 +139,11 @@ def compare(
 
 
 class _EndError(Exception):
-    """Nothing is left to compare."""
+    """The comparison cannot continue."""
 
 
 class _Comparing:
-    """A comparison under way."""
+    """A running comparison."""
 
     def __init__(self, cls: type[Component], compiled: Compiled, bounds: Bounds) -> None:
         self.result = Comparison(cls.__name__)
@@ -149,11 +151,11 @@ class _Comparing:
         self._inside = Inside(compiled)
         self._cycle = 0
         self._mine = bounds.record(compiled.description.record)
-        self._draw = np.random.default_rng(1)  # of its own, so that inputs are the same
-        self._prepared: dict[bytes, Any] = {}  # by the parameters
+        self._draw = np.random.default_rng(1)  # separate, so that inputs do not depend on it
+        self._prepared: dict[bytes, Any] = {}  # records by parameter values
 
     def run(self, enough: Callable[[int], bool], draw: Any, edges: float) -> None:
-        """Run hooks in the order of a loop's."""
+        """Run hooks in the order of the loop."""
         self._component: Any = self._made()
         hooks, result = self._compiled.hooks, self.result
         description = self._compiled.description
@@ -170,7 +172,7 @@ class _Comparing:
                     self._prepare()
                 if "start" in hooks:
                     self._both("start")
-                # Every other time without special values: one NaN stays in a filter's state.
+                # Every other run has no special values: a NaN would stay in a filter's state.
                 share = edges if self._cycle // _ANEW % 2 else 0.0
                 inputs = [_Inputs(each, draw, share) for each in description.of(Input)]
                 inputs += [_Messages(each, draw, share) for each in description.of(Queue)]
@@ -187,7 +189,7 @@ class _Comparing:
             self._both("safe")
 
     def _prepare(self) -> None:
-        """Compute Derived members, once for the same parameters."""
+        """Compute Derived members, once for each set of parameters."""
         record, description = self._record, self._compiled.description
         given = b"".join(record[each.name].tobytes() for each in description.of(Parameter))
         if given not in self._prepared:
@@ -197,7 +199,7 @@ class _Comparing:
             record[derived.name] = self._prepared[given][derived.name]
 
     def _made(self) -> Any:
-        """Return the component in the interpreter."""
+        """Return the component for the interpreter."""
         cls = _interpreted(self._cls, self._compiled.narrow)
         try:
             with self._bounds.python():
@@ -205,12 +207,12 @@ class _Comparing:
         except TimeLimitError as error:
             self._endless("prepare", error)
         except Exception:
-            # Its prepare() takes no defaults: the load says so.
+            # prepare() rejects the default parameters; loading reports it.
             self.result.raised += 1
         raise _EndError
 
     def _both(self, hook: str) -> None:
-        """Run a hook both ways on copies of the record, and take the interpreter's over."""
+        """Run a hook both ways on copies of the record; continue with the interpreter's record."""
         result, record, mine, component = self.result, self._record, self._mine, self._component
         _bytes(component._record)[:] = _bytes(record)
         error = self._raised(hook)
@@ -235,7 +237,7 @@ class _Comparing:
         _bytes(record)[:] = _bytes(theirs)
 
     def _compare(self, hook: str, mine: Any, theirs: Any) -> None:
-        """Compare all members; leave the interpreter's record as it is."""
+        """Compare all members; keep the interpreter's record unchanged."""
         result = self.result
         nearby: list[Any] = []
         for name in mine.dtype.names:
@@ -257,7 +259,7 @@ class _Comparing:
         _bytes(self._component._record)[:] = _bytes(theirs)
 
     def _nearby(self, hook: str) -> list[Any]:
-        """Return what the interpreter makes of values a last place apart from those of the hook."""
+        """Return records of the interpreter for inputs changed by one unit in the last place."""
         found = []
         theirs = self._component._record
         names = [
@@ -269,7 +271,7 @@ class _Comparing:
         for number in range(_TRIES):
             _bytes(theirs)[:] = _bytes(self._record)
             for name in names:
-                # Each way is tried with its opposite: a float32 may be rounded to the same by one.
+                # Try both directions: one of them may round to the same float32.
                 towards[name] = -towards[name] if number % 2 else self._towards(theirs[name])
                 theirs[name] = np.nextafter(theirs[name], towards[name])
             if self._raised(hook) is None:
@@ -277,7 +279,7 @@ class _Comparing:
         return found
 
     def _towards(self, values: Any) -> Any:
-        """Return infinities of either sign, one for each of some values."""
+        """Return an infinity of random sign for each value."""
         return self._draw.choice((-np.inf, np.inf), values.shape).astype(values.dtype)
 
     def _raised(self, hook: str) -> Exception | None:
@@ -302,7 +304,7 @@ class _Comparing:
         )
 
     def _read(self, hook: str) -> str:
-        """Return which values a hook has of the inputs, as far as they are single ones."""
+        """Return the values of up to three scalar inputs, for the message."""
         inputs = [
             each.name
             for each in self._compiled.description.of(Input)
@@ -314,7 +316,7 @@ class _Comparing:
 
 
 def _same_fault(said: str | None, error: Exception | None) -> bool:
-    """Tell whether compiled code and interpreter have raised the same type, or nothing."""
+    """Tell whether compiled code and interpreter raised the same type of exception, or none."""
     if said is None or error is None:
         return said is None and error is None
     return isinstance(error, Fault) or any(
@@ -323,12 +325,12 @@ def _same_fault(said: str | None, error: Exception | None) -> bool:
 
 
 def _is_rounding(mine: Any, theirs: Any, nearby: list[Any]) -> bool:
-    """Tell whether values are apart by no more than a last place of what they depend on makes."""
+    """Tell whether a difference is within the effect of last places of the inputs."""
     if not nearby:
         return False
     ours, pythons = np.asarray(mine, np.float64), np.asarray(theirs, np.float64)
     others = np.asarray(nearby, np.float64)
-    # An element that is the same, as infinity or NaN, tells nothing about the others.
+    # Ignore equal elements, including infinity and NaN.
     pairs = zip(np.ravel(mine), np.ravel(theirs), strict=True)
     same = np.reshape([ulp(*pair) <= LARGEST_ULP for pair in pairs], ours.shape)
     finite = np.isfinite(ours) & np.isfinite(pythons) & np.isfinite(others).all(axis=0)
@@ -340,7 +342,7 @@ def _is_rounding(mine: Any, theirs: Any, nearby: list[Any]) -> bool:
 
 
 def _farthest(mine: Any, theirs: Any) -> tuple[str, Any, Any]:
-    """Return the element that differs most, as `[1, 2]`, and its values."""
+    """Return the index of the element that differs most, such as `[1, 2]`, and its values."""
     if not np.shape(mine):
         return "", mine, theirs
     far = [ulp(a, b) for a, b in zip(np.ravel(mine), np.ravel(theirs), strict=True)]
@@ -349,12 +351,12 @@ def _farthest(mine: Any, theirs: Any) -> tuple[str, Any, Any]:
 
 
 def _bytes(record: Any) -> Any:
-    """Return a record's memory, with what lies between its fields."""
+    """Return the memory of a record, including padding."""
     return record.reshape(1).view(np.uint8)
 
 
 def ulp(a: Any, b: Any) -> int:
-    """Return by how many representable numbers two values, or arrays, are apart at most."""
+    """Return the largest distance between two values or arrays, in units in the last place."""
     a, b = np.atleast_1d(a), np.atleast_1d(b)
     if a.dtype.kind != "f":
         return 0 if np.array_equal(a, b) else 2**63
@@ -373,10 +375,10 @@ def ulp(a: Any, b: Any) -> int:
 
 
 class _Inputs:
-    """What an input gets in the cycles up to the next start."""
+    """The values of an input in the cycles up to the next restart."""
 
     def __init__(self, member: Member, draw: Any, edges: float) -> None:
-        """Draw all at once, as NumPy is slow one by one."""
+        """Draw all values at once: single calls of NumPy are slow."""
         name = member.name
         self._flags = [f"{name}__{flag}" for flag in ("new", "valid", "connected")]
         self._age_name = f"{name}__age"
@@ -388,7 +390,7 @@ class _Inputs:
             self._values[name + leaf.field] = _drawn(leaf.type, shape, draw, edges)
             if leaf.is_variable:
                 counts = draw.integers(0, leaf.type.count, _ANEW, endpoint=True)
-                # Most messages are whole.
+                # Most messages have full length.
                 whole = draw.random(_ANEW) < 0.8
                 self._values[name + leaf.count] = np.where(whole, leaf.type.count, counts)
 
@@ -404,10 +406,10 @@ class _Inputs:
 
 
 class _Messages:
-    """What a queue gets: none to three messages a cycle, now and then more than it keeps."""
+    """The messages of a queue: up to three per cycle, sometimes more than its size."""
 
     def __init__(self, member: Member, draw: Any, edges: float) -> None:
-        """Draw all at once."""
+        """Draw all messages at once."""
         self._member = member
         self._counts = draw.choice((0, 0, 0, 1, 1, 2, 3, member.size + 1), _ANEW).tolist()
         shape = (_ANEW, member.size + 3, *member.type.shape)
@@ -421,7 +423,7 @@ class _Messages:
 
 
 def _drawn(kind: ValueType, shape: tuple[int, ...], draw: Any, edges: float) -> Any:
-    """Draw values of a type, the first size by their own scale."""
+    """Draw values of a type, with a random scale for each index of the first dimension."""
     if kind.is_bool:
         values = draw.random(shape) < 0.5
     elif kind.enumeration:
@@ -451,8 +453,8 @@ def _parameters(record: Any, parameters: list[Member], draw: Any) -> None:
 
 
 def _interpreted(cls: type[Component], narrow: Collection[CodeType]) -> type[Component]:
-    """Return the class, and its bases, with helpers in the place of `@`, np.linalg, divisions and
-    others.
+    """Return a copy of the class and its bases in which helpers replace `@`, np.linalg, divisions
+    and other operations.
     """
     copies: dict[type, type] = {}
     known: dict[FunctionType, FunctionType] = {}
@@ -508,7 +510,7 @@ def _with_helpers(
 def _in_class(
     tree: ast.FunctionDef, scope: dict[str, Any], source: Source, owner: type | None
 ) -> FunctionType:
-    """Return a function of a rewritten tree, in which super() is that of its class."""
+    """Return a function of a rewritten tree whose super() refers to its class."""
     place = ast.arguments([], [ast.arg("__class__")], None, [], [], None, [])
     name = ast.Return(ast.Name(tree.name, ast.Load()))
     outer = ast.FunctionDef("rtcf_in_class", place, [tree, name], [])

@@ -1,7 +1,7 @@
-"""The comparison in a process of its own, which ends also where compiled code does not.
+"""Runs the comparison in a child process, which ends even if compiled code does not.
 
-Python code is interrupted by a timer's signal. Compiled code is not: there the process ends by
-another timer, or by a crash, and what it was about to do stands in memory that it shares with us.
+A timer signal interrupts Python code but not compiled code. There, another timer, or a crash, kills
+the child. It notes its next step in shared memory, from which the parent makes the message.
 """
 
 import mmap
@@ -31,19 +31,21 @@ _COMPONENT, _HOOK, _CYCLE, _COMPILED = range(4)
 
 @dataclass(frozen=True)
 class Amount:
-    """How much is compared: cycles of each component, or seconds of processor time of all."""
+    """The length of a comparison: cycles per component, or total seconds of processor time."""
 
     cycles: int = 0
     seconds: float = 0.0
 
     @classmethod
     def parse(cls, text: str) -> "Amount":
-        """Read `10000`, or `1s`."""
+        """Parse `10000` or `1s`."""
         return cls(seconds=float(text[:-1])) if text.endswith("s") else cls(cycles=int(text))
 
     def enough(self, components: int) -> Callable[[int], bool]:
-        """Return what tells, of one of so many components, whether its cycles are enough; its
-        time begins now."""
+        """Return a function that tells whether a number of cycles is enough for a component.
+
+        `components`: the number of components that share the time. The time of this one begins now.
+        """
         if self.cycles:
             return lambda done: done >= self.cycles
         until = time.process_time() + self.seconds / components
@@ -53,12 +55,12 @@ class Amount:
 def compare_all(
     classes: Sequence[type[Component]], compiled: Sequence[Compiled], amount: Amount, seed: int = 1
 ) -> list[Comparison]:
-    """Compare each class with its machine code; raise Mistake where that cannot begin."""
+    """Compare each class with its machine code; raise Mistake if the comparison cannot start."""
     size = _HEADER + max(each.description.record.itemsize for each in compiled)
     with mmap.mmap(-1, size) as shared:
         readable, writable = os.pipe()
         with warnings.catch_warnings():
-            # Of NumPy's threads, which mind a fork.
+            # Python warns of a fork while NumPy has threads.
             warnings.simplefilter("ignore", DeprecationWarning)
             child = os.fork()
         if child == 0:
@@ -81,7 +83,7 @@ def compare_all(
 
 
 class _Notes:
-    """Of the next hook, in shared memory."""
+    """Notes about the next hook, in shared memory."""
 
     def __init__(self, shared: mmap.mmap) -> None:
         self._shared = shared
@@ -92,18 +94,18 @@ class _Notes:
         return np.ndarray((), dtype, self._shared, _HEADER)
 
     def begin(self, component: int) -> None:
-        """Note which component is compared from now on."""
+        """Note the component that is compared next."""
         self._numbers[_COMPONENT] = component
 
     @contextmanager
     def python(self) -> Iterator[None]:
-        """Bound a hook in the interpreter: raises TimeLimitError."""
+        """Limit a hook in the interpreter; raises TimeLimitError."""
         with limited(HOOK_S):
             yield
 
     @contextmanager
     def machine_code(self, hook: int, cycle: int) -> Iterator[None]:
-        """Bound a compiled hook: this process ends."""
+        """Limit a compiled hook; a timer kills this process."""
         self._numbers[_HOOK], self._numbers[_CYCLE] = hook, cycle
         self._numbers[_COMPILED] = True
         signal.setitimer(signal.ITIMER_PROF, HOOK_S)
@@ -120,7 +122,7 @@ def _work(
     notes: _Notes,
     results: BinaryIO,
 ) -> None:
-    """Be the child."""
+    """Run the comparisons in the child process."""
     status = 1
     try:
         signal.signal(signal.SIGPROF, signal.SIG_DFL)
@@ -150,12 +152,12 @@ def _next(results: BinaryIO) -> Comparison | Mistake | None:
 
 
 def _end(compiled: Compiled, status: int, shared: mmap.mmap) -> Comparison:
-    """Return the result of a comparison that has ended before its time."""
+    """Return the result of a comparison whose process ended early."""
     numbers: Any = np.ndarray(4, np.int64, shared)
     hook, cycle, in_machine_code = (int(numbers[each]) for each in (_HOOK, _CYCLE, _COMPILED))
     record: Any = np.ndarray((), compiled.description.record, shared, _HEADER)
     line = int(record["_line"]) if in_machine_code else 0
-    del numbers, record  # memory that is mapped is not closed
+    del numbers, record  # the mapping cannot be closed while they refer to it
     result = Comparison(compiled.description.name)
     result.cycles = cycle
     name = compiled.hooks[hook]

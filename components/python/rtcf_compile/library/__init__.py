@@ -1,1 +1,1 @@
-"""From object files to a library of components: tables, adapters of messages, and the runtime."""
+"""Links object files to a component library: tables, message adapters and the runtime."""

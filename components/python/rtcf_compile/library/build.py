@@ -1,5 +1,5 @@
-"""From compiled components to a library: their objects, their tables, adapters of the messages that
-they have, and the runtime, which is compiled already.
+"""Links compiled components to a library: their objects, their tables, the adapters of their
+messages, and the precompiled runtime.
 """
 
 import os
@@ -18,7 +18,7 @@ _FLAGS = (
 
 
 def library(compiled: Sequence[Compiled], output: Path) -> None:
-    """Write the library of these components; raise Mistake if that fails."""
+    """Write a library of these components; raise Mistake on failure."""
     runtime = toolchain.runtime()
     with tempfile.TemporaryDirectory(prefix="rtcf-compile-") as name:
         folder = Path(name)
@@ -33,7 +33,7 @@ def library(compiled: Sequence[Compiled], output: Path) -> None:
         used = [member.message for member in members if member.message]
         objects += messages.objects(used, folder)
         output.parent.mkdir(parents=True, exist_ok=True)
-        # In one step, as the file may be that of a component which is loaded just now.
+        # Replace the file atomically: an executor may be loading it.
         part = output.with_name(f".{output.name}.{os.getpid()}")
         command = [*toolchain.compiler(), *_FLAGS, *map(str, objects), str(runtime)]
         command += ["-o", str(part), *toolchain.libraries(), "-lm"]

@@ -1,6 +1,6 @@
-"""Constants and small functions as LLVM's assembly, in the form that this Debian's LLVM reads.
+"""Constants and small functions as LLVM assembly, in the syntax of this Debian release's LLVM.
 
-Every number has 64 bits and every pointer is an i8*, as C++ has them in tables.hpp.
+Every number has 64 bits and every pointer is an i8*, as in tables.hpp.
 """
 
 import struct
@@ -14,13 +14,13 @@ _POINTER = "i8*"
 
 @dataclass(frozen=True)
 class Value:
-    """A constant, with its type."""
+    """A constant and its type."""
 
     type: str
     text: str
 
     def __str__(self) -> str:
-        """Return it as an element of a constant."""
+        """Return the type and the value, as in an aggregate constant."""
         return f"{self.type} {self.text}"
 
 
@@ -29,16 +29,16 @@ Field = Value | int | float | str | None
 
 
 class Data:
-    """The assembly of a module that has constants."""
+    """Collects the assembly of a module of constants."""
 
     def __init__(self) -> None:
-        """Begin with none."""
+        """Begin with an empty module."""
         self._lines: list[str] = []
         self._known: dict[tuple[str, str], Value] = {}
 
     def text(self, text: str) -> Value:
-        """Return the address of a text, which ends by a zero."""
-        # A text of Python may have halves of characters, which are no UTF-8.
+        """Return the address of a text, terminated by a zero byte."""
+        # A Python string may contain surrogates, which UTF-8 cannot encode.
         return self.bytes(text.encode(errors="backslashreplace") + b"\0")
 
     def bytes(self, content: bytes, alignment: int = 1) -> Value:
@@ -47,7 +47,7 @@ class Data:
         return self._constant(f"[{len(content)} x i8]", f'c"{escaped}"', alignment)
 
     def struct(self, *fields: Field) -> Value:
-        """Return a struct of these fields: numbers, texts, and what this class has returned."""
+        """Return a struct of these fields: numbers, texts, or values of this class."""
         values = [self.value(each) for each in fields]
         types = ", ".join(each.type for each in values)
         return Value(f"{{ {types} }}", f"{{ {', '.join(map(str, values))} }}")
@@ -57,19 +57,19 @@ class Data:
         return self._constant(value.type, value.text, 8)
 
     def array(self, values: Sequence[Value]) -> Value:
-        """Return the address of values, one behind the other; null of none."""
+        """Return the address of an array of values; null if there are none."""
         if not values:
             return NULL
         items = Value(f"[{len(values)} x {values[0].type}]", f"[ {', '.join(map(str, values))} ]")
         return self.address(items)
 
     def name(self, name: str, value: Value, linkage: str = "internal") -> Value:
-        """Return the address of a constant that has a name."""
+        """Define a named constant; return its address."""
         self.add(f"@{name} = {linkage} constant {value}, align 8")
         return pointer_to(name, value.type)
 
     def add(self, lines: str) -> None:
-        """Add assembly, whose pointers have types."""
+        """Add assembly with typed pointers."""
         self._lines.append(lines)
 
     def value(self, field: Field) -> Value:
@@ -85,7 +85,7 @@ class Data:
         return Value("i64", str(int(field)))
 
     def assembly(self) -> str:
-        """Return all of it."""
+        """Return the assembly of the module."""
         return backend.pointers("\n".join(self._lines) + "\n")
 
     def _constant(self, kind: str, text: str, alignment: int) -> Value:
@@ -98,7 +98,7 @@ class Data:
 
 
 def pointer_to(name: str, kind: str) -> Value:
-    """Return the address of a constant or a function of that type."""
+    """Return the address of a constant or function of this type."""
     if not backend.POINTERS_HAVE_TYPES or kind == "i8":
         return Value(_POINTER, f"@{name}")
     return Value(_POINTER, f"bitcast ({kind}* @{name} to {_POINTER})")

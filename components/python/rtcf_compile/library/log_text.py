@@ -1,5 +1,5 @@
-"""The texts of log calls: they have to mean the same to Python, for tests, and to libfmt, which
-makes them when the component runs.
+"""Checks the format strings of log calls: Python, in tests, and libfmt, in the loop, must give them
+the same meaning.
 """
 
 import re
@@ -16,15 +16,15 @@ _FLOAT, _WHOLE = "eEfFgG", "bcdoxX"
 
 
 def check(logs: Logs) -> None:
-    """Look at all log calls of a component; raise Mistake."""
+    """Check all log calls of a component; raise Mistake on error."""
     for call in logs.calls:
         checked(call)
 
 
 def checked(call: LogCall) -> tuple[str, list[str]]:
-    """Return the text, and the types as which its arguments are stored; raise Mistake.
+    """Return the text and the types in which its arguments are stored; raise Mistake on error.
 
-    An int that the text shows as a float, by `{:.3f}`, is stored as one.
+    An int that the text formats as a float, with `{:.3f}`, is stored as a float.
     """
     types = list(call.types)
     shown: list[set[bool]] = [set() for _ in types]
@@ -32,24 +32,26 @@ def checked(call: LogCall) -> tuple[str, list[str]]:
     try:
         fields = list(string.Formatter().parse(call.text))
     except ValueError as error:
-        raise _mistake(call, str(error), "{} stands for an argument, {{ for a {") from None
+        raise _mistake(call, str(error), "write {} for an argument, {{ for a {") from None
     numbered = {bool(field) for _, field, _, _ in fields if field is not None}
     if len(numbered) > 1:
-        raise _mistake(call, "has {} and {0} in one text", "number all or none")
+        raise _mistake(call, "has {} and {0} in one text", "use one form")
     for _, field, form, conversion in fields:
         if field is None:
             continue
         if conversion:
-            raise _mistake(call, f"!{conversion} is not shown", "write {}")
+            raise _mistake(call, f"!{conversion} is not supported", "write {}")
         if field and not field.isdigit():
-            raise _mistake(call, f"{{{field}}} has a name", "write {}, and the arguments in order")
+            raise _mistake(call, f"{{{field}}} is named", "write {}, and the arguments in order")
         number = int(field) if field else following
         following += 1
         if number >= len(types):
-            raise _mistake(call, "has more places than arguments", "give an argument for each {}")
+            raise _mistake(
+                call, "has more placeholders than arguments", "give an argument for each {}"
+            )
         shown[number].add(_is_float(call, form or "", types[number]))
     if not all(shown):
-        raise _mistake(call, "has fewer places than arguments", "write a {} for each")
+        raise _mistake(call, "has fewer placeholders than arguments", "write a {} for each")
     for number, ways in enumerate(shown):
         if len(ways) > 1 and types[number] != "float64":
             raise _mistake(
@@ -61,14 +63,14 @@ def checked(call: LogCall) -> tuple[str, list[str]]:
 
 
 def _is_float(call: LogCall, form: str, kind: str) -> bool:
-    """Tell whether a place shows a float; raise Mistake if it cannot show its argument."""
+    """Tell whether a placeholder formats a float; raise Mistake if its argument is no match."""
     found = _BOTH.fullmatch(form)
     if found is None:
         way_out = "write width, precision and type: {:8.3f}"
-        raise _mistake(call, f"{{:{form}}} is not shown", way_out)
+        raise _mistake(call, f"{{:{form}}} is not supported", way_out)
     if found["type"] and found["type"] not in (_FLOAT if kind == "float64" else _FLOAT + _WHOLE):
         way_out = "write {:d} for an int, {:.3f} for a float"
-        raise _mistake(call, f"{{:{form}}} does not show a {kind}", way_out)
+        raise _mistake(call, f"{{:{form}}} cannot show a {kind}", way_out)
     if found["type"]:
         return found["type"] in _FLOAT
     return kind == "float64" or bool(found["precision"])

@@ -1,6 +1,6 @@
 /// @file
-/// The adapter of a ROS message: its type's functions and the places of its fields, compiled once
-/// for each message by rtcf-compile.
+/// The adapter of a ROS message: the functions of its type and the offsets of its fields.
+/// rtcf-compile compiles one for each message.
 #pragma once
 
 #include <boost/array.hpp>
@@ -23,7 +23,7 @@ struct NumberOf;
     struct NumberOf<Scalar::SCALAR> {     \
         using Type = TYPE;                \
     }
-RTCF_PYTHON_NUMBER_(Bool, std::uint8_t);  // as messages have it
+RTCF_PYTHON_NUMBER_(Bool, std::uint8_t);  // the type in C++ messages
 RTCF_PYTHON_NUMBER_(Int8, std::int8_t);
 RTCF_PYTHON_NUMBER_(Int16, std::int16_t);
 RTCF_PYTHON_NUMBER_(Int32, std::int32_t);
@@ -44,7 +44,7 @@ struct IsSequence<std::vector<T, Allocator>> : std::true_type {
                   "a sequence with an allocator of its own");
 };
 
-/// A field of type T whose numbers are what Python calls `scalar`.
+/// A field of type T whose elements Python knows as `scalar`.
 template <typename T, Scalar scalar>
 constexpr MessageField field(std::size_t offset) {
     using Number = typename NumberOf<scalar>::Type;
@@ -73,10 +73,10 @@ constexpr MessageField field(std::size_t offset) {
 
 }  // namespace rtcf::python
 
-// A message is no standard layout where it has strings; its fields have their places all the same.
+// A message with strings has no standard layout, but g++ supports offsetof for it.
 #pragma GCC diagnostic ignored "-Winvalid-offsetof"
 
-/// The field of `Message` at PATH, as `header.stamp`.
+/// The field of `Message` at PATH, such as `header.stamp`.
 #define RTCF_PYTHON_FIELD(PATH, SCALAR)                            \
     ::rtcf::python::field<decltype(std::declval<Message&>().PATH), \
                           ::rtcf::python::Scalar::SCALAR>(offsetof(Message, PATH))

@@ -1,5 +1,5 @@
-"""Adapters of ROS messages: for each type an object file that g++ makes once, whatever a component
-declares. It is kept in the user's cache, beside the compiled components.
+"""Adapters of ROS messages. g++ compiles one object file per message type, which does not depend on
+the component. The user's cache keeps it beside the compiled components.
 """
 
 import hashlib
@@ -35,15 +35,15 @@ class _Adapter:
 
 
 def symbol(message: MessageType) -> str:
-    """Return the name of a message's table."""
+    """Return the symbol of the table of a message."""
     return f"rtcf_message_{message.name.replace('/', '__')}"
 
 
 def objects(messages: Iterable[MessageType], folder: Path) -> list[Path]:
-    """Return the adapters' object files, and compile those that are not kept.
+    """Return the object files of the adapters; compile those that are not in the cache.
 
-    `folder` is for what cannot be kept. Raise Mistake if a message has no C++ header, or another
-    one than its Python class.
+    `folder`: used in place of a cache that is not writable. Raise Mistake if a message has no C++
+    header, or if the header and the Python class differ.
     """
     by_name = {each.name: each for each in messages}
     kept, missing = _folder(folder), []
@@ -62,7 +62,7 @@ def objects(messages: Iterable[MessageType], folder: Path) -> list[Path]:
 
 
 def _folder(other: Path) -> Path:
-    """Return the folder that keeps adapters."""
+    """Return the cache of adapters, or another folder if it is not writable."""
     kept = compiled_folder() / ".messages"
     try:
         kept.mkdir(parents=True, exist_ok=True)
@@ -72,7 +72,7 @@ def _folder(other: Path) -> Path:
 
 
 def _is_ours(file: Path) -> bool:
-    """Tell whether it is there, and nobody else can have written it."""
+    """Tell whether a file exists and only this user can write it."""
     try:
         found = file.stat()
     except OSError:
@@ -81,7 +81,7 @@ def _is_ours(file: Path) -> bool:
 
 
 def _key(message: MessageType) -> str:
-    """Return what an adapter depends on, as a hash."""
+    """Return a hash of everything that an adapter depends on."""
     header = toolchain.header(f"{message.name}.h")
     found = f"{header} {header.stat().st_mtime_ns}" if header else ""
     parts = (_source(message), found, *_command(), toolchain.identity())
@@ -91,13 +91,13 @@ def _key(message: MessageType) -> str:
 def _command() -> list[str]:
     here = Path(__file__).resolve().parent
     compiler = toolchain.compiler()
-    # clang makes no unique symbols, and does not know the option.
+    # clang emits no unique symbols and rejects the option.
     more = [] if any("clang" in each for each in compiler) else ["-fno-gnu-unique"]
     return [*compiler, *_FLAGS, *more, f"-I{here}", *toolchain.flags(), "-c"]
 
 
 def _compile(message: MessageType, file: Path, folder: Path) -> _Adapter:
-    """Begin to compile an adapter; it takes its place in one step, when it is whole."""
+    """Start to compile an adapter. _finish renames it into place atomically."""
     source = folder / f"{file.stem}.cpp"
     source.write_text(_source(message), encoding="utf-8")
     part = file.with_name(f".{file.name}.{os.getpid()}")
@@ -122,13 +122,13 @@ def _mistake(message: MessageType, said: str) -> Mistake:
     if f"{message.name}.h: No such file" in said:
         return Mistake(message.name, 0, "has no C++ header", install)
     if "rtcf-compile: another definition" in said:
-        what = "the C++ header has another definition than the Python class"
-        return Mistake(message.name, 0, what, "build both of one message, and source its workspace")
+        what = "the C++ header and the Python class have different definitions"
+        return Mistake(message.name, 0, what, "build both from one message, source its workspace")
     return toolchain.mistake(message.name, said)
 
 
 def _source(message: MessageType) -> str:
-    """Return the adapter's source."""
+    """Return the C++ source of an adapter."""
     fields = [
         f"    RTCF_PYTHON_FIELD({'.'.join(each.path)}, {_scalar(each.type.scalar.name)}),"
         for each in message.leaves

@@ -1,11 +1,11 @@
 /// @file
-/// The tables from which librtcf_python.a makes components: constants that rtcf-compile writes
-/// beside the machine code of the hooks (tables.py, in the same order), and constants that an
-/// adapter of a ROS message has (messages.py). All numbers have 64 bits, so that nothing lies
-/// between the members.
+/// The tables from which librtcf_python.a makes components. rtcf-compile writes them as constants
+/// beside the machine code of the hooks (tables.py, same order of members); the adapters of ROS
+/// messages contain the others (messages.py). All numbers have 64 bits, so that there is no padding
+/// between members.
 ///
-/// A change of a table raises RTCF_PYTHON_TABLES, and TABLES in tables.py: a library then does not
-/// link with the runtime of another release.
+/// Increment RTCF_PYTHON_TABLES, and TABLES in tables.py, when a table changes: a library then does
+/// not link with the runtime of another release.
 #pragma once
 
 #include <rtcf/component.hpp>
@@ -16,7 +16,7 @@
 
 namespace rtcf::python {
 
-/// The type of an element; tables.py has the same numbers.
+/// The type of an element; tables.py uses the same numbers.
 enum class Scalar : std::int64_t {
     Bool,
     Int8,
@@ -31,9 +31,10 @@ enum class Scalar : std::int64_t {
     Double
 };
 
-/// The type of a port's value, or of a state. For arrays the functions are those of TypeInfo and
-/// StateDeclaration, which get no context: small functions of the library itself, which call the
-/// runtime's with their table. Null for a single number, whose functions the runtime has.
+/// The type of a port's value or of a state. For an array, the function members are those of
+/// TypeInfo and StateDeclaration. These take no context, so each library defines small functions
+/// that call the runtime with their table. For a single number they are null: the runtime provides
+/// its functions.
 struct TypeTable {
     Scalar scalar;
     std::int64_t rows;     ///< 0: a single number
@@ -51,12 +52,12 @@ struct TypeTable {
     decltype(StateDeclaration::print) print_state = nullptr;
 };
 
-/// How a message has a field.
+/// The representation of a field in a C++ message.
 enum class Form : std::int64_t {
     Number,
     Array,     ///< of fixed size
     Sequence,  ///< a std::vector
-    Time,      ///< two numbers of 32 bits, s and ns; Scalar tells whether the first has a sign
+    Time,      ///< two numbers of 32 bits, s and ns; Scalar gives the sign of the first
     Text,
     TextArray,
     TextSequence
@@ -70,7 +71,7 @@ struct MessageField {
     std::int64_t count;   ///< elements of an Array or a TextArray
 };
 
-/// What the adapter of a message type has: the type's own functions, and where its fields lie.
+/// The adapter of a message type: the functions of the type and its fields.
 struct MessageTable {
     const TypeInfo& (*type)();
     const MessageField* fields;
@@ -80,18 +81,18 @@ struct MessageTable {
 struct LeafTable {
     std::int64_t field;    ///< index in MessageTable::fields
     std::int64_t offset;   ///< in the record
-    std::int64_t count;    ///< where the record has the number of elements; -1: nowhere
-    std::int64_t largest;  ///< elements that the record has room for
+    std::int64_t count;    ///< offset of the number of elements in the record; -1: none
+    std::int64_t largest;  ///< capacity of the record, elements
 };
 
-/// A constant text of a message that an output writes; several are a list.
+/// A constant text of a message that an output writes, or a list of texts.
 struct TextTable {
     std::int64_t field;
     const char* const* texts;
     std::int64_t count;
 };
 
-/// An input that keeps each message; offsets are places in the record.
+/// An input that queues messages; the other members are offsets in the record.
 struct QueueTable {
     std::int64_t size;  ///< messages
     std::int64_t times;
@@ -100,12 +101,12 @@ struct QueueTable {
     std::int64_t dropped;
 };
 
-/// An input; offsets are places in the record, -1 where no hook looks at it.
+/// An input; offsets in the record are -1 if no hook reads the field.
 struct InputTable {
     const char* name;
     const TypeTable* type;        ///< null: a message
-    const MessageTable* message;  ///< null: no message
-    const QueueTable* queue;      ///< null: the newest value alone
+    const MessageTable* message;  ///< null: not a message
+    const QueueTable* queue;      ///< null: only the newest value
     std::int64_t value;
     std::int64_t flags;  ///< bools: new, valid
     std::int64_t age;
@@ -120,9 +121,9 @@ struct OutputTable {
     const char* name;
     const char* unit;
     const TypeTable* type;        ///< null: a message
-    const MessageTable* message;  ///< null: no message
+    const MessageTable* message;  ///< null: not a message
     std::int64_t finite;          ///< 1: declared Finite
-    std::int64_t written;         ///< in the record, a bool
+    std::int64_t written;         ///< offset of a bool in the record
     const LeafTable* leaves;
     std::int64_t leaf_count;
     const TextTable* texts;
@@ -135,7 +136,7 @@ struct ChoiceTable {
     std::int64_t value;
 };
 
-/// A parameter, or an element of one that is an array.
+/// A parameter, or an element of an array parameter.
 struct ParameterTable {
     const char* name;
     const char* unit;
@@ -146,8 +147,8 @@ struct ParameterTable {
     std::int64_t has_maximum;
     double minimum;
     double maximum;
-    const ChoiceTable* choices;  ///< of an enum, which is an Int64
-    std::int64_t choice_count;   ///< 0: no enum
+    const ChoiceTable* choices;  ///< enumerators of an enum, an Int64
+    std::int64_t choice_count;   ///< 0: not an enum
 };
 
 struct DerivedTable {
@@ -163,15 +164,16 @@ struct StateTable {
     std::int64_t offset;  ///< in the record
 };
 
-/// What the bytes of a raise mean. Line 0: in a function called from the line that the hook noted.
+/// The meaning of the bytes of an exception. Line 0: raised in a function that the hook called from
+/// the line that it noted last.
 struct RaiseTable {
     std::uint64_t hash;  ///< FNV-1a of 64 bits
     std::int64_t line;
     const char* text;
-    std::int64_t has_values;  ///< 1: a text with two {}, for RaisedValues
+    std::int64_t has_values;  ///< 1: the text has two {} for RaisedValues
 };
 
-/// A line of the Python source that may be the one that a hook noted.
+/// A line of the Python source that a hook may note.
 struct LineTable {
     std::int64_t line;
     const char* text;
@@ -184,13 +186,13 @@ struct LogTable {
     const Scalar* types;
 };
 
-/// A hook's machine code. @return null, or what it raised
+/// The machine code of a hook. @return null, or the exception
 using HookFunction = const void* (*)(void* record);
-/// The same of a hook that has ports. `ports`: the inputs of values, and the outputs behind them,
-/// in order of their declaration; it reads those and writes these.
+/// The machine code of a hook with ports. `ports`: the inputs of values, then the outputs, both in
+/// order of declaration. The hook reads the inputs and writes the outputs.
 using PortHookFunction = const void* (*)(void* record, void* const* ports);
 
-/// Members of the record that every component has, at its beginning.
+/// The first members of the record of every component.
 struct RecordHead {
     Component* component;
     std::int64_t time;
@@ -199,16 +201,16 @@ struct RecordHead {
     std::int64_t iteration;
     double dt;
     double frequency;
-    std::int64_t line;  ///< that a hook noted last
+    std::int64_t line;  ///< the line that a hook noted last
 };
 
-/// The last member of the record: the numbers that an exception names, as index and size.
+/// The last member of the record: the numbers in the text of an exception, such as index and size.
 struct RaisedValues {
     std::int64_t first;
     std::int64_t second;
 };
 
-/// Which of the record's times hooks look at; bits of ComponentTable::times.
+/// The times that hooks read; bits of ComponentTable::times.
 enum TimeBit : std::uint64_t {
     kTime = 1,
     kStamp = 2,
@@ -224,10 +226,10 @@ struct ComponentTable {
     const char* doc;
     const char* file;  ///< for messages
     Component* (*create)(const char* name, ComponentContext* context);
-    const void* record;  ///< a new one
+    const void* record;  ///< initial content
     std::int64_t record_size;
     HookFunction prepare;  ///< null: the class has none
-    HookFunction start;    ///< likewise
+    HookFunction start;    ///< null: the class has none
     PortHookFunction update;
     PortHookFunction safe;  ///< null: the class has none
     std::uint64_t times;
@@ -253,7 +255,7 @@ struct LibraryTable {
     std::int64_t count;
 };
 
-/// What the name ends in by which the runtime finds a library's tables.
+/// The suffix of the symbol that points to the tables of a library.
 #define RTCF_PYTHON_TABLES 2
 
 }  // namespace rtcf::python

@@ -1,5 +1,5 @@
-"""The tables of a library, from which the runtime makes its components: see tables.hpp, which has
-the same members in the same order.
+"""The tables of a library, from which the runtime makes components. tables.hpp has the same members
+in the same order.
 """
 
 import enum
@@ -36,8 +36,9 @@ _LEVELS = {"debug": 1, "info": 2, "warn": 3, "error": 4, "fatal": 5}
 _LLVM = {"bool": "i8", "int64": "i64", "float64": "double"}
 _NOWHERE = -1
 
-# What the functions of an array's type give and take. An object of C++ is made where a hidden first
-# argument points to: a shared_ptr has two words; a string, and a vector that may be missing, four.
+# The result and parameter types of the functions of an array type. Functions that return a C++
+# object store it at the address in a hidden first argument. A shared_ptr has two words; a string
+# and an optional vector have four.
 _POINTER, _OBJECT, _TEXT = "i8*", "[2 x i64]", "[4 x i64]"
 _FUNCTIONS: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("make_slot", _OBJECT, (_POINTER,)),
@@ -57,7 +58,7 @@ _CREATE = "i8* (i8*, i8*)"
 
 
 def assembly(compiled: Sequence[Compiled]) -> str:
-    """Return the tables of these components as LLVM's assembly."""
+    """Return the tables of these components as LLVM assembly."""
     library = _Library()
     tables = [library.component(each) for each in compiled]
     pointers = library.data.array(tables)
@@ -81,9 +82,9 @@ class _Library:
             self.data.add(f"declare hidden {_result(result)} @rtcf_python_{name}({arguments})")
 
     def component(self, compiled: Compiled) -> Value:
-        """Return the address of the table of a component."""
+        """Define the table of a component; return its address."""
         for number, call in enumerate(compiled.logs.calls):
-            if len(call.types) == call.count:  # else it is in no hook
+            if len(call.types) == call.count:  # else no hook contains it
                 self._log(compiled.logs.symbol(number), call)
         about, number = compiled.description, self._components
         self._components += 1
@@ -133,7 +134,7 @@ class _Library:
         place, name = _Places(compiled), member.name
         is_queue = member.kind is Queue
         own = None if is_queue else f"{name}__new"
-        warning = f"a message of {name} has more elements than declared, and is not taken"
+        warning = f"a message of {name} has more elements than declared and is ignored"
         return self.data.struct(
             name,
             None if member.message else self._type(member.type),
@@ -190,7 +191,7 @@ class _Library:
         return found
 
     def _message(self, message: MessageType | None) -> Value | None:
-        """Return the address of the adapter of a message."""
+        """Return the address of the adapter of a message, or None."""
         if message is None:
             return None
         if message.name not in self._messages:
@@ -200,11 +201,11 @@ class _Library:
         return self._messages[message.name]
 
     def _parameter(self, member: Member, record: np.ndarray) -> list[Value]:  # type: ignore[type-arg]
-        """Return the elements of an array, or the one number."""
+        """Return the table entries of the elements of a parameter."""
         options, offset = member.options, _offset(record, member.name)
         bounds = [options.get(each) for each in ("min", "max")]
         enumeration = member.type.enumeration
-        # Other names of a value follow its own.
+        # Aliases follow the canonical names.
         named: dict[str, enum.IntEnum] = {}
         if enumeration:
             named = {each.name: each for each in enumeration} | dict(enumeration.__members__)
@@ -239,7 +240,7 @@ class _Library:
         ]
 
     def _type(self, kind: ValueType) -> Value:
-        """Return the address of a type's table."""
+        """Return the address of the table of a type."""
         rows, columns = (*kind.shape, 1)[:2] if kind.shape else (0, 0)
         if kind.shape and not kind.is_float:
             rows, columns = kind.count, 1
@@ -267,7 +268,7 @@ class _Library:
         )
 
     def _log(self, symbol: str, call: LogCall) -> None:
-        """Define the function that compiled code calls to log: it stores its arguments."""
+        """Define the function that compiled code calls to log; it passes its arguments as words."""
         text, types = log_text.checked(call)
         scalars = self.data.array([self.data.value(SCALARS[each]) for each in types])
         site = self._site(call.level, text, call.file, call.line, call.function)
@@ -291,7 +292,7 @@ class _Library:
 
 
 class _Places:
-    """Where members are in the record."""
+    """Offsets of fields in the record."""
 
     def __init__(self, compiled: Compiled) -> None:
         self._record, self._used = compiled.description.record, compiled.used
@@ -302,17 +303,17 @@ class _Places:
         return int(self._record.fields[name][1])
 
     def used(self, name: str) -> int:
-        """Return the offset of a field that hooks look at, or -1."""
+        """Return the offset of a field; -1 if no hook uses it."""
         return self.of(name) if name in self._used else _NOWHERE
 
 
 def _of(compiled: Compiled, *kinds: type) -> list[Member]:
-    """Return the members of some kinds in order of their declaration."""
+    """Return the members of some kinds in order of declaration."""
     return [each for each in compiled.description.members.values() if each.kind in kinds]
 
 
 def _record(compiled: Compiled) -> "np.ndarray[tuple[()], np.dtype[np.void]]":
-    """Return a component's memory when it is new."""
+    """Return the initial record of a component."""
     about = compiled.description
     record = np.zeros((), about.record)
     head = ["_component", *(f"_{name}" for name in TIME_FIELDS), "_line"]
@@ -332,7 +333,7 @@ def _signed(number: int) -> int:
 
 
 def _hidden(result: str) -> list[str]:
-    """Return the argument that says where the result is made, if it is an object."""
+    """Return the hidden argument with the address of the result, if the result is an object."""
     return [f"{result}* sret({result})"] if result.startswith("[") else []
 
 
@@ -341,13 +342,13 @@ def _result(result: str) -> str:
 
 
 def _kind(result: str, taken: tuple[str, ...]) -> str:
-    """Return the type of a function as an address has it."""
+    """Return the LLVM type of a function."""
     given = [f"{result}*"] if result.startswith("[") else []
     return f"{_result(result).removeprefix('zeroext ')} ({', '.join([*given, *taken])})"
 
 
 def _forward(name: str, function: str, table: Value, result: str, taken: tuple[str, ...]) -> str:
-    """Return a function that calls the runtime's with the type's table before its arguments."""
+    """Return a function that calls the runtime with the table of the type and its own arguments."""
     place = [f"{each} %result" for each in _hidden(result)]
     own = [f"{each} %a{i}" for i, each in enumerate(taken)]
     called = f"call {_result(result)} @rtcf_python_{function}("
@@ -360,7 +361,7 @@ def _forward(name: str, function: str, table: Value, result: str, taken: tuple[s
 
 
 def _word(given: str, stored: str, number: int) -> list[str]:
-    """Return the conversion of an argument to 64 bits."""
+    """Return the instructions that convert an argument to 64 bits."""
     value, word = f"%a{number}", f"%word{number}"
     if given == "float64":
         return [f"  {word} = bitcast double {value} to i64"]
@@ -374,5 +375,5 @@ def _word(given: str, stored: str, number: int) -> list[str]:
 
 
 def object_file(compiled: Sequence[Compiled]) -> bytes:
-    """Return the object file that has the tables."""
+    """Return the object file of the tables."""
     return backend.emitted(assembly(compiled))

@@ -1,5 +1,5 @@
-"""g++, with the flags and the runtime of the component API: of the build tree that this runs in, or
-installed.
+"""g++ and the flags and runtime of the component API, from the current build tree or from the
+system.
 """
 
 import hashlib
@@ -16,7 +16,7 @@ _SYSTEM = ("/usr/local/include", "/usr/include")
 
 
 def compiler() -> list[str]:
-    """Return the C++ compiler's command."""
+    """Return the command of the C++ compiler."""
     command = shlex.split(os.environ.get("CXX", "g++"))
     if shutil.which(command[0]) is None:
         raise Mistake(command[0], 0, "no such compiler", "sudo apt install g++, or set CXX")
@@ -24,26 +24,26 @@ def compiler() -> list[str]:
 
 
 def flags() -> list[str]:
-    """Return the compiler's flags for headers."""
+    """Return the compiler flags for headers."""
     return shlex.split(os.environ.get("RTCF_CXXFLAGS", "-isystem /usr/include/eigen3"))
 
 
 def libraries() -> list[str]:
-    """Return the linker's flags for libraries."""
+    """Return the linker flags for libraries."""
     return shlex.split(os.environ.get("RTCF_LDFLAGS", "-lroscpp_serialization -lrostime -lfmt"))
 
 
 def runtime() -> Path:
-    """Return the archive that is in each library; raise Mistake if it is not there."""
+    """Return the archive that each library contains; raise Mistake if it does not exist."""
     folder = Path("/usr/lib") / (sysconfig.get_config_var("MULTIARCH") or "")
     file = Path(os.environ.get("RTCF_PYTHON_RUNTIME") or folder / "librtcf_python.a")
     if not file.is_file():
-        raise Mistake(str(file), 0, "is not there", "sudo apt install librtcf-dev")
+        raise Mistake(str(file), 0, "does not exist", "sudo apt install librtcf-dev")
     return file
 
 
 def header(name: str) -> Path | None:
-    """Return the header that an #include finds."""
+    """Return the header that an #include would find, or None."""
     given = [each for flag in ("CPATH", "CPLUS_INCLUDE_PATH") for each in _paths(flag)]
     words = iter(flags())
     for word in words:
@@ -56,7 +56,7 @@ def header(name: str) -> Path | None:
 
 
 def identity() -> str:
-    """Return what distinguishes this compiler and this runtime from others."""
+    """Return a text that identifies this compiler and this runtime."""
     program = Path(shutil.which(compiler()[0]) or "").resolve()
     found = program.stat()
     content = hashlib.sha256(runtime().read_bytes()).hexdigest()
@@ -64,11 +64,11 @@ def identity() -> str:
 
 
 def mistake(file: str, said: str) -> Mistake:
-    """Return what a compiler or a linker says as a mistake."""
+    """Return the output of a failed compiler or linker as a Mistake."""
     first = next((each for each in said.splitlines() if re.search("error|undefined", each)), "")
-    way_out = "this is rtcf-compile's to mend: say so with the source"
+    way_out = "this is a bug of rtcf-compile: report it with the source"
     if "rtcf_python_library_" in said:
-        way_out = "install librtcf-dev and rtcf-python of one version"
+        way_out = "install the same version of librtcf-dev and rtcf-python"
     elif "No such file" in first or "cannot find" in said:
         way_out = "sudo apt install librtcf-dev"
     return Mistake(file, 0, f"{compiler()[0]}: {(first or said.strip())[:300]}", way_out)

@@ -1,24 +1,25 @@
-"""What compiled code calls instead of numba's allocator, as LLVM's assembly (pointers with types,
-see backend.py), linked into each object, so that it is inlined.
+"""Replaces numba's allocator, as LLVM assembly (typed pointers, see backend.py), which is linked
+into each object so that it is inlined.
 
-A block begins with what numba calls a MemInfo, eight words: references, destructor, two of ours
-(WORDS), data, size, allocator.
+A block begins with a header of eight words, which numba calls a MemInfo: references, destructor,
+block size (heap: previous block), data, size, and a link in the place of the allocator.
 
-In the real-time thread blocks lie in an arena that is empty at the beginning of each hook. What is
-released is used again: at the top it goes back to the arena, elsewhere to a list of its size, of
-which there are four between a power of two and the next, so that a loop of any length makes its
-temporaries in the memory of its first turns. A block that finds no room is a MemoryError, never
-more memory. Each takes the same few instructions. Most arrays are no blocks: see stack.py.
+In the real-time thread, blocks lie in an arena, which is empty at the start of each hook. A
+released block at the top returns to the arena; others go to a free list for their size class, with
+four classes per power of two. So a loop of any length reuses the memory of its first iterations. An
+allocation that does not fit raises MemoryError; the arena never grows. Each allocation takes a
+constant number of instructions. Most arrays need no block: see stack.py.
 
-Beside the loop blocks are malloc's; those that a fault leaves are released at the end of the hook.
+Hooks outside the real-time thread use the heap. Blocks left after a fault are freed at the end of
+the hook.
 """
 
 HEADER = 64
-_SMALLEST = 128  # bytes, with the header
-_LISTS = 40  # of blocks of 128 bytes to 128 KiB
+_SMALLEST = 128  # bytes, including the header
+_LISTS = 40  # free lists, for blocks of 128 bytes to 128 KiB
 
 
-# What entries call, for as long as none of this is linked.
+# Declarations for the entries of hooks, until the allocator is linked.
 DECLARATIONS = """
 declare void @rtcf_begin_hook()
 declare void @rtcf_end_hook()
@@ -80,14 +81,14 @@ done:
 
 
 def arena(size: int) -> str:
-    """Return the functions for an arena of that many bytes, and `rtcf_arena_empty`."""
+    """Return the allocator with an arena of `size` bytes."""
     return f"""
 @rtcf_arena = internal global [{size} x i8] zeroinitializer, align 64
 @rtcf_arena_used = internal global i64 0
 @rtcf_arena_free = internal global [{_LISTS} x i64] zeroinitializer, align 64
 declare i64 @llvm.ctlz.i64(i64, i1)
 
-; Offsets in the lists are one more than they are: 0 is the end of a list.
+; Free lists store offsets plus 1; 0 is the end of a list.
 define internal i64 @rtcf_arena_class(i64 %rounded) {{
   %zeros = call i64 @llvm.ctlz.i64(i64 %rounded, i1 true)
   %power = sub i64 63, %zeros
@@ -193,7 +194,7 @@ define void @rtcf_end_hook() {{
 
 
 def heap() -> str:
-    """Return the same functions for hooks that run beside the loop."""
+    """Return the allocator for hooks outside the real-time thread, which uses the heap."""
     return f"""
 @rtcf_blocks = internal global i8* null
 declare i8* @aligned_alloc(i64, i64)

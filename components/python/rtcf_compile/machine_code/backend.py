@@ -1,7 +1,7 @@
-"""LLVM as this Debian has it, and what else of numba differs between the releases.
+"""The differences of LLVM and numba between the releases of Debian.
 
-Debian 12: numba 0.56 on LLVM 14, whose pointers have types. Debian 13: numba 0.61 on LLVM 19, whose
-have none, and whose passes are put together in another way. Nothing else here knows of that.
+Debian 12: numba 0.56 on LLVM 14 with typed pointers. Debian 13: numba 0.61 on LLVM 19 with opaque
+pointers and another pass manager. Other modules do not depend on the release.
 """
 
 import re
@@ -16,16 +16,16 @@ from numba import types
 from numba.core import cgutils, codegen, cpu
 from numba.core.compiler_lock import global_compiler_lock
 
-# Options of functions that neither Python nor C calls by numba's ways.
+# Options for functions that need no wrappers for calls from Python or C.
 NO_WRAPPERS = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 POINTERS_HAVE_TYPES = llvm.llvm_version_info[0] < 15
-_INLINED = 1000  # instructions
+_INLINED = 1000  # inlining threshold
 _POINTER = re.compile(r"(?:i\d+|float|double|\[\d+ x i\d+\])\*+")
 _RECORD_AND_EXCEPTION = (
     r"\(i8\*\*[^,]*, (?P<exception>\{[^}]*\})\*\*[^,]*, (?P<record>\[[^\]]*\]\*)"
 )
 
-# Neither numba takes an array of bools in a record, for want of this alone.
+# With this attribute, both versions of numba support arrays of bools in records.
 types.Boolean.bitwidth = 8
 if POINTERS_HAVE_TYPES:
     llvm.initialize()
@@ -35,8 +35,10 @@ llvm.initialize_native_asmprinter()
 
 @contextmanager
 def not_to_run() -> Iterator[None]:
-    """Have numba compile functions for their assembly alone: it makes no machine code of them in
-    this process, which takes longer than to optimise them. They cannot be called from Python.
+    """Make numba compile functions to assembly only.
+
+    Loading machine code into this process would take longer than optimising it. Python cannot call
+    the functions.
     """
 
     def executable(context: Any, library: Any, description: Any, environment: Any) -> Any:
@@ -56,7 +58,7 @@ def not_to_run() -> Iterator[None]:
 
 
 def assembly_of(library: Any) -> str:
-    """Return the assembly of functions that numba has compiled, with what they call."""
+    """Return the assembly of functions that numba has compiled, including their callees."""
     with not_to_run(), global_compiler_lock:
         library._ensure_finalized()
     text: str = library.get_llvm_str()
@@ -69,12 +71,12 @@ def parsed(assembly: str) -> Any:
 
 
 def pointers(assembly: str) -> str:
-    """Return assembly of ours, whose pointers have types, as this LLVM reads it."""
+    """Convert our assembly, which has typed pointers, to the syntax of this LLVM."""
     return assembly if POINTERS_HAVE_TYPES else _POINTER.sub("ptr", assembly)
 
 
 def taken(assembly: str, function: str) -> tuple[str, str]:
-    """Return as what a function of numba's takes the record and the exception's place."""
+    """Return the parameter types of the record and of the exception in a function of numba."""
     form = _RECORD_AND_EXCEPTION if POINTERS_HAVE_TYPES else r"\(ptr [^,]*, ptr [^,]*, ptr "
     found = re.search(rf"^define [^\n]*@{re.escape(function)}{form}", assembly, re.M)
     if found is None:
@@ -83,7 +85,7 @@ def taken(assembly: str, function: str) -> tuple[str, str]:
 
 
 def drop_unused(module: Any) -> None:
-    """Drop what no external function needs."""
+    """Drop code that no external function needs."""
     if POINTERS_HAVE_TYPES:
         passes = llvm.ModulePassManager()
         passes.add_global_dce_pass()
@@ -95,12 +97,12 @@ def drop_unused(module: Any) -> None:
 
 
 def inline(module: Any) -> None:
-    """Put functions into those that call them and simplify, without making vectors."""
+    """Inline functions and simplify, without vectorising."""
     _run(module, vectors=False)
 
 
 def optimise(module: Any) -> None:
-    """Make a module as fast as -O3 does, inlining more than that."""
+    """Optimise a module as -O3 does, with more inlining."""
     _run(module, vectors=True)
     drop_unused(module)
 
@@ -112,7 +114,7 @@ def _run(module: Any, vectors: bool) -> None:
         builder.opt_level = 3
         builder.loop_vectorize = builder.slp_vectorize = vectors
         builder.inlining_threshold = _INLINED
-        target = machine()  # the passes refer to it
+        target = machine()  # the passes refer to it: keep it alive
         target.add_analysis_passes(passes)
         builder.populate(passes)
         passes.run(module)
@@ -122,7 +124,7 @@ def _run(module: Any, vectors: bool) -> None:
 
 
 def emitted(assembly: str) -> bytes:
-    """Return the object file of an assembly that is only data and calls."""
+    """Return the object file of assembly with only data and calls."""
     module = parsed(assembly)
     target = machine()
     module.triple, module.data_layout = target.triple, str(target.target_data)
@@ -131,7 +133,7 @@ def emitted(assembly: str) -> bytes:
 
 
 def machine() -> Any:
-    """Return what emits code for any processor of this architecture."""
+    """Return the target machine for any processor of this architecture."""
     target = llvm.Target.from_default_triple()
     return target.create_target_machine(cpu="generic", opt=3, reloc="pic", codemodel="default")
 

@@ -1,4 +1,4 @@
-"""numba's errors in one line: place, mistake and way out, without a word of numba's."""
+"""Translates numba's errors into one line: place, error and way out, without terms of numba."""
 
 import re
 from types import FunctionType
@@ -8,7 +8,7 @@ from rtcf_compile.rewriting import helpers, numpy_functions
 from rtcf_compile.source.mistake import Mistake, source_line
 
 _MARK = re.compile(r"RTCF:([^:\n]+):([^\n]+?)(?:\x1b|\n|$)")
-# A function that has no implementation for such types.
+# numba has no implementation of a function for these types.
 _NONE_FOR = re.compile(
     r"No implementation of function Function\((?P<function>[^\n]*?)\) found for "
     r"signature:\s*>>> (?P<name>\w+)\((?P<arguments>[^\n]*)\)"
@@ -25,11 +25,11 @@ _OPERATORS = {
     **{"neg": "-", "pos": "+", "invert": "~", "not_": "not", "contains": "in"},
 }
 _BITS = ("&", "|", "^", "<<", ">>", "~")
-# Functions' names in the source, by the helpers in their place.
+# The names of functions in the source, by the helpers that replace them.
 NAMES = {
     own.__name__: f"{'np.linalg' if 'linalg' in module else 'np'}.{of.__name__}"
     for of, own in (*helpers.INSTEAD.items(), *numpy_functions.STANDS_FOR)
-    # ufuncs have no module.
+    # ufuncs have no __module__.
     if (module := getattr(of, "__module__", None) or "numpy").startswith("numpy")
 }
 _SIMPLE = {
@@ -37,7 +37,7 @@ _SIMPLE = {
     **{"bool": "a bool", "boolean": "a bool", "omitted": "nothing", "Literal[str]": "a text"},
     **{"complex128": "a complex number", "...": "..."},
 }
-# `{0}` is the first word found, `{kind0}` the type that it says.
+# `{0}` is the first group, `{kind0}` its type in words, `{kinds0}` its types in words.
 _KNOWN: tuple[tuple[str, str, str], ...] = (
     (
         r"Use of unsupported NumPy function '?(?:numpy\.)?([\w.]+)",
@@ -48,7 +48,7 @@ _KNOWN: tuple[tuple[str, str, str], ...] = (
     (
         r"Casting ([^\n]*) to (\w+) directly",
         "np.{1} of {kind0}",
-        "give it a number, or write x.astype(np.{1}) of an array",
+        "give it a number, or write x.astype(…) for an array",
     ),
     (
         r"Unknown attribute '(\w+)' of type Module\(<module 'numpy([\w.]*)'",
@@ -62,27 +62,27 @@ _KNOWN: tuple[tuple[str, str, str], ...] = (
     ),
     (
         r"Unknown attribute '(\w+)' of type ([^\n]*)",
-        "{kind1} has no {0} that is compiled",
-        "use functions of NumPy on numbers and arrays",
+        "{kind1} has no compiled attribute {0}",
+        "use NumPy functions on numbers and arrays",
     ),
     (
         r"Cannot resolve setattr: \((.*)\)\.(\w+) = ",
-        "{kind0} has no {1} to be set",
-        "leave it out, or declare a State for it",
+        "{kind0} has no attribute {1} that can be set",
+        "remove it, or declare a State",
     ),
     (
         r"Cannot unify ([^\n]*) and ([^\n]*) for '([A-Za-z]\w*)[\w.]*'",
-        "{2} is once {kind0}, once {kind1}",
-        "give it one type, as 0.0 for a float",
+        "{2} is {kind0} in one place and {kind1} in another",
+        "give it one type, such as 0.0 for a float",
     ),
     (
         r"Cannot unify ([^\n]*) and ([^\n]*) for '",
-        "is once {kind0}, once {kind1}",
-        "give it one type, as 0.0 for a float",
+        "is {kind0} in one place and {kind1} in another",
+        "give it one type, such as 0.0 for a float",
     ),
     (
         r"Can't unify return type from the following types: ([^\n]*)",
-        "returns several types: {kinds0}",
+        "returns values of several types: {kinds0}",
         "return one type",
     ),
     (
@@ -98,22 +98,22 @@ _KNOWN: tuple[tuple[str, str, str], ...] = (
     (
         r"undecided|Type of variable '([\w.]+)' cannot be determined",
         "has no type",
-        "give it a value before it is used",
+        "give it a value before its use",
     ),
-    (r"tuple index out of range", "an index is beyond the elements", "use one from 0 to size - 1"),
+    (r"tuple index out of range", "an index is out of range", "use an index from 0 to size - 1"),
     (
         r"Can only index|getitem|setitem",
-        "cannot be indexed so",
+        "cannot be indexed like this",
         "use an int or a slice as the index",
     ),
 )
 
 
 def mistake(error: Any, function: FunctionType) -> Mistake:
-    """Return numba's error about a function as a mistake in its source."""
+    """Return an error of numba about a function as a Mistake in its source."""
     text = re.sub(r"\x1b\[[0-9;]*m", "", str(error)) or type(error).__name__
     file = function.__code__.co_filename
-    # numba gives a file's path as it is, or relative to the present folder.
+    # numba gives the path of a file as it is, or relative to the working directory.
     name = re.escape(file.rpartition("/")[2])
     lines = [int(each) for each in re.findall(rf'File "(?:[^"]*/)?{name}", line (\d+)', text)]
     place = getattr(error, "loc", None)
@@ -122,7 +122,7 @@ def mistake(error: Any, function: FunctionType) -> Mistake:
 
 
 def _said(text: str, source: str) -> tuple[str, str]:
-    """Return the mistake of a line, and the way out."""
+    """Return the error in a line and the way out."""
     if found := _MARK.search(text):
         return found[1].strip(), found[2].strip()
     for pattern, what, way_out in _KNOWN[:2]:
@@ -135,7 +135,7 @@ def _said(text: str, source: str) -> tuple[str, str]:
         if found["called"] == "getiter":
             over = ", ".join(kind_of(each) for each in _arguments(found["arguments"]))
             return f"a loop over {over}", "use range(…) of an int, an array or a tuple"
-        return f"{kind} is no function", "write * to multiply, or [0] for an element"
+        return f"{kind} is not a function", "write * to multiply, or [0] for an element"
     for pattern, what, way_out in _KNOWN[2:]:
         if found := re.search(pattern, text):
             words = [each or "" for each in found.groups()]
@@ -149,16 +149,19 @@ def _said(text: str, source: str) -> tuple[str, str]:
 
 
 def _no_implementation(name: str, arguments: list[str], source: str) -> tuple[str, str]:
-    """Explain a function, or an operator, that takes no such types."""
+    """Describe a function or operator that does not accept the types of its arguments."""
     kinds = [kind_of(each.rpartition("=")[2] if "=" in each else each) for each in arguments]
     named = [each.partition("=")[0] for each in arguments if re.match(r"\w+=", each)]
-    if name == "rtcf_get" and kinds[0] == "several values":
-        what = "values of several types have no variable index"
+    if name == "rtcf_get" and kinds[0] == "a list or tuple":
+        what = "values of several types need a constant index"
         return what, "use a constant index, or values of one type"
     if name in ("getitem", "static_getitem", "rtcf_get", "setitem", "static_setitem", "rtcf_set"):
         if kinds[0] in ("a float", "an int", "a bool", "None"):
             return f"{kinds[0]} has no elements", "write it without [ ]"
-        return f"{kinds[0]} has no index {_index(arguments[1])}", "use ints, slices and arrays"
+        return (
+            f"{kinds[0]} cannot be indexed by {_index(arguments[1])}",
+            "use ints, slices and arrays",
+        )
     plain = name.removeprefix("rtcf_op_").removeprefix("rtcf_element_")
     for each in (plain, f"{plain}_"):
         if each in _OPERATORS:
@@ -171,41 +174,41 @@ def _no_implementation(name: str, arguments: list[str], source: str) -> tuple[st
     if as_written := re.search(rf"[\w.]*\b{name}(?= ?\()", source):
         name = as_written[0]
     if named:
-        return f"{name} has no {named[0]} here", f"leave {named[0]} out"
+        return f"{name} takes no argument {named[0]} here", f"leave {named[0]} out"
     short = name.rpartition(".")[2]
     if short in ("zeros", "ones", "empty", "full", "eye", "identity", "arange"):
-        return f"{name} of {of}", "make its sizes ints: int(…)"
+        return f"{name} of {of}", "convert its sizes to ints: int(…)"
     way_out = "give it an array or a tuple" if short in ("len", "sum", "min", "max") else ""
-    return f"{name} of {of}", way_out or "give it numbers and arrays that fit it"
+    return f"{name} of {of}", way_out or "give it numbers or arrays of a suitable type"
 
 
 def _operator(operator: str, kinds: list[str]) -> tuple[str, str]:
     joined = f" {operator} ".join(kinds) if len(kinds) > 1 else f"{operator} {kinds[0]}"
     if any(each.endswith("or None") for each in kinds):
-        return joined, "test it before by `is not None`"
+        return joined, "test it before with `is not None`"
     if "a text" in kinds:
-        return joined, "use numbers: text is not made in the cycle"
-    if "several values" in kinds:
+        return joined, "use numbers: the cycle cannot build text"
+    if "a list or tuple" in kinds:
         return joined, "make it an array: np.array([…])"
     if operator == "not":
         return joined, "use np.any(…) or np.all(…)"
     if operator in _BITS:
-        return joined, "use ints, bools, or arrays of them; join conditions by `and`, `or`, `not`"
+        return joined, "use ints, bools, or arrays of them; join conditions with `and`, `or`, `not`"
     return joined, "use numbers and arrays"
 
 
 def _index(text: str) -> str:
-    """Return an index in words."""
+    """Describe an index."""
     if re.match(r"(?:Uni)?Tuple\(", text):
         inner = text.partition("(")[2].rpartition(")")[0]
         if found := re.fullmatch(r"(.*) x (\d+)", inner):
-            return f"of {found[2]} places"
+            return f"{found[2]} indices"
         return ", ".join(kind_of(each) for each in _arguments(inner))
     return kind_of(text)
 
 
 def _arguments(text: str) -> list[str]:
-    """Return the types that stand between commas, of which they have some themselves."""
+    """Split a list of types at its commas, except those inside brackets."""
     found, depth = [""], 0
     for each in text:
         depth += (each in "([{<") - (each in ")]}>")
@@ -217,7 +220,7 @@ def _arguments(text: str) -> list[str]:
 
 
 def kind_of(text: str) -> str:
-    """Return numba's name of a type in words."""
+    """Describe a type by its name in numba."""
     text = text.strip().strip("'\"")
     text = re.sub(r"^(?:readonly |unaligned )+", "", text)
     if text in _SIMPLE:
@@ -237,7 +240,7 @@ def kind_of(text: str) -> str:
     if found := re.match(r"IntEnum<\w+>?\((\w+)", text):
         return f"a {found[1]}"
     if re.match(r"(?:Uni)?Tuple\(", text):
-        return "several values"
+        return "a list or tuple"
     for begin, kind in (
         ("slice", "a slice"),
         ("Function", "a function"),

@@ -1,6 +1,6 @@
-"""The gate: compiled code may refer to mathematics, to moving memory, and to log calls.
+"""Checks the references of compiled code: mathematics, memory copies and log calls are allowed.
 
-Whatever else it would need at run time is refused, with the line that it comes from.
+Other references are rejected, with the line that causes them.
 """
 
 from typing import Any
@@ -67,7 +67,7 @@ _MEANING = {
     "numba_xx": "BLAS",
     "numba_ez": "LAPACK",
     "numba_raw": "LAPACK",
-    "numba_": "functions that no loop has",
+    "numba_": "functions that the loop does not have",
     "Py": "the interpreter",
     "_Py": "the interpreter",
     "printf": "printing",
@@ -76,7 +76,7 @@ _MEANING = {
 
 
 def check(module: Any, compiled: Any, hooks: Any, realtime: bool) -> None:
-    """Raise Mistake if a module refers to what it must not."""
+    """Raise Mistake if a module refers to a function that is not allowed."""
     allowed = ALLOWED if realtime else ALLOWED | _HEAP
     for function in module.functions:
         name = function.name
@@ -90,14 +90,14 @@ def check(module: Any, compiled: Any, hooks: Any, realtime: bool) -> None:
 
 
 def _mistake(compiled: Any, hooks: Any, symbol: str) -> Mistake:
-    """Return the mistake of a hook that needs a function: at the call of NumPy that may be it."""
+    """Return the error of a hook that needs a function, at the NumPy call that may need it."""
     needed = next((each for begin, each in _MEANING.items() if symbol.startswith(begin)), symbol)
     for file, line, text, name in compiled.other_calls:
         what = f"{name} is not compiled: it needs {needed}"
         return Mistake(file, line, what, "write it as arithmetic on elements", text)
     name = f"{compiled.description.name}.{'/'.join(hooks)}"
     what = f"{name} needs {needed}"
-    return Mistake(compiled.file, compiled.line, what, "use arithmetic, NumPy on small arrays")
+    return Mistake(compiled.file, compiled.line, what, "use arithmetic and NumPy on small arrays")
 
 
 def _is_called(module: Any, name: str) -> bool:

@@ -1,8 +1,8 @@
-"""From rewritten functions to an object file, by numba and LLVM.
+"""Compiles rewritten functions to an object file, with numba and LLVM.
 
-Of what numba makes the inner functions are kept, linked with the arena, made one piece, and
-emitted for any processor of the architecture: neither the interpreter nor numba's run time is
-left.
+Of numba's output, only the inner functions are kept. They are linked with the arena, inlined, and
+emitted for any processor of the architecture. The result needs neither the interpreter nor numba's
+runtime.
 """
 
 import inspect
@@ -20,7 +20,7 @@ from rtcf.component.ros_name import class_name_error
 
 import rtcf_compile.machine_code.numpy_functions
 import rtcf_compile.machine_code.operators
-import rtcf_compile.machine_code.overloads  # noqa: F401, registers them
+import rtcf_compile.machine_code.overloads  # noqa: F401, registers the overloads
 from rtcf_compile.machine_code import (
     arena,
     backend,
@@ -65,17 +65,17 @@ class Compiled:
     used: set[str]
     lines: set[int]
     raises: dict[int, Raise] = field(default_factory=dict)
-    line: int = 0  # of update
+    line: int = 0  # the line of update
     other_calls: list[tuple[str, int, str, str]] = field(default_factory=list)
     narrow: set[CodeType] = field(default_factory=set)  # see Functions
 
     def symbol(self, hook: str) -> str:
-        """Return the name of a hook's C function."""
+        """Return the symbol of a hook."""
         return f"rtcf_{self.description.name}_{hook}"
 
 
 def compile_component(cls: type[Component], arena_bytes: int = ARENA) -> Compiled:
-    """Compile a class; raise Mistake."""
+    """Compile a class; raise Mistake on error."""
     if problem := class_name_error(cls.__name__):
         file, line = inspect.getsourcefile(cls) or "?", inspect.getsourcelines(cls)[1]
         what, _, way_out = problem.partition(": ")
@@ -84,8 +84,8 @@ def compile_component(cls: type[Component], arena_bytes: int = ARENA) -> Compile
     record = numba.from_dtype(description.record)
     narrow: set[CodeType] = set()
     before = -1
-    # Once more where functions are found that compute with narrow numbers: with what they then
-    # return others may, too.
+    # Repeat while this finds more functions that compute with narrow numbers: their results may be
+    # narrow numbers in other functions.
     while len(narrow) > before:
         before = len(narrow)
         compiler = _compiler(narrow)
@@ -121,12 +121,12 @@ def compile_component(cls: type[Component], arena_bytes: int = ARENA) -> Compile
 
 
 def _compiler(narrow: set[CodeType]) -> Compiler:
-    """Return what compiles functions and notes those that compute with narrow numbers."""
+    """Return a compiler that adds functions computing with narrow numbers to `narrow`."""
     return numba.njit(pipeline_class=numbers.compiler(narrow), **_OPTIONS)  # type: ignore[no-any-return]
 
 
 def _inner(function: FunctionType, record: Any, compiler: Compiler) -> tuple[str, str]:
-    """Return the name of the inner function and the assembly that has it."""
+    """Return the name of the inner function, and the assembly that contains it."""
     dispatcher = compiler(function)
     try:
         with backend.not_to_run(), source_lines.emitted():
@@ -136,13 +136,13 @@ def _inner(function: FunctionType, record: Any, compiler: Compiler) -> tuple[str
         raise stop.mistake from None
     except Mistake:
         raise
-    except Exception as error:  # numba's own, or what it fails by where it ought to have one
+    except Exception as error:  # numba's own errors, or any other failure in it
         raise explain.mistake(error, function) from error
     return result.fndesc.mangled_name, backend.assembly_of(result.library)
 
 
 def _linked(compiled: Compiled, inner: dict[str, tuple[str, str]], allocator: str) -> Any:
-    """Return one module with the entries of these hooks, and nothing that they do not need."""
+    """Return one module with the entries of these hooks and only the code that they need."""
     parts, base = [], arena.DECLARATIONS + port_access.DECLARATIONS
     access = port_access.PortAccess(compiled.description, compiled.used)
     for hook, (name, text) in inner.items():
@@ -154,7 +154,7 @@ def _linked(compiled: Compiled, inner: dict[str, tuple[str, str]], allocator: st
             has_ports=hook in REALTIME_HOOKS,
             writes_always=hook == "safe",
         )
-        # Ours take their place; numba's count by locked instructions.
+        # Replace numba's reference counting, which uses atomic instructions.
         text = _NRT_COUNTS.sub("", text) + backend.pointers(_COUNTS)
         part = backend.parsed(text)
         _keep(part, {name})
@@ -173,7 +173,7 @@ def _linked(compiled: Compiled, inner: dict[str, tuple[str, str]], allocator: st
     _keep(module, symbols)
     for variable in module.global_variables:
         if variable.name == raised_values.NAME:
-            variable.linkage = "internal"  # each object has its own
+            variable.linkage = "internal"  # each object has its own copy
     backend.optimise(module)
     _without_addresses(module)
     module.verify()
@@ -181,7 +181,7 @@ def _linked(compiled: Compiled, inner: dict[str, tuple[str, str]], allocator: st
 
 
 def _keep(module: Any, names: set[str]) -> None:
-    """Drop what those functions do not need."""
+    """Drop code that these functions do not need."""
     for function in module.functions:
         if not function.is_declaration:
             function.linkage = "external" if function.name in names else "internal"
@@ -192,7 +192,7 @@ def _keep(module: Any, names: set[str]) -> None:
 
 
 def _without_addresses(module: Any) -> None:
-    """Take addresses out of numba's names, so that each compilation gives the same library."""
+    """Remove addresses from numba's symbols, for reproducible libraries."""
     for each in (*module.functions, *module.global_variables):
         if not each.is_declaration and (plain := _ADDRESS.sub("0", each.name)) != each.name:
             each.name = plain

@@ -1,8 +1,8 @@
-"""Types of numbers where an operator meets two, as both releases of NumPy have them.
+"""Result types of operators on two numbers, as in both NumPy 1 and NumPy 2.
 
-NumPy 1 gives a single number with an array the array's type if it fits, whatever type it has. NumPy
-2 does so for Python's own numbers alone, there also with single numbers of NumPy. What differs
-between the two is refused.
+NumPy 1 converts a single number of any type to the type of an array if its value fits. NumPy 2 does
+so only for Python numbers, but also with single NumPy numbers. Operations whose result types differ
+between the two are rejected.
 """
 
 import operator
@@ -31,24 +31,24 @@ class Operand:
 
     @property
     def is_narrow(self) -> bool:
-        """Tell whether it has another type than numbers of Python."""
+        """Tell whether its type differs from the types of Python numbers."""
         return is_narrow(self.dtype)
 
     @property
     def is_bool(self) -> bool:
-        """Tell whether it is a bool, or an array of them."""
+        """Tell whether it is a bool or an array of bools."""
         return self.dtype.kind == "b"
 
     @property
     def words(self) -> str:
-        """Return it in words."""
+        """Describe it for messages."""
         if not self.is_array and not self.is_narrow:
             return {"b": "a bool", "i": "an int", "f": "a float"}[self.dtype.kind]
         return f"an array of {self.dtype.name}" if self.is_array else f"a single {self.dtype.name}"
 
 
 def operand(kind: Any) -> Operand | None:
-    """Return numba's type as an operand; None for other values than numbers."""
+    """Return the operand of a numba type; None if it is not a number."""
     kind = types.unliteral(kind)
     if isinstance(kind, types.Optional):
         kind = kind.type
@@ -60,9 +60,10 @@ def operand(kind: Any) -> Operand | None:
 
 @dataclass(frozen=True)
 class Meeting:
-    """What two operands are converted to, None for what stays as it is.
+    """The types to which two operands are converted; None: no conversion.
 
-    `weak`: the one that has to be a number of Python, 0 or 1, as otherwise the releases differ.
+    `weak`: the operand, 0 or 1, that must be a Python number: with a NumPy number, NumPy 1 and
+    NumPy 2 differ.
     """
 
     left: np.dtype[Any] | None = None
@@ -73,8 +74,10 @@ class Meeting:
 def together(
     operation: Callable[..., Any], left: Operand, right: Operand, is_exact: bool = False
 ) -> Meeting:
-    """Return what an operation converts its operands to; raise TypingError where that differs
-    between the releases of NumPy. `is_exact`: the wide one is a constant, which both types have.
+    """Return the types to which an operation converts its operands.
+
+    Raise TypingError if NumPy 1 and NumPy 2 differ. `is_exact`: the wider operand is a constant
+    that both types represent.
     """
     if left.is_array != right.is_array:
         return _with_array(operation, left, right)
@@ -93,13 +96,13 @@ def together(
 def _with_array(operation: Callable[..., Any], left: Operand, right: Operand) -> Meeting:
     array, number = (left, right) if left.is_array else (right, left)
     if operation in _COMPARISONS and "f" not in (array.dtype.kind, number.dtype.kind):
-        return Meeting()  # as they are
+        return Meeting()  # no conversion
     as_python, as_numpy = (
         _result(operation, each, array.dtype)
         for each in (_weak(array.dtype, number.dtype), number.dtype)
     )
     if number.is_narrow:
-        # In the older release the type of a NumPy number only counts if its kind is higher.
+        # NumPy 1 ignores the type of a single NumPy number that is not of a higher kind.
         if as_python != as_numpy and _order(number) <= _order(array):
             _differ(array, number)
         return _of_types(left, right)
@@ -113,7 +116,7 @@ def _with_array(operation: Callable[..., Any], left: Operand, right: Operand) ->
 
 
 def _of_types(left: Operand, right: Operand) -> Meeting:
-    """Return what two types of NumPy's make. For numba float32 has all ints."""
+    """Return the conversions for two NumPy types. numba would keep float32 with any int."""
     if np.promote_types(left.dtype, right.dtype) != np.float64:
         return Meeting()
     to = np.dtype(np.float64)
@@ -127,7 +130,7 @@ def _order(each: Operand) -> int:
 
 
 def _weak(of: np.dtype[Any], number: np.dtype[Any]) -> np.dtype[Any]:
-    """Return the type that a number of Python has beside another one of NumPy."""
+    """Return the type of a Python number in an operation with a NumPy type."""
     return of if _ORDER[number.kind] <= _ORDER[of.kind] else number
 
 
@@ -143,11 +146,11 @@ def _result(
 def _differ(one: Operand, other: Operand) -> None:
     plain = one if not one.is_array else other
     raise TypingError(
-        f"RTCF:{one.words} and {other.words} make other numbers in NumPy 1 than in NumPy 2:"
+        f"RTCF:{one.words} and {other.words} give different results in NumPy 1 and NumPy 2:"
         f"{plain_of(plain)}"
     )
 
 
 def plain_of(each: Operand) -> str:
-    """Return the way out for a single number."""
+    """Return the way out for a single number: convert it."""
     return f"convert the number: {_PYTHONS[each.dtype.kind]}(…)"

@@ -1,11 +1,12 @@
-"""A pass of numba's behind its inference of types: refuses what the machine's numbers do otherwise
-than Python's and NumPy's.
+"""A compiler pass after numba's type inference. It rejects operations whose results in machine code
+would differ from Python and NumPy:
 
-- Functions that compute with narrow numbers are noted, to be rewritten for these.
-- A number of NumPy where one of Python is needed, as the releases of NumPy differ for it.
-- Arithmetic of bools of NumPy, which is logic there.
-- A variable that is an int in one place and a float in another, and may be a large int: the machine
-  has it as a float, which has 53 bits.
+- a NumPy number where only a Python number gives the same result in NumPy 1 and NumPy 2;
+- arithmetic of NumPy bools, which NumPy computes as logic;
+- a variable that is an int in one place and a float in another and may be a large int: compiled, it
+  is a float, which has 53 bits.
+
+It also notes the functions that compute with narrow numbers, which the rewriter then adapts.
 """
 
 import builtins
@@ -28,17 +29,17 @@ from rtcf_compile.rewriting import helpers, numpy_functions, operators
 from rtcf_compile.rewriting.functions import WRITTEN_CODE
 from rtcf_compile.source.mistake import Mistake
 
-_LARGEST = 2**53  # up to which floats have all ints
-_TURNS = 2**31  # of a loop, at most
+_LARGEST = 2**53  # floats represent all ints up to this
+_TURNS = 2**31  # assumed limit of iterations of a loop
 _COMPARISONS = tuple(operators.COMPARISONS.values())
 _OPERATIONS = (*operators.BINARY.values(), *operators.SHIFTS.values(), *_COMPARISONS)
-# Two bools of NumPy make a bool, or raise; two of Python make an int.
+# On two NumPy bools these give a bool or raise; on two Python bools they give an int.
 _ARITHMETIC = (
     *(operator.add, operator.sub, operator.mul, operator.floordiv, operator.mod, operator.pow),
 )
 _IN_PLACE = {getattr(operator, f"i{each.__name__.strip('_')}"): each for each in _OPERATIONS
              if hasattr(operator, f"i{each.__name__.strip('_')}")}  # fmt: skip
-# Helpers that compute as an operator does, which of their arguments meet each other.
+# Helpers that act as an operator, with the operator and the pairs of arguments that it combines.
 _MEETING: dict[Callable[..., Any], tuple[Callable[..., Any], tuple[tuple[int, int], ...]]] = {
     **{own: (of, ((0, 1),)) for of, own in operators.OF.items()},
     **{own: (operators.BINARY[node], ((0, 1),)) for node, own in operators.OF_ELEMENTS.items()},
@@ -51,7 +52,7 @@ _MEETING: dict[Callable[..., Any], tuple[Callable[..., Any], tuple[tuple[int, in
     helpers.rtcf_negative_pow: (operator.pow, ((0, 1),)),
     numpy_functions.rtcf_clip: (np.clip, ((0, 1), (0, 2))),
 }  # fmt: skip
-# Functions that give numbers of Python, and those that do for numbers of Python.
+# Functions that return Python numbers, always and for arguments that are Python numbers.
 _PYTHONS = (
     *(len, bool, helpers.rtcf_to_int, helpers.rtcf_to_float, helpers.rtcf_floor, helpers.rtcf_ceil),
     *(helpers.rtcf_round, helpers.rtcf_index, helpers.rtcf_front, helpers.rtcf_age),
@@ -67,7 +68,7 @@ _AS_ARGUMENTS = (
     *operators.OF_ELEMENTS.values(),
     *helpers.IN_PLACE.values(),
 )
-# What numba has of NumPy for narrow numbers as NumPy has it: of one, and of two of one type.
+# numba's ufuncs that match NumPy for narrow numbers: with one argument, or two of the same type.
 _NARROW_UFUNCS = (
     *(np.floor, np.ceil, np.trunc, np.rint, np.sqrt, np.square, np.absolute, np.fabs, np.sign),
     *(np.negative, np.isnan, np.isfinite, np.isinf, np.signbit, np.logical_not, np.logical_and),
@@ -77,10 +78,10 @@ _FLOATS_ONLY = (np.floor, np.ceil, np.trunc, np.rint, np.sqrt, np.fabs, np.copys
 
 
 class Stop(BaseException):
-    """Ends a compilation from within numba, which takes other exceptions for its own."""
+    """Ends a compilation from within numba, which would catch an Exception."""
 
     def __init__(self, mistake: Mistake) -> None:
-        """Carry a mistake."""
+        """Wrap an error."""
         self.mistake = mistake
 
 
@@ -89,8 +90,8 @@ class _NarrowError(Exception):
 
 
 def compiler(narrow: set[CodeType]) -> Any:
-    """Return numba's compiler with the pass, which notes the code of functions that compute with
-    narrow numbers.
+    """Return numba's compiler with the pass, which adds the code of functions that compute with
+    narrow numbers to `narrow`.
     """
     return type("Compiler", (_Compiler,), {"narrow": narrow})
 
@@ -99,7 +100,7 @@ class _Compiler(CompilerBase):  # type: ignore[misc]
     narrow: set[CodeType]
 
     def define_pipelines(self) -> list[Any]:
-        """Return the passes."""
+        """Return the pipelines of passes."""
         self.state.rtcf_narrow = self.narrow
         passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
         passes.add_pass_after(_NumbersPass, NopythonTypeInference)
@@ -115,7 +116,7 @@ class _NumbersPass(AnalysisPass):  # type: ignore[misc]
         AnalysisPass.__init__(self)
 
     def run_pass(self, state: Any) -> bool:
-        """Look at a function whose types are known."""
+        """Check a function after type inference."""
         try:
             Numbers(state.func_ir, state.typemap).check()
         except _NarrowError:
@@ -124,10 +125,10 @@ class _NumbersPass(AnalysisPass):  # type: ignore[misc]
 
 
 class Numbers:
-    """The numbers of a function."""
+    """Checks the numbers in a function."""
 
     def __init__(self, function: Any, types_of: dict[str, Any]) -> None:
-        """Look at numba's intermediate representation."""
+        """Read a function in numba's intermediate representation."""
         self._file = function.loc.filename
         self._is_own = WRITTEN_CODE in vars(function.func_id.func)
         self._types = types_of
@@ -140,7 +141,7 @@ class Numbers:
                     self._assigned.setdefault(each.target.name, []).append(each.value)
 
     def check(self) -> None:
-        """Raise Stop, or that it is narrow, for the first thing that is found."""
+        """Raise Stop for the first error, or _NarrowError for the first narrow number."""
         for each in self._statements:
             self._line = each.loc.line
             self._joined(each)
@@ -150,11 +151,11 @@ class Numbers:
             Bounds(self).check()
 
     def stop(self, what: str, way_out: str, line: int = 0) -> Stop:
-        """Return a mistake at the present line."""
+        """Return an error at a line (default: the current one)."""
         return Stop(Mistake(self._file, line or self._line, what, way_out))
 
     def _joined(self, assignment: Any) -> None:
-        """Refuse a variable that is a narrow number in one place, and another one elsewhere."""
+        """Reject a variable that is a narrow number in one place and another type in another."""
         joined = self.number(assignment.target)
         for each in self._sources(assignment):
             number = self.number(each)
@@ -162,11 +163,11 @@ class Numbers:
                 continue
             if number.dtype != joined.dtype:
                 raise self.stop(
-                    f"is once {number.words}, once a number of another type", plain_of(number)
+                    f"is {number.words} in one place and another type in another", plain_of(number)
                 )
 
     def _sources(self, assignment: Any) -> list[Any]:
-        """Return the variables whose value another one gets as it is."""
+        """Return the variables whose values an assignment copies."""
         value = assignment.value
         if isinstance(value, ir.Var):
             return [value]
@@ -175,7 +176,7 @@ class Numbers:
         return [value.value] if isinstance(value, ir.Expr) and value.op == "cast" else []
 
     def _becomes_float(self, assignment: Any) -> bool:
-        """Tell whether ints are set to a float variable, or are the largest beside one."""
+        """Tell whether an int becomes a float by assignment, or in max or min."""
         value, sources = assignment.value, self._sources(assignment)
         if isinstance(value, ir.Expr) and value.op == "call":
             sources = list(value.args) if self.function(value.func) in (max, min) else []
@@ -195,7 +196,7 @@ class Numbers:
             self._call(value, self.function(value.func))
 
     def operation(self, value: Any) -> Callable[..., Any] | None:
-        """Return the operator that an expression is."""
+        """Return the operator that an expression applies, or None."""
         if value.op == "binop":
             return value.fn  # type: ignore[no-any-return]
         if value.op == "inplace_binop":
@@ -206,7 +207,7 @@ class Numbers:
         return None
 
     def operands(self, value: Any) -> list[Any]:
-        """Return the variables that an operator, or a function, has."""
+        """Return the operands of an operator or the arguments of a function."""
         if value.op == "call":
             return list(value.args)
         return [value.lhs, value.rhs]
@@ -228,7 +229,7 @@ class Numbers:
             raise _NarrowError
 
     def _bools(self, operation: Any, variables: list[Any]) -> None:
-        """Refuse arithmetic of bools, unless all are Python's."""
+        """Reject arithmetic of bools, unless all are Python bools."""
         if operation not in _ARITHMETIC or all(map(self.is_python, variables)):
             return
         raise self.stop(
@@ -252,7 +253,7 @@ class Numbers:
         if number.is_bool and value.fn in (operator.neg, operator.pos) and not self.is_python(
             value.value
         ):  # fmt: skip
-            raise self.stop("- and + of bools are not in NumPy", "convert them: int(…)")
+            raise self.stop("NumPy has no - and + of bools", "convert them: int(…)")
 
     def _call(self, value: Any, function: Any) -> None:
         function = _hashable(function)
@@ -283,8 +284,9 @@ class Numbers:
             self._extreme(value)
 
     def _is_stored(self, element: Any, value: Any) -> bool:
-        """Tell whether an element of small ints is changed by an int, which goes round as it is
-        stored; refuse a constant that it cannot be.
+        """Tell whether `x[i] += n` changes an element of small ints, which wraps around.
+
+        Reject a constant that does not fit the element.
         """
         one, other = self.number(element), self.number(value)
         if one is None or other is None or one.is_array or other.is_array:
@@ -293,7 +295,7 @@ class Numbers:
         return one.dtype.kind in "iu" and other.dtype == np.int64
 
     def _set(self, target: Any, value: Any) -> None:
-        """Refuse to set elements to a constant that they cannot be."""
+        """Reject setting elements to a constant that does not fit them."""
         number, constant = self.number(target), self.constant(value)
         if number is None or number.dtype.kind not in "iu" or type(constant) is not int:
             return
@@ -303,16 +305,16 @@ class Numbers:
             raise self.stop(what, f"use {limits.min} to {limits.max}")
 
     def _extreme(self, value: Any) -> None:
-        """Refuse the largest of numbers that have different types in Python, too."""
+        """Reject max and min of numbers whose types also differ in Python."""
         numbers = [number for each in value.args if (number := self.number(each)) is not None]
         if len({each.dtype for each in numbers}) < 2:
             return
         for each in numbers:
             if each.is_narrow:
-                raise self.stop(f"{each.words} beside numbers of other types", plain_of(each))
+                raise self.stop(f"{each.words} among numbers of other types", plain_of(each))
 
     def _ufunc(self, value: Any, function: Any) -> None:
-        """A function of NumPy that is numba's."""
+        """Check a NumPy function that numba implements."""
         numbers = [number for each in value.args if (number := self.number(each)) is not None]
         of = operators.UFUNCS.get(function)
         narrow = [each for each in numbers if each.is_narrow]
@@ -332,7 +334,7 @@ class Numbers:
             )
 
     def _met(self, operation: Any, variables: list[Any]) -> None:
-        """Refuse what differs between releases of NumPy."""
+        """Reject operations whose results differ between NumPy 1 and NumPy 2."""
         numbers = [self.number(each) for each in variables]
         one, other = numbers
         assert one is not None and other is not None
@@ -355,13 +357,13 @@ class Numbers:
         if meeting.weak is not None and not self.is_python(variables[meeting.weak]):
             array, number = (one, other) if one.is_array else (other, one)
             raise self.stop(
-                f"{array.words} with a number that may be NumPy's makes {array.dtype.name} in "
+                f"{array.words} with a number that may be NumPy's gives {array.dtype.name} in "
                 f"NumPy 1, {np.promote_types(array.dtype, number.dtype).name} in NumPy 2",
                 plain_of(number),
             )
 
     def _is_exact(self, variables: list[Any], one: Operand, other: Operand) -> bool:
-        """Tell whether the wide one of two numbers is a constant that the narrow type has."""
+        """Tell whether the wider of two numbers is a constant that the narrow type represents."""
         for variable, number, narrow in ((variables[0], one, other), (variables[1], other, one)):
             constant = self.constant(variable)
             if not number.is_narrow and narrow.dtype == np.float32 and constant is not None:
@@ -369,14 +371,14 @@ class Numbers:
                     return bool(np.float32(constant) == constant)
         return False
 
-    # What variables are.
+    # Properties of variables.
 
     def number(self, variable: Any) -> Operand | None:
-        """Return a variable as an operand."""
+        """Return the operand of a variable, or None."""
         return operand(self._types[variable.name])
 
     def type_of(self, name: str) -> Any:
-        """Return numba's type of a variable."""
+        """Return the numba type of a variable."""
         return types.unliteral(self._types[name])
 
     def assignments(self) -> Iterator[Any]:
@@ -384,7 +386,7 @@ class Numbers:
         yield from self._statements
 
     def function(self, variable: Any) -> Any:
-        """Return the function that a variable is."""
+        """Return the function that a variable refers to, or None."""
         values = self._assigned.get(variable.name, [])
         if len(values) != 1:
             return None
@@ -398,7 +400,7 @@ class Numbers:
         return None
 
     def constant(self, variable: Any) -> Any:
-        """Return the number that a variable always is; None for others."""
+        """Return the constant value of a variable, or None."""
         values = self._assigned.get(variable.name, [])
         if len(values) != 1:
             return None
@@ -413,7 +415,7 @@ class Numbers:
         return None
 
     def is_python(self, variable: Any) -> bool:
-        """Tell whether a number is surely one of Python in the interpreter, too."""
+        """Tell whether a number is surely a Python number in the interpreter."""
         return variable.name in self._pythons
 
     @functools.cached_property
@@ -467,7 +469,7 @@ class Numbers:
         return False
 
     def _item(self, value: Any) -> Any:
-        """Return the variable that an element of several values is; None if it is not known."""
+        """Return the variable that is an element of a tuple; None if unknown."""
         made = self._assigned.get(value.value.name, [])
         while len(made) == 1 and (
             isinstance(made[0], ir.Var)
@@ -495,14 +497,15 @@ def _hashable(function: Any) -> Any:
 
 
 class Bounds:
-    """How large an int a variable may be in Python where it is a float here.
+    """Bounds the ints in Python of variables that are floats when compiled.
 
-    A bound is None for what is never an int. Loops are followed some turns; what grows by the same
-    in each is bounded by the turns that a cycle may have, what grows by more is not.
+    A bound is None for a variable that is never an int. The analysis follows some iterations of
+    each loop. A bound that grows by a constant per iteration is multiplied by the limit of
+    iterations; one that grows faster is infinite.
     """
 
     def __init__(self, numbers: Numbers) -> None:
-        """Bound the numbers of a function."""
+        """Compute the bounds of the variables of a function."""
         self._numbers = numbers
         self._bounds: dict[str, float | None] = {}
         history: list[dict[str, float | None]] = []
@@ -528,13 +531,13 @@ class Bounds:
         name = self._joined_name(assignment)
         subject = f"{name} is" if name.isidentifier() and not name.startswith("rtcf_") else "is"
         raise self._numbers.stop(
-            f"{subject} once an int, once a float, which has 53 bits",
+            f"{subject} an int in one place and a float, which has 53 bits, in another",
             "convert the int: float(…)",
             self._line(assignment),
         )
 
     def _joined_name(self, assignment: Any) -> str:
-        """Return the variable that is both: a new one, or one that an operator meets."""
+        """Return the variable that is an int and a float: the target, or a float operand."""
         value, names = assignment.value, [assignment.target.name]
         if isinstance(value, ir.Expr) and self._numbers.operation(value) is not None:
             names = [
@@ -545,7 +548,7 @@ class Bounds:
         return str(names[0]).partition(".")[0]
 
     def _line(self, assignment: Any) -> int:
-        """Return where an int comes to what joins several values, else the assignment's line."""
+        """Return the line that sets an int among joined values, else the line of the assignment."""
         value = assignment.value
         if isinstance(value, ir.Expr) and value.op == "phi":
             names = {each.name for each in value.incoming_values if each is not ir.UNDEFINED}
@@ -635,7 +638,7 @@ class Bounds:
 
 
 def _by_type(dtype: np.dtype[Any]) -> float | None:
-    """Return the largest int of a type; None for floats."""
+    """Return the largest absolute int of a type; None for floats."""
     if dtype.kind == "b":
         return 1.0
     return float(max(abs(np.iinfo(dtype).min), np.iinfo(dtype).max)) if dtype.kind in "iu" else None

@@ -1,5 +1,6 @@
-"""The functions of NumPy as numba compiles them: numbers, vectors and matrices. Imported only where
-something is compiled.
+"""The numba overloads of NumPy functions, for numbers, vectors and matrices.
+
+Import this only to compile: it imports numba.
 """
 
 import math
@@ -27,16 +28,16 @@ from rtcf_compile.rewriting.operators import is_narrow
 _Numbers = types.Number | types.Boolean
 _lower, _higher = operators.OF[np.minimum], operators.OF[np.maximum]
 _minus = operators.OF[operator.sub]
-_LONG = 128  # elements that NumPy sums with eight accumulators, before it halves
+_LONG = 128  # up to this size, NumPy sums with eight accumulators; it halves longer arrays
 
 
 def _dtype(kind: Any) -> Any:
-    """Return NumPy's type of a number, or of an array's elements."""
+    """Return the NumPy type of a number, or of the elements of an array."""
     return as_dtype(types.unliteral(kind.dtype if isinstance(kind, types.Array) else kind))
 
 
 def _needs(kind: Any, what: str, dimensions: tuple[int, ...] = (1, 2)) -> None:
-    """Refuse all but an array of so many dimensions."""
+    """Reject values other than an array of these dimensions."""
     if isinstance(kind, types.Array) and kind.ndim in dimensions:
         return
     names: dict[tuple[int, ...], str] = {(1,): "a vector", (2,): "a matrix"}
@@ -47,21 +48,21 @@ def _needs(kind: Any, what: str, dimensions: tuple[int, ...] = (1, 2)) -> None:
 
 
 def _leaves(kind: Any) -> tuple[tuple[int, ...], list[Any]]:
-    """Return the shape of numbers in rows, and their types."""
+    """Return the shape of nested rows of numbers, and the types of the numbers."""
     if not isinstance(kind, types.BaseTuple):
         if not isinstance(kind, _Numbers):
-            raise TypingError(f"RTCF:an array of {words(kind)}:make it of numbers")
+            raise TypingError(f"RTCF:an array of {words(kind)}:use numbers")
         return (), [kind]
     found = [_leaves(each) for each in kind.types]
     shapes = {shape for shape, _ in found}
     if len(shapes) != 1:
-        raise TypingError("RTCF:rows of different length make no array:make them fit")
+        raise TypingError("RTCF:the rows of an array have different lengths:make them equal")
     return (len(found), *shapes.pop()), [each for _, types_of in found for each in types_of]
 
 
 @intrinsic  # type: ignore[misc]
 def _store(typing: Any, array: Any, values: Any) -> Any:
-    """Set the elements of a new array from numbers in rows."""
+    """Set the elements of a new array from nested rows of numbers."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         data = arrayobj.make_array(array)(context, builder, arguments[0]).data
@@ -85,7 +86,7 @@ def _store(typing: Any, array: Any, values: Any) -> Any:
 
 
 def _wanted(given: Any, dtype: Any) -> Any:
-    """Return the type of elements that a dtype asks for, or that follows of given ones."""
+    """Return the element type: the given dtype, or the common type of the elements."""
     follows = np.result_type(*(_dtype(each) for each in given))
     if isinstance(dtype, types.NoneType):
         return follows
@@ -228,7 +229,7 @@ def _viewed(typing: Any, array: Any, shape: Any, strides: Any) -> Any:
 
 @plain
 def _sizes(wanted: Any, count: Any) -> Any:
-    """Return a shape with the size in the place of -1."""
+    """Return the size that replaces -1 in a shape; 0 if there is no -1."""
     known = 1
     open_ones = 0
     for each in wanted:
@@ -308,7 +309,7 @@ def _only_step(a: Any) -> Any:
 
 @compiled_as(_only_step)
 def _step_between(a: Any) -> Any:
-    """The distance of one element to the next, bytes, if it is the same for all; else 0."""
+    """Return the distance between elements, bytes, if it is the same for all, else 0."""
     if a.ndim == 1:
         return lambda a: a.strides[0] if a.shape[0] > 1 else a.itemsize
 
@@ -348,7 +349,7 @@ def _strides_as_before(a: Any, shape: Any) -> Any:
 
 @intrinsic  # type: ignore[misc]
 def _any_layout(typing: Any, array: Any) -> Any:
-    """Return an array as one of any layout."""
+    """Return an array with the type for any layout."""
     result = types.Array(array.dtype, array.ndim, "A", not array.mutable, aligned=array.aligned)
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -382,12 +383,14 @@ def _flatten(a: Any) -> Any:
 
 
 def _joined(name: str, parts: Any, along: Any) -> Any:
-    """Return a function that copies arrays one after the other: vectors (along None), matrices
-    below each other (0) or side by side (1). Vectors become rows and columns there.
+    """Return a function that joins arrays.
+
+    `along`: None joins vectors; 0 joins matrices below each other, 1 side by side, with vectors as
+    rows or columns.
     """
     result = np.result_type(*(_dtype(each) for each in parts))
     count = len(parts)
-    # numba takes elements of a tuple of several types by constant indices alone.
+    # numba indexes a tuple of several types only by constants.
     lines = [f"def joined({name}):"]
     for k in range(count):
         lines.append(f"    p{k} = {name}[{k}]")
@@ -438,13 +441,13 @@ def _function(text: str, name: str, scope: dict[str, Any]) -> Any:
 
 
 def _arrays_of(name: str, given: Any, what: str, helper: str, numbers: bool, rest: str = "") -> Any:
-    """Return None if a tuple has arrays alone, else a function that makes them of rows and numbers
-    and calls the helper again.
+    """Return None if a tuple has only arrays, else a function that converts its rows and numbers to
+    arrays and calls the helper again.
     """
     if isinstance(given, types.Array) and given.ndim == 2:
         raise TypingError(f"RTCF:{what} of one matrix:give it several arrays")
     if not isinstance(given, types.BaseTuple) or not given.count:
-        raise TypingError(f"RTCF:{what} of {words(given)}:give it arrays in ( )")
+        raise TypingError(f"RTCF:{what} of {words(given)}:give it a tuple of arrays")
     if all(isinstance(each, types.Array) and each.ndim in (1, 2) for each in given.types):
         return None
     parts = []
@@ -470,7 +473,7 @@ def _concatenate(arrays: Any, axis: Any) -> Any:
         return again
     dimensions = {each.ndim for each in arrays.types}
     if len(dimensions) != 1:
-        raise TypingError("RTCF:np.concatenate of vectors and matrices:make them of one dimension")
+        raise TypingError("RTCF:np.concatenate of vectors and matrices:use np.vstack or np.hstack")
     if dimensions == {1}:
         vectors = plain(_joined("arrays", arrays.types, None))
 
@@ -566,12 +569,12 @@ def _diff(a: Any) -> Any:
     return lambda a: a[:, 1:] - a[:, :-1]
 
 
-# One number of many.
+# Reductions.
 
 
 @plain
 def _pairwise(a: Any, begin: Any, n: Any, result: Any) -> Any:
-    """Return the sum of up to 128 elements of a vector, as NumPy adds them."""
+    """Return the sum of up to 128 elements of a vector, in NumPy's order."""
     if n < 8:
         for i in range(n):
             result += a[begin + i]
@@ -598,10 +601,10 @@ def _pairwise(a: Any, begin: Any, n: Any, result: Any) -> Any:
 
 @plain
 def _halves(a: Any, begin: Any, n: Any, zero: Any) -> Any:
-    """Return the sum of a longer vector: of halves of halves, from the last to the first."""
+    """Return the sum of a longer vector: halve it repeatedly and add the halves, as NumPy does."""
     if n <= _LONG:
         return _pairwise(a, begin, n, zero)
-    # Parts that wait, and sums of parts, by their depth; NumPy calls itself instead.
+    # Stacks of parts and of sums, with depths, replace the recursion of NumPy.
     sums = np.empty(64, a.dtype)
     begins, sizes, depths = np.empty(64, np.int64), np.empty(64, np.int64), np.empty(64, np.int64)
     done_at = np.empty(64, np.int64)
@@ -619,7 +622,7 @@ def _halves(a: Any, begin: Any, n: Any, zero: Any) -> Any:
             waiting += 1
             continue
         total = _pairwise(a, here, size, zero)
-        # The second half is there when the first one waits at the same depth.
+        # This is the second half if the sum of the first half has the same depth.
         while done > 0 and done_at[done - 1] == depth:
             done -= 1
             total = sums[done] + total
@@ -657,7 +660,7 @@ def _sum_of(a: Any) -> Any:
 
 @plain
 def _summed_in_order(a: Any) -> Any:
-    """Return the sum of a column among others, which NumPy adds row by row."""
+    """Return the sum of a matrix column, which NumPy adds row by row."""
     if a.shape[0] == 0:
         return _summed(a)
     result = a[0] + _summed(a[:0])
@@ -679,7 +682,7 @@ def _smallest(a: Any) -> Any:
 @plain
 def _place_of_largest(a: Any) -> Any:
     if a.shape[0] == 0:
-        raise ValueError("the largest of no elements")
+        raise ValueError("the largest element of an empty array")
     place = 0
     for i in range(a.shape[0]):
         if a[i] != a[i]:
@@ -692,7 +695,7 @@ def _place_of_largest(a: Any) -> Any:
 @plain
 def _place_of_smallest(a: Any) -> Any:
     if a.shape[0] == 0:
-        raise ValueError("the smallest of no elements")
+        raise ValueError("the smallest element of an empty array")
     place = 0
     for i in range(a.shape[0]):
         if a[i] != a[i]:
@@ -743,9 +746,10 @@ def _product_of(a: Any) -> Any:
 def _reduction(
     helper: Any, name: str, whole: Any, column: Any = None, result: Any = None, keeps: bool = False
 ) -> None:
-    """Register a function of all elements of an array, or of each row or column. `whole` is that of
-    a vector, `column` of a column of a matrix; `result` the type of its elements by those of the
-    array.
+    """Register a reduction of an array, or of each row or column.
+
+    `whole`: reduces a vector. `column`: reduces a column of a matrix (default: `whole`).
+    `result`: returns the element type of the result for that of the array.
     """
     column = column or whole
 
@@ -754,7 +758,7 @@ def _reduction(
             return lambda a, axis, keepdims: whole(own.rtcf_array((a,), None))
         _needs(a, name)
         if isinstance(axis, types.BaseTuple):
-            raise TypingError(f"RTCF:{name} along several axes:leave axis away")
+            raise TypingError(f"RTCF:{name} along several axes:leave axis out")
         dtype = _dtype(a) if result is None else result(_dtype(a))
         stays = not isinstance(keepdims, types.NoneType)
         if a.ndim == 1:
@@ -861,7 +865,7 @@ def _elements(a: Any, axis: Any) -> Any:
 
 @compiled_as(_elements)
 def _elements_along(a: Any, axis: Any) -> Any:
-    """How many elements make one number."""
+    """Return the number of elements in one mean."""
     if isinstance(axis, types.NoneType):
         return lambda a, axis: a.size
     return lambda a, axis: a.shape[axis]
@@ -883,10 +887,10 @@ def _divided(total: Any, count: Any) -> Any:
 
 @compiled_as(_divided)
 def _divided_by(total: Any, count: Any) -> Any:
-    """A sum, or sums, by a number of elements: floats of the same size."""
+    """Divide a sum, or sums, by a number of elements; floats keep their size."""
     if _dtype(total) != np.float32:
         return lambda total, count: total / count
-    # The quotient of 64 bits is rounded once more to the right one of 32.
+    # Rounding the quotient of 64 bits gives the correct quotient of 32 bits.
     if isinstance(total, types.Array):
         return lambda total, count: own.rtcf_array(total / count, np.float32)
     return lambda total, count: np.float32(total / count)
@@ -960,7 +964,7 @@ def _trace(a: Any) -> Any:
 
 
 def _running(helper: Any, name: str, step: Any) -> None:
-    """Register sums or products up to each element."""
+    """Register a cumulative sum or product."""
 
     @compiled_as(helper, arrays=("a",))
     def _run(a: Any, axis: Any) -> Any:
@@ -1011,7 +1015,7 @@ _running(own.rtcf_cumprod, "np.cumprod", _times)
 
 @plain
 def _before(x: Any, y: Any) -> Any:
-    """Tell whether one number stands before another: NaN is the last."""
+    """Tell whether one number sorts before another; NaN sorts last."""
     return x < y or (y != y and x == x)
 
 
@@ -1031,7 +1035,7 @@ def _merge(values: Any, spare: Any, begin: Any, middle: Any, end: Any) -> None:
 
 @plain
 def _sort_vector(values: Any) -> None:
-    """Sort a vector: runs of eight by insertion, then merged."""
+    """Sort a vector: insertion sort of runs of eight, then merge sort."""
     n = values.shape[0]
     for begin in range(0, n, 8):
         for i in range(begin + 1, min(begin + 8, n)):
@@ -1055,7 +1059,7 @@ def _sort_vector(values: Any) -> None:
 def _sort_in_place(a: Any, axis: Any) -> Any:
     _needs(a, "sort")
     if not a.mutable:
-        raise TypingError("RTCF:a constant of the module is sorted:copy it")
+        raise TypingError("RTCF:a constant of the module is sorted:copy it first")
     if a.ndim == 1:
         return lambda a, axis: _sort_vector(a)
 
@@ -1159,11 +1163,11 @@ def _searchsorted(a: Any, v: Any, side: Any) -> Any:
     return each
 
 
-# Elements of arrays, and numbers.
+# Element-wise functions.
 
 
 def _clip_number(a: Any, a_min: Any, a_max: Any) -> Any:
-    # Two comparisons are enough where no bound is NaN; a number that is NaN stays so.
+    # Two comparisons are enough if no bound is NaN; a NaN number stays NaN.
     if a_min <= a_max:
         raised = a_min if a_min > a else a
         return a_max if a_max < raised else raised
@@ -1189,11 +1193,11 @@ def _clip(a: Any, a_min: Any, a_max: Any) -> Any:
         return lambda a, a_min, a_max: np.maximum(a, a_min)
     if high:
         return lambda a, a_min, a_max: np.minimum(a, a_max)
-    raise TypingError("RTCF:np.clip without bounds:give it one")
+    raise TypingError("RTCF:np.clip without bounds:give it a bound")
 
 
 def _clip_narrow(a: Any, a_min: Any, a_max: Any) -> Any:
-    """Return what clips narrow numbers: in one type, as NumPy does."""
+    """Return the function that clips narrow numbers, in one type as NumPy does."""
     low, high = (not isinstance(each, types.NoneType) for each in (a_min, a_max))
     if low and high and result_type(np.clip, a, a_min) != result_type(np.clip, a, a_max):
         raise TypingError("RTCF:bounds of different types:convert one: x.astype(float)")
@@ -1225,13 +1229,13 @@ def _astype(a: Any, dtype: Any) -> Any:
     if not (_dtype(a).kind == "f" and wanted.kind in "iu"):
         return lambda a, dtype: own.rtcf_array(a, dtype)
     if wanted != np.dtype(np.int64):
-        raise TypingError(f"RTCF:floats become {wanted}:make them int64 before")
+        raise TypingError(f"RTCF:floats cannot become {wanted}:convert them to int64 first")
 
     def whole(a: Any, dtype: Any) -> Any:
         row = own.rtcf_ravel(a)
         result = np.empty(row.shape[0], np.int64)
         for i in range(row.shape[0]):
-            # As the processor has it, where there is no such int.
+            # A float beyond int64 becomes the value that the processor gives.
             if -9223372036854775808.0 <= row[i] < 9223372036854775808.0:
                 result[i] = int(row[i])
             else:
@@ -1253,7 +1257,7 @@ def _abs(x: Any) -> Any:
 
 
 def _elementwise(function: Callable[..., Any]) -> Any:
-    """Return a function of numbers as one of arrays, too."""
+    """Return a function of numbers that also takes arrays."""
     function.__annotations__ = {}
     return numba.vectorize(function)
 
@@ -1355,8 +1359,9 @@ def _nan_to_num(x: Any, nan: Any, posinf: Any, neginf: Any) -> Any:
 
 @plain
 def _interval(x: Any, xp: Any, guess: Any) -> Any:
-    """Return the interval that a number lies in, as NumPy finds it: -1 before the first point,
-    their number behind the last one.
+    """Return the interval that contains a number, found as NumPy does.
+
+    The result is -1 before the first point, and the number of points after the last one.
     """
     n = xp.shape[0]
     if x > xp[n - 1]:
@@ -1396,7 +1401,7 @@ def _interval(x: Any, xp: Any, guess: Any) -> Any:
 
 @plain
 def _between(x: Any, xp: Any, fp: Any, left: Any, right: Any, j: Any) -> Any:
-    """Return the value of a function at x, which lies in interval j."""
+    """Return the interpolated value at x in interval j."""
     n = xp.shape[0]
     if x != x:
         return x
@@ -1420,7 +1425,7 @@ def _between(x: Any, xp: Any, fp: Any, left: Any, right: Any, j: Any) -> Any:
 @plain
 def _interpolated(x: Any, xp: Any, fp: Any, left: Any, right: Any) -> Any:
     if xp.shape[0] == 0 or xp.shape[0] != fp.shape[0]:
-        raise ValueError("np.interp: xp and fp need the same number of points, one at least")
+        raise ValueError("np.interp: xp and fp need the same number of points, at least one")
     x = x * 1.0
     return _between(x, xp, fp, left, right, _interval(x, xp, 0))
 
@@ -1452,7 +1457,7 @@ def _interp(x: Any, xp: Any, fp: Any, left: Any, right: Any) -> Any:
 
     def each(x: Any, xp: Any, fp: Any, left: Any, right: Any) -> Any:
         if xp.shape[0] == 0 or xp.shape[0] != fp.shape[0]:
-            raise ValueError("np.interp: xp and fp need the same number of points, one at least")
+            raise ValueError("np.interp: xp and fp need the same number of points, at least one")
         low, high = _or_end(left, fp, 0), _or_end(right, fp, -1)
         result = np.empty(x.shape[0])
         j = 0
@@ -1563,7 +1568,7 @@ def _norm(x: Any, ord: Any, axis: Any) -> Any:
 
             return of_all
         if x.ndim == 2:
-            raise TypingError("RTCF:this norm of a matrix is not compiled:leave ord away")
+            raise TypingError("RTCF:this norm of a matrix is not compiled:leave ord out")
 
         def of_vector(x: Any, ord: Any, axis: Any) -> Any:
             if ord == 2:
@@ -1578,7 +1583,7 @@ def _norm(x: Any, ord: Any, axis: Any) -> Any:
 
         return of_vector
     if not default:
-        raise TypingError("RTCF:np.linalg.norm with ord and axis:leave ord away")
+        raise TypingError("RTCF:np.linalg.norm with ord and axis:leave ord out")
     return lambda x, ord, axis: np.sqrt(own.rtcf_sum(x * 1.0 * x, axis, None))
 
 
@@ -1666,7 +1671,7 @@ def _whole_pow(base: Any, exponent: Any) -> Any:
     return power
 
 
-# The C library's functions, by those of NumPy.
+# Functions of the C library that stand for NumPy functions.
 
 
 def _by_libm(helper: Any, name: str) -> None:

@@ -1,4 +1,4 @@
-"""Operators as functions, as numba compiles them. Imported only where something is compiled."""
+"""The numba overloads of operator functions. Import this only to compile: it imports numba."""
 
 import functools
 import operator
@@ -27,7 +27,7 @@ _COMPARISONS = tuple(own.COMPARISONS.values())
 
 
 def _operating(helper: Callable[..., Any], operation: Callable[..., Any]) -> None:
-    """Register an operator of numbers and arrays."""
+    """Register the overload of an operator on numbers and arrays."""
     shifts = operation in own.SHIFTS.values()
 
     @compiled_as(helper)
@@ -51,7 +51,7 @@ def _operating(helper: Callable[..., Any], operation: Callable[..., Any]) -> Non
 
 
 def refuse_bools(operation: Callable[..., Any], one: Operand, other: Operand) -> None:
-    """Refuse arithmetic of two arrays of bools, which NumPy takes for logic or refuses."""
+    """Reject arithmetic of arrays of bools, which NumPy computes as logic or rejects."""
     bits = (operator.and_, operator.or_, operator.xor, np.minimum, np.maximum)
     if one.is_bool and other.is_bool and (one.is_array or other.is_array) and operation not in bits:
         raise TypingError(
@@ -61,7 +61,7 @@ def refuse_bools(operation: Callable[..., Any], one: Operand, other: Operand) ->
 
 
 def _of_numbers(operation: Callable[..., Any], one: Operand, other: Operand) -> Any:
-    """Return what computes it of single numbers, by zero as Python does."""
+    """Return the operator on single numbers; division by zero raises as in Python."""
     if operation in own.SHIFTS.values():
         return _shift_of_numbers(operation, one, other)
     if operation in own.EXTREMES or operation in _COMPARISONS:
@@ -90,7 +90,7 @@ def _of_numbers(operation: Callable[..., Any], one: Operand, other: Operand) -> 
     return lambda left, right: to(divided(to(left), to(right)))
 
 
-# Shifts. Of a number all bits are gone after 64; NumPy's arrays take a negative count for many.
+# Shifts. A shift by 64 or more removes all bits; NumPy arrays treat negative counts likewise.
 
 
 @plain
@@ -104,11 +104,11 @@ def _right(value: Any, count: Any) -> Any:
 
 
 def _shift_type(one: Operand, other: Operand) -> np.dtype[Any]:
-    """Return the type of a shift."""
+    """Return the type of the result of a shift."""
     meeting = together(operator.lshift, one, other)
     result = np.promote_types(meeting.left or one.dtype, meeting.right or other.dtype)
     if result.kind not in "iu":
-        raise TypingError(f"RTCF:a shift of {one.words} by {other.words}:convert them by int(…)")
+        raise TypingError(f"RTCF:a shift of {one.words} by {other.words}:convert them with int(…)")
     return result
 
 
@@ -146,7 +146,7 @@ for _operation, _helper in own.OF.items():
 
 
 def _changing_element(helper: Callable[..., Any], operation: Callable[..., Any]) -> None:
-    """Register `x[i] += value`."""
+    """Register the overload of `x[i] += value`."""
     operate = own.OF[operation]
 
     @compiled_as(helper)
@@ -205,7 +205,7 @@ def _divmod(left: Any, right: Any) -> Any:
     return both
 
 
-# The largest and smallest of bools, which numba does not know.
+# max and min of bools, which numba does not support.
 
 
 @overload(max)

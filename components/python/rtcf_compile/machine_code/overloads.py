@@ -1,4 +1,4 @@
-"""The helpers as numba compiles them. Imported only where something is compiled."""
+"""The numba overloads of the helpers. Import this only to compile: it imports numba."""
 
 import functools
 import inspect
@@ -22,7 +22,7 @@ from rtcf_compile.machine_code.sharing import overlaps, shares
 from rtcf_compile.machine_code.tile import ROWS
 from rtcf_compile.rewriting import helpers, numpy_functions, operators
 
-# numba takes an overload apart by its parameters' names and reads its returned function as source.
+# numba matches an overload by its parameter names and compiles the function that it returns.
 _OPTIONS: dict[str, Any] = {
     "boundscheck": False,
     "error_model": "numpy",
@@ -37,10 +37,13 @@ def compiled_as(
     in_line: bool = False,
     refused: str = "",
 ) -> Callable[[Callable[..., Any]], None]:
-    """Register what chooses a helper's implementation by types; numba wants no annotations.
-    `checked` are the indices that it uses; arguments of the names `arrays` may be numbers in rows.
-    `in_line`: always, so that its temporaries may be variables of the caller (stack.py).
-    `refused`: the kinds of narrow types, and b for bools, that NumPy computes in another way.
+    """Register a function that chooses the implementation of a helper by types.
+
+    Annotations are removed, because numba rejects them.
+    `checked`: check the indices in the implementation.
+    `arrays`: names of arguments that may also be rows of numbers.
+    `in_line`: always inline, so that temporaries become variables of the caller (stack.py).
+    `refused`: kinds of narrow types, and b for bools, to reject as NumPy computes them differently.
     """
 
     def register(choose: Callable[..., Any]) -> None:
@@ -79,7 +82,7 @@ def _refuse_narrow(helper: Callable[..., Any], kind: Any, refused: str) -> None:
 
 
 def _again(helper: Callable[..., Any], names: list[str], changed: dict[str, str]) -> Any:
-    """Return a function that calls a helper with some arguments changed."""
+    """Return a function that calls a helper with some arguments converted."""
     scope = {"helper": helper, "some": _some, "array": numpy_functions.rtcf_array}
     given = ", ".join(changed.get(name, name) for name in names)
     exec(f"def again({', '.join(names)}):\n    return helper({given})\n", scope)
@@ -92,7 +95,7 @@ def _some(value: Any) -> Any:
 
 @intrinsic
 def _unwrapped(typing, value):  # type: ignore[no-untyped-def]
-    """An optional value that is not None."""
+    """Return the value of an optional that is not None."""
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         return context.cast(builder, arguments[0], value, value.type)
@@ -102,11 +105,11 @@ def _unwrapped(typing, value):  # type: ignore[no-untyped-def]
 
 @overload(_some)
 def _value_of(value):  # type: ignore[no-untyped-def]
-    """An optional value; raises where it is None."""
+    """Return the value of an optional; raise TypeError if it is None."""
 
     def some(value):  # type: ignore[no-untyped-def]
         if value is None:
-            raise TypeError("None is no number")
+            raise TypeError("None is not a number")
         return _unwrapped(value)
 
     return some
@@ -119,7 +122,7 @@ def _enum_to_float(context, builder, kind, wanted, value):  # type: ignore[no-un
 
 @intrinsic
 def _member(typing, value, cls):  # type: ignore[no-untyped-def]
-    """The member of an enum with a value."""
+    """Return the member of an enum with a value."""
     result = types.IntEnumMember(cls.instance_class, types.int64)
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
@@ -130,7 +133,7 @@ def _member(typing, value, cls):  # type: ignore[no-untyped-def]
 
 @lower_builtin(operator.is_, types.Optional, types.IntEnumMember)
 def _maybe_is(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-    """`x is Mode.RUN` of an optional value."""
+    """`x is Mode.RUN` for an optional value."""
     optional, member = signature.args
     if optional.type != member:
         return context.get_constant(types.boolean, False)
@@ -157,8 +160,8 @@ def _enum(value: Any, cls: Any) -> Any:
     if not isinstance(value, types.Integer):
         first = next(iter(enumeration))
         raise TypingError(
-            f"RTCF:{enumeration.__name__} of {words(value)}:"
-            f"give it a member, as {enumeration.__name__}.{first.name}"
+            f"RTCF:{words(value)} is not a {enumeration.__name__}:"
+            f"give it a member, such as {enumeration.__name__}.{first.name}"
         )
     test = " or ".join(f"value == {int(each)}" for each in enumeration)
     text = f"""\
@@ -229,11 +232,11 @@ def _or_old(value, old):  # type: ignore[no-untyped-def]
 
 @intrinsic
 def _without_sizes(typing, array):  # type: ignore[no-untyped-def]
-    """An array of a record, whose type has no sizes, as a view."""
+    """Return an array of a record as a view, whose type has no sizes."""
     result = types.Array(array.dtype, array.ndim, "C", aligned=array.aligned)
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        return arguments[0]  # the record is not counted
+        return arguments[0]  # the record has no reference count
 
     return result(array), generate
 
@@ -251,13 +254,15 @@ def _store(target: Any, value: Any) -> Any:
         return lambda target, value: helpers.rtcf_assign(target, value)
     if value.ndim != target.ndim:
         raise TypingError(
-            f"RTCF:{words(target)} is set to {words(value)}:give it an array of its shape"
+            f"RTCF:{words(target)} is set to {words(value)}:give it an array of the same shape"
         )
 
     def store(target: Any, value: Any) -> None:
         if target.shape != value.shape:
             note(target.size, value.size)
-            raise ValueError("\x1ean array of {} elements is set to one of another shape, of {}")
+            raise ValueError(
+                "\x1ean array of {} elements is set to one of another shape with {} elements"
+            )
         helpers.rtcf_assign(target, value)
 
     return store
@@ -289,7 +294,7 @@ def _int(value: Any) -> Any:
         return lambda value: value.value
     if isinstance(value, types.Integer):
         return lambda value: value
-    raise TypingError(f"RTCF:a whole number is set to {words(value)}:round it by int(…)")
+    raise TypingError(f"RTCF:a whole number is set to {words(value)}:convert it with int(…)")
 
 
 @compiled_as(helpers.rtcf_bool)
@@ -300,7 +305,7 @@ def _bool(value: Any) -> Any:
 
 
 def plain(function: Any) -> Any:
-    """Return a function that compiled ones call, compiled as they are."""
+    """Return a function that overloads can call, compiled with the same options."""
     function.__annotations__ = {}
     return register_jitable(**_OPTIONS)(function)
 
@@ -318,7 +323,7 @@ def _matmul(a: Any, b: Any) -> Any:
         raise TypingError(f"RTCF:@ of {words(a)} and {words(b)}:use * for numbers")
     if not isinstance(a.dtype, types.Float) and not isinstance(b.dtype, types.Float):
         raise TypingError(
-            f"RTCF:@ of {words(a)} and {words(b)}:make one of them floats: x.astype(float)"
+            f"RTCF:@ of {words(a)} and {words(b)}:convert one to floats: x.astype(float)"
         )
     if (a.ndim, b.ndim) == (1, 1) or (a.dtype, b.dtype) != (types.float64, types.float64):
         dtype = np.promote_types(as_dtype(a.dtype), as_dtype(b.dtype))
@@ -361,7 +366,7 @@ def _matmul(a: Any, b: Any) -> Any:
 
 @functools.cache
 def _plain_product(left: int, right: int, dtype: np.dtype[Any]) -> Any:
-    """Return a product of any elements, by the dimensions of both; its elements are of a type."""
+    """Return a product for elements of any type, by the dimensions of both operands."""
     to = dtype.type
 
     def inner(a: Any, b: Any) -> Any:
@@ -405,7 +410,7 @@ def _plain_product(left: int, right: int, dtype: np.dtype[Any]) -> Any:
 
 
 def _row(matrix: Any, by_rows: str, by_columns: str) -> Any:
-    """Return what computes a row of a product, by where a matrix's neighbours are."""
+    """Return the function for a row of a product, by the memory layout of the matrix."""
     if matrix.layout == "A":
         return _row_of_any()
     return ROWS[by_rows if matrix.layout == "C" else by_columns]
@@ -413,7 +418,7 @@ def _row(matrix: Any, by_rows: str, by_columns: str) -> Any:
 
 @functools.cache
 def _row_of_any() -> Any:
-    """Return the same for a matrix whose strides are known late: when all functions are inlined."""
+    """Return the same for a matrix whose strides are constants only after inlining."""
     along_out, along_sum, along_nothing = ROWS["out"], ROWS["sum"], ROWS[""]
 
     @plain
@@ -431,7 +436,7 @@ def _row_of_any() -> Any:
 @compiled_as(helpers.rtcf_assign, in_line=True)
 def _assign(target: Any, value: Any) -> Any:
     if not isinstance(target, types.Array):
-        raise TypingError(f"RTCF:{words(target)} is set as an array:use =")
+        raise TypingError(f"RTCF:{words(target)} is not an array:set it with =")
     if not target.mutable:
         raise TypingError("RTCF:a constant of the module is set:declare a State, or copy it")
     new = value.dtype if isinstance(value, types.Array) else value
@@ -448,7 +453,7 @@ def _assign(target: Any, value: Any) -> Any:
         )
     if not isinstance(value, types.Array) or value.ndim > target.ndim:
         raise TypingError(
-            f"RTCF:{words(target)} is set to {words(value)}:give it an array of its shape"
+            f"RTCF:{words(target)} is set to {words(value)}:give it an array of the same shape"
         )
     copying = _copying(target.ndim, value.ndim)
     if target.ndim == 1:
@@ -474,7 +479,7 @@ def _assign(target: Any, value: Any) -> Any:
 
 
 def _fitted(target: Any, value: Any) -> Any:
-    """Return what looks whether a single int fits an array's ints; None where it always does."""
+    """Return the function that checks that an int fits an array's ints; None if it always fits."""
     number = operand(value)
     if number is None or number.is_array or number.dtype.kind not in "iu":
         return None
@@ -486,12 +491,12 @@ def _fitted(target: Any, value: Any) -> Any:
 
 @functools.cache
 def conversion(dtype: np.dtype[Any]) -> Any:
-    """Return what makes a single number an element of such an array: see as_element."""
+    """Return the function that converts a number to an element of such an array: see as_element."""
     to = dtype.type
     if dtype.kind not in "iu":
         return plain(lambda number: to(number))
     limits = np.iinfo(dtype)
-    low, high = limits.min, min(limits.max, 2**63 - 1)  # of int64
+    low, high = limits.min, min(limits.max, 2**63 - 1)  # the limits within int64
     text = f"a number does not fit {dtype.name}"
 
     def convert(number: Any) -> Any:
@@ -508,7 +513,7 @@ def _same(value: Any) -> Any:
 
 
 def conversions(operation: Any, x: Any, y: Any) -> tuple[Any, Any]:
-    """Return what converts each of two numbers or arrays before they meet."""
+    """Return the functions that convert the operands of an operation."""
     one, other = operand(x), operand(y)
     if one is None or other is None:
         return _same, _same
@@ -528,7 +533,7 @@ def _array_conversion(dtype: np.dtype[Any]) -> Any:
 
 
 def result_type(operation: Any, x: Any, y: Any) -> np.dtype[Any]:
-    """Return the type of the elements that two numbers or arrays make."""
+    """Return the element type of the result of an operation."""
     one, other = operand(x), operand(y)
     assert one is not None and other is not None
     meeting = together(operation, one, other)
@@ -539,13 +544,15 @@ def result_type(operation: Any, x: Any, y: Any) -> np.dtype[Any]:
 
 @plain
 def _is_from_the_end(target: Any, value: Any) -> Any:
-    """Tell whether NumPy copies a vector from its last element to its first: where it would
-    otherwise set elements before it reads them. It looks at addresses alone, not at strides.
+    """Tell whether NumPy copies a vector from the last element to the first.
+
+    It does so if it would otherwise overwrite elements before it reads them. It decides by
+    addresses only, not by strides.
     """
     n = target.shape[0]
     if n == 0 or value.shape[0] != n:
         return False
-    # A difference of addresses in the same record is a constant, which addresses are not.
+    # The difference of two addresses in one record is a compile-time constant.
     ahead = np.int64(target.ctypes.data) - np.int64(value.ctypes.data)
     step_to, step_at = target.strides[0], value.strides[0]
     if step_to >= 0:
@@ -577,7 +584,7 @@ def _filling(dimensions: int) -> Any:
 
 
 def _copying(of_target: int, of_value: int) -> Any:
-    """Return what copies elements in order, as NumPy broadcasts them."""
+    """Return the function that copies elements in order, broadcasting as NumPy does."""
 
     def vector(target: Any, value: Any) -> None:
         step = 0 if value.shape[0] == 1 else 1
@@ -616,7 +623,7 @@ def _get(base: Any, index: Any) -> Any:
     if any(isinstance(each, types.IntEnumMember) for each in index.types):
         return _by_values("base, index", "helpers.rtcf_get(base, ({}))", index)
     if isinstance(base, types.BaseTuple) and index.count != 1:
-        raise TypingError("RTCF:several values have one index:use x[i][k] for rows")
+        raise TypingError("RTCF:a list or tuple takes one index:use x[i][k] for rows")
     if isinstance(base, types.UniTuple) and isinstance(index[0], types.Integer):
         size = base.count
 
@@ -673,7 +680,7 @@ def _set(base: Any, index: Any, value: Any) -> Any:
     if isinstance(value, types.IntEnumMember):
         return lambda base, index, value: helpers.rtcf_set(base, index, value.value)
     if not isinstance(base, types.Array):
-        raise TypingError(f"RTCF:elements of {words(base)} are set:use an array")
+        raise TypingError(f"RTCF:elements of {words(base)} cannot be set:use an array")
     if not base.mutable:
         raise TypingError("RTCF:a constant of the module is set:declare a State, or copy it")
     new = value.dtype if isinstance(value, types.Array) else value
@@ -700,7 +707,7 @@ def _set(base: Any, index: Any, value: Any) -> Any:
 
 
 def _by_values(parameters: str, call: str, index: Any) -> Any:
-    """Return a function that calls a helper with ints in the place of enums in an index."""
+    """Return a function that calls a helper with an index whose enums are converted to ints."""
     parts = "".join(
         f"index[{k}].value, " if isinstance(each, types.IntEnumMember) else f"index[{k}], "
         for k, each in enumerate(index.types)
@@ -711,7 +718,7 @@ def _by_values(parameters: str, call: str, index: Any) -> Any:
 
 
 def _kinds(base: Any, index: Any) -> tuple[str, ...]:
-    """Return the kinds of the parts of an index: int, slice, array, or a mask of two dimensions."""
+    """Return the kinds of the parts of an index: int, slice, array, or mask (two dimensions)."""
     kinds: list[str] = []
     for each in index.types:
         if isinstance(each, types.Array):
@@ -729,12 +736,14 @@ def _kinds(base: Any, index: Any) -> tuple[str, ...]:
     several = len(kinds) > 1 and ("mask" in kinds or (rest and "array" in kinds))
     if len(kinds) > base.ndim or "" in kinds or several:
         given = ", ".join(words(each) for each in index.types)
-        raise TypingError(f"RTCF:{words(base)} has no index {given}:use ints, slices and arrays")
+        raise TypingError(
+            f"RTCF:{words(base)} cannot be indexed by {given}:use ints, slices and arrays"
+        )
     return tuple(kinds)
 
 
 def _selected(kinds: tuple[str, ...], value: Any) -> Any:
-    """Return what sets what a mask or an array of numbers selects."""
+    """Return the function that sets the elements selected by a mask or an array of ints."""
     if isinstance(value, types.BaseTuple):
         return lambda base, index, value: helpers.rtcf_set(
             base, index, numpy_functions.rtcf_array(value, None)
@@ -769,7 +778,7 @@ def _gathered(base: Any, index: Any) -> Any:
 
 @compiled_as(_gathered)
 def _gather(base: Any, index: Any) -> Any:
-    """Elements of a vector, or rows of a matrix."""
+    """Copy selected elements of a vector, or rows of a matrix."""
     if base.ndim == 1:
 
         def elements(base: Any, index: Any) -> Any:
@@ -794,9 +803,9 @@ def _gather(base: Any, index: Any) -> Any:
 
 @plain
 def _where_true(base: Any, mask: Any) -> Any:
-    """Return the elements of a matrix where a mask of its shape is true, row by row."""
+    """Return the elements of a matrix selected by a mask of the same shape, row by row."""
     if mask.shape != base.shape:
-        raise IndexError("a mask has another shape than the array")
+        raise IndexError("the mask and the array have different shapes")
     result = np.empty(_count(mask), base.dtype)
     k = 0
     for i in range(mask.shape[0]):
@@ -819,7 +828,7 @@ def _count(mask: Any) -> Any:
 
 @plain
 def _steps(rows: Any, columns: Any) -> Any:
-    """Return the steps in indices of two dimensions: 0 for one of a single element."""
+    """Return the steps through two index arrays: 0 for an array of one element, else 1."""
     down = 0 if rows.shape[0] == 1 else 1
     along = 0 if columns.shape[0] == 1 else 1
     if down and along and rows.shape[0] != columns.shape[0]:
@@ -833,13 +842,13 @@ def _places(index: Any, size: Any) -> Any:
 
 @compiled_as(_places)
 def _places_of(index: Any, size: Any) -> Any:
-    """The places that an index selects, each within the size."""
+    """Return the positions that an index selects; raise IndexError if one is out of range."""
     if isinstance(index.dtype, types.Boolean):
 
         def true_ones(index: Any, size: Any) -> Any:
             if index.shape[0] != size:
                 note(index.shape[0], size)
-                raise IndexError("\x1ea mask of {} elements for {}")
+                raise IndexError("\x1ea mask of {} elements for an array of size {}")
             count = 0
             for i in range(size):
                 if index[i]:
@@ -875,10 +884,10 @@ def _apart(base: Any, value: Any) -> Any:
 
 @compiled_as(_apart)
 def _apart_from(base: Any, value: Any) -> Any:
-    """The value, copied if it may share memory with the base."""
+    """Return the value, copied if it may share memory with the base."""
     if not isinstance(value, types.Array):
         return lambda base, value: value
-    # A copy has its elements in order, which is another type to numba.
+    # A copy is contiguous, which numba treats as a different type.
     if value.layout != "C" or not value.mutable:
         return lambda base, value: value.copy()
     return lambda base, value: value.copy() if overlaps(base, value) else value
@@ -890,7 +899,7 @@ def _scatter(base: Any, places: Any, value: Any) -> Any:
 
 @compiled_as(_scatter)
 def _scattered(base: Any, places: Any, value: Any) -> Any:
-    """Elements of a vector, or rows of a matrix."""
+    """Set selected elements of a vector, or rows of a matrix."""
     if not isinstance(value, types.Array):
         if base.ndim == 1:
 
@@ -907,7 +916,7 @@ def _scattered(base: Any, places: Any, value: Any) -> Any:
 
         return fill_rows
     if value.ndim > base.ndim:
-        raise TypingError(f"RTCF:parts of {words(base)} are set to {words(value)}:make them fit")
+        raise TypingError(f"RTCF:parts of {words(base)} are set to {words(value)}:make sizes fit")
     if base.ndim == 1:
 
         def elements(base: Any, places: Any, value: Any) -> None:
@@ -1003,13 +1012,13 @@ def _masked(base: Any, mask: Any, value: Any) -> Any:
 
 @compiled_as(_masked)
 def _set_where(base: Any, mask: Any, value: Any) -> Any:
-    """Elements of a matrix where a mask of its shape is true, row by row."""
+    """Set the elements of a matrix selected by a mask of the same shape, row by row."""
     if isinstance(value, types.Array) and value.ndim > 1:
         raise TypingError(f"RTCF:elements are set to {words(value)}:give them a vector")
 
     def where(base: Any, mask: Any, value: Any) -> None:
         if mask.shape != base.shape:
-            raise IndexError("a mask has another shape than the array")
+            raise IndexError("the mask and the array have different shapes")
         step = _step(value, _count(mask))
         k = 0
         for i in range(mask.shape[0]):
@@ -1027,7 +1036,7 @@ def _step(value: Any, count: Any) -> Any:
 
 @compiled_as(_step)
 def _step_of(value: Any, count: Any) -> Any:
-    """1 to take a value after the other, 0 to take the only one again and again."""
+    """Return the step through the values: 0 to repeat a single value, else 1."""
     if not isinstance(value, types.Array):
         return lambda value, count: 0
 
@@ -1072,7 +1081,7 @@ def _changing(helper: Any, operation: Any) -> None:
 
 
 def require_kind(operation: Any, target: Any, value: Any) -> None:
-    """Refuse to change an array by values of another kind, as NumPy does."""
+    """Reject an in-place operation with values of another kind, as NumPy does."""
     if operand(value) is None or not isinstance(target, types.Array):
         return
     if isinstance(target.dtype, types.Float):
@@ -1080,8 +1089,8 @@ def require_kind(operation: Any, target: Any, value: Any) -> None:
     result = result_type(operation, target, value)
     if not np.can_cast(result, as_dtype(target.dtype), "same_kind"):
         raise TypingError(
-            f"RTCF:elements of {target.dtype} are changed to {result}:"
-            f"convert what they are changed by: ….astype(np.{target.dtype})"
+            f"RTCF:elements of {target.dtype} would become {result}:"
+            f"convert the other operand: ….astype(np.{target.dtype})"
         )
 
 
@@ -1094,7 +1103,7 @@ def _with_lists(helper: Any, operation: Any) -> None:
             return lambda left, right: operation(left, numpy_functions.rtcf_array(right, None))
         if isinstance(left, types.BaseTuple) and isinstance(right, types.Array):
             return lambda left, right: operation(numpy_functions.rtcf_array(left, None), right)
-        raise TypingError("RTCF:a list is computed with, but with no array:use np.array([…])")
+        raise TypingError("RTCF:arithmetic on lists without an array:use np.array([…])")
 
 
 for _helper in helpers.OF_LISTS.values():
@@ -1117,11 +1126,13 @@ def _changed(target: Any, value: Any) -> Any:
 
 
 def _checking(helper: Any, function: Any) -> None:
-    """Register a function of one number: as CPython has it, what gives a NaN of a number is outside
-    its domain, and what gives infinity of a finite one too, unless it only grows so large.
+    """Register a math function of one number that raises as in CPython.
+
+    A NaN from a number is a domain error. So is infinity from a finite number, unless the function
+    grows that large (OverflowError).
     """
     name, grows = function.__name__, function in (math.exp, math.expm1, math.sinh, math.cosh)
-    if function is math.log2:  # which numba does not know
+    if function is math.log2:  # not supported by numba
         function = types.ExternalFunction("log2", types.float64(types.float64))
 
     @compiled_as(helper)
@@ -1193,12 +1204,12 @@ def _pow(base: Any, exponent: Any) -> Any:
 
 
 def _power_of_arrays(base: Any, exponent: Any) -> Any:
-    """Return what computes it of floats, where 0 to a negative power is infinite, or of ints."""
+    """Return the power function of arrays: of floats, where 0 ** -1 is infinite, or of ints."""
     kinds = [getattr(each, "dtype", each) for each in (base, exponent)]
     if isinstance(kinds[0], types.Float) and isinstance(exponent, types.Float):
 
         def by_number(base: Any, exponent: Any) -> Any:
-            # NumPy has functions of its own for these.
+            # NumPy computes these with other functions.
             if exponent == 0.5:
                 return np.sqrt(base)
             if exponent == -1.0:
@@ -1282,7 +1293,7 @@ def _index(value: Any) -> Any:
         return lambda value: value.value
     if isinstance(value, types.Integer | types.Boolean):
         return lambda value: value
-    raise TypingError(f"RTCF:range of {words(value)}:make it an int: int(…)")
+    raise TypingError(f"RTCF:range of {words(value)}:convert it: int(…)")
 
 
 @compiled_as(helpers.rtcf_items)
@@ -1290,10 +1301,12 @@ def _items(values: Any, count: Any) -> Any:
     n = count.count
     if isinstance(values, types.BaseTuple):
         if values.count != n:
-            raise TypingError(f"RTCF:{values.count} values for {n} names:make them fit")
+            raise TypingError(f"RTCF:{values.count} values for {n} names:use as many names")
         return lambda values, count: values
     if not isinstance(values, types.Array):
-        raise TypingError(f"RTCF:{words(values)} for {n} names:give it a vector or several values")
+        raise TypingError(
+            f"RTCF:{words(values)} is unpacked into {n} names:use a vector or a tuple"
+        )
     elements = ", ".join(f"values[{k}]" for k in range(n))
     text = f"""\
 def items(values, count):
@@ -1337,7 +1350,7 @@ def _where(condition: Any, x: Any, y: Any) -> Any:
         isinstance(each, types.Array | types.Number | types.Boolean) for each in given
     ):
         kinds = ", ".join(words(each) for each in given)
-        raise TypingError(f"RTCF:np.where of {kinds}:give it arrays of one shape, and numbers")
+        raise TypingError(f"RTCF:np.where of {kinds}:give it numbers and arrays of one shape")
     as_x, as_y = conversions(np.where, x, y)
     if not dimensions:
         return lambda condition, x, y: x if condition else y
@@ -1483,7 +1496,7 @@ def _cholesky(a: Any) -> Any:
 
 
 def words(value: Any) -> str:
-    """Return numba's type in the words of NumPy."""
+    """Describe a type of numba in the terms of NumPy."""
     if isinstance(value, types.Array):
         of = {1: "a vector", 2: "a matrix"}
         return f"{of.get(value.ndim, f'an array of {value.ndim} dimensions')} of {value.dtype}"
@@ -1494,7 +1507,7 @@ def words(value: Any) -> str:
     if isinstance(value, types.Integer):
         return "an int"
     if isinstance(value, types.BaseTuple):
-        return "several values"
+        return "a list or tuple"
     if isinstance(value, types.IntEnumMember):
         return f"a {value.instance_class.__name__}"
     if isinstance(value, types.Optional):

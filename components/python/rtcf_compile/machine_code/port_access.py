@@ -1,25 +1,25 @@
-"""How hooks get at ports of numbers and arrays, as LLVM's assembly (pointers with types, see
-backend.py): the values of inputs go to the record before a hook runs, those of outputs to their
-slots behind it. Ports of messages, and queues, are the runtime's: see python_component.cpp.
+"""The access of hooks to ports of numbers and arrays, as LLVM assembly (typed pointers, see
+backend.py). It copies the values of inputs to the record before a hook runs, and those of outputs
+to their slots after it. The runtime handles ports of messages and queues: see python_component.cpp.
 
-The places in ports and slots are those of port.hpp and slot.hpp; value_ports.hpp requires that.
+The offsets in ports and slots are those of port.hpp and slot.hpp; value_ports.hpp asserts them.
 """
 
 from collections.abc import Iterator, Sequence
 
 from rtcf.component.declaration import Description, Input, Member, Output
 
-SEQUENCE, SLOT_TIME, SLOT_VALUE = 0, 8, 16  # bytes in a slot
-SOURCE, CURRENT, SEEN = 0, 8, 16  # in an input
-RAW, CLOCK = 0, 8  # in an output
-CLOCK_TIME = 8  # in the loop's clock
+SEQUENCE, SLOT_TIME, SLOT_VALUE = 0, 8, 16  # byte offsets in a slot
+SOURCE, CURRENT, SEEN = 0, 8, 16  # byte offsets in an input
+RAW, CLOCK = 0, 8  # byte offsets in an output
+CLOCK_TIME = 8  # byte offset in the loop's clock
 READ, READ_MORE = "rtcf_python_read", "rtcf_python_read_more"
 NONE, OLD, NEW = 0, 1, 2  # the results of READ
-_UNROLLED = 64  # elements
+_UNROLLED = 64  # elements copied without a loop
 
 
 def _transpose(size: int) -> str:
-    """Return a function that writes a matrix row by row that lies column by column."""
+    """Return a function that transposes a matrix of elements of `size` bytes."""
     kind = f"i{8 * size}"
     return f"""
 define internal void @rtcf_transpose_{size}(i8* %to, i8* %from, i64 %rows, i64 %columns) {{
@@ -60,34 +60,34 @@ declare i8* @memcpy(i8*, i8*, i64)
 
 
 def inputs(description: Description) -> list[Member]:
-    """Return the inputs in the order in which a hook gets them; outputs follow."""
+    """Return the inputs in the order of a hook's ports; the outputs follow."""
     return [each for each in description.of(Input) if each.message is None]
 
 
 def outputs(description: Description) -> list[Member]:
-    """Return the outputs in the order in which a hook gets them."""
+    """Return the outputs in the order of a hook's ports."""
     return [each for each in description.of(Output) if each.message is None]
 
 
 class PortAccess:
-    """The assembly around a hook: of `%record` (i8*) and `%ports` (i8**)."""
+    """The assembly around a hook, which uses `%record` (i8*) and `%ports` (i8**)."""
 
     def __init__(self, description: Description, used: set[str]) -> None:
         fields = description.record.fields
         assert fields is not None
         self._places = {name: int(field[1]) for name, field in fields.items()}
         self._used = used
-        self.raised = self._places["_raised"]  # the numbers that an exception names
+        self.raised = self._places["_raised"]  # the numbers in the text of an exception
         self._inputs, self._outputs = inputs(description), outputs(description)
 
     def read(self) -> str:
-        """Return the instructions before the hook."""
+        """Return the instructions before the hook, which read inputs."""
         return "\n".join(
             line for i, each in enumerate(self._inputs) for line in self._read(each, f"i{i}", i)
         )
 
     def write(self) -> str:
-        """Return the instructions behind the hook: outputs that it has written."""
+        """Return the instructions after the hook, which copy the outputs that it has written."""
         first = len(self._inputs)
         return "\n".join(
             line
@@ -114,7 +114,7 @@ class PortAccess:
         yield f"{name}.same:"
         yield f"  %{name}.has_value = icmp ne i64 %{name}.sequence, 0"
         yield f"  br label %{name}.read"
-        # The value of an earlier writer.
+        # The port holds the value of an earlier writer.
         yield f"{name}.other:"
         yield f"  %{name}.status = call i64 @{READ}(i8* %{name}.port)"
         yield f"  %{name}.other.new = icmp eq i64 %{name}.status, {NEW}"
@@ -183,7 +183,7 @@ def _port(name: str, index: int) -> Iterator[str]:
 
 
 def _place(name: str, base: str, offset: int, kind: str) -> Iterator[str]:
-    """Return the address that many bytes behind another one."""
+    """Yield the instructions for an address at an offset, bytes."""
     if kind == "i8":
         yield f"  %{name} = getelementptr i8, i8* %{base}, i64 {offset}"
         return
@@ -192,14 +192,15 @@ def _place(name: str, base: str, offset: int, kind: str) -> Iterator[str]:
 
 
 def _loaded(name: str, base: str, offset: int, kind: str) -> Iterator[str]:
-    """Return a value that many bytes behind an address, and its own address as `name.place`."""
+    """Yield the instructions that load a value at an offset, and its address as `name.place`."""
     yield from _place(f"{name}.place", base, offset, kind)
     yield f"  %{name} = load {kind}, {kind}* %{name}.place"
 
 
 def _copy(member: Member, name: str, to_port: bool) -> Iterator[str]:
-    """Return the instructions that copy a value. Ports have matrices of floats by columns, and
-    records all arrays by rows.
+    """Yield the instructions that copy a value.
+
+    Ports store matrices of floats in column-major order; records store arrays in row-major order.
     """
     kind = member.type
     size = kind.scalar.itemsize
@@ -212,7 +213,7 @@ def _copy(member: Member, name: str, to_port: bool) -> Iterator[str]:
         places = f"i8* %{name}.to, i8* %{name}.from"
         yield f"  %{name}.copied = call i8* @memcpy({places}, i64 {kind.count * size})"
         return
-    # A row of one is a column of the other.
+    # A row in one order is a column in the other.
     along, across = (columns, rows) if to_port else (rows, columns)
     if kind.count > _UNROLLED:
         yield (
@@ -225,8 +226,9 @@ def _copy(member: Member, name: str, to_port: bool) -> Iterator[str]:
 
 
 def _copy_elements(name: str, sources: Sequence[int], size: int, kind: str) -> Iterator[str]:
-    """Return instructions that read all elements, by their places, and then write them in order:
-    LLVM makes vectors of them.
+    """Yield instructions that load all elements by index, then store them in order.
+
+    LLVM vectorises this sequence.
     """
     for target, source in enumerate(sources):
         own = f"{name}.{target}"
@@ -246,16 +248,16 @@ def entry(
     has_ports: bool,
     writes_always: bool = False,
 ) -> str:
-    """Return a hook's function for C, which returns null or the exception.
+    """Return the C entry function of a hook, which returns null or the exception.
 
-    In tables.hpp it is a HookFunction, and with ports a PortHookFunction. `taken`: the types of the
-    record and of the exception's place, as the inner function takes them. `writes_always`: outputs
-    are written also after an exception.
+    In tables.hpp it is a HookFunction, or a PortHookFunction with ports. `taken`: the parameter
+    types of the record and of the exception in the inner function. `writes_always`: write outputs
+    after an exception too.
     """
     record, exception = taken
     read = access.read() if has_ports else ""
     write = access.write() if has_ports else ""
-    # Nothing else leads to the record while a hook runs.
+    # No other pointer refers to the record while a hook runs: it is noalias.
     ports = ", i8** %ports" if has_ports else ""
     return f"""
 declare i32 @{inner}(i8**, {exception}, {record})

@@ -1,8 +1,9 @@
-"""The two numbers that an exception names, as an index and a size.
+"""The two numbers in the text of an exception, such as an index and a size.
 
-An exception of compiled code is constant bytes. Its text has places {} for the numbers, and the
-code stores these into a variable of the module just before it raises: nothing is done where nothing
-is raised. The hook's entry copies them to the record (port_access.py), for the runtime.
+An exception of compiled code is constant bytes. Its text has placeholders {} for the numbers. The
+code stores the numbers in a variable of the module just before it raises, so there is no cost
+without an exception. The entry of the hook copies them to the record (port_access.py) for the
+runtime.
 """
 
 from typing import Any
@@ -29,7 +30,7 @@ def _store(builder: Any, *values: Any) -> None:
 
 @intrinsic
 def note(typing, first, second):  # type: ignore[no-untyped-def]
-    """Store the numbers of the exception that is raised next."""
+    """Store the numbers of the exception that the next statement raises."""
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         kinds = zip(arguments, signature.args, strict=True)
@@ -40,8 +41,9 @@ def note(typing, first, second):  # type: ignore[no-untyped-def]
 
 
 def check_bounds(context: Any, builder: Any, ind: Any, dimlen: Any, axis: Any = None) -> None:
-    """Raise IndexError as numba's cgutils.do_boundscheck, with index and size. numba has added the
-    size to a negative index.
+    """Raise IndexError with index and size; replaces numba's cgutils.do_boundscheck.
+
+    numba has already added the size to a negative index.
     """
     with cgutils.if_unlikely(builder, builder.icmp_signed(">=", ind, dimlen)):
         _raise(context, builder, ind, dimlen)

@@ -1,6 +1,6 @@
-"""What compiled code may raise: constants that numba puts into the code, as pickled bytes.
+"""The exceptions of compiled code, which numba stores in the code as pickled constants.
 
-The runtime finds the exception and its line by a hash of these bytes; nothing is unpickled there.
+The runtime finds the exception and its line by a hash of these bytes; it does not unpickle them.
 """
 
 import pickle
@@ -11,38 +11,38 @@ from rtcf.component import Fault
 
 from rtcf_compile.source.prefix_map import mapped
 
-# Not the hashes beside them (.sha1), which are any bytes.
+# Skip the hashes beside them (.sha1), which are arbitrary bytes.
 _CONSTANT = re.compile(
     r'^@"?\.const\.pickledata\.[\d.]+"? = [^\n]*constant \[\d+ x i8\] c"([^"\n]*)"', re.M
 )
-# The beginning of texts that name two numbers: see raised_values.py.
+# The first character of texts with two numbers: see raised_values.py.
 WITH_VALUES = "\x1e"
 _WORDS = {
     "division by zero": "division by zero",
-    "Allocation failed (probably too large).": "temporaries are more than the arena has; "
-    "make fewer of them in a loop",
+    "Allocation failed (probably too large).": "the temporary arrays do not fit into the "
+    "arena; make fewer of them in a loop",
 }
 
 
 @dataclass(frozen=True)
 class Raise:
-    """One place that raises; line 0: in a function that was called from the hook's line."""
+    """A statement that raises; line 0: in a function called from the line that the hook noted."""
 
     file: str
     line: int
     text: str
-    has_values: bool = False  # a text with two {}
+    has_values: bool = False  # the text has two {}
 
 
 def raises_in(assembly: str, file: str) -> dict[int, Raise]:
-    """Return what the code of a module may raise, by the hash of its bytes."""
+    """Return the exceptions in the code of a module, by the hash of their bytes."""
     found = {}
     for constant in _CONSTANT.finditer(assembly):
         data = _bytes(constant[1])
         try:
             exception, arguments, place = pickle.loads(data)[:3]
         except (pickle.UnpicklingError, ValueError, TypeError, EOFError):
-            continue  # numba's own: an environment
+            continue  # numba's environment, not an exception
         text = str(arguments[0]) if arguments else ""
         has_values = text.startswith(WITH_VALUES)
         text = _WORDS.get(text, text.removeprefix(WITH_VALUES) if has_values else text)
@@ -54,7 +54,7 @@ def raises_in(assembly: str, file: str) -> dict[int, Raise]:
 
 
 def hash_of(data: bytes) -> int:
-    """Return FNV-1a of 64 bits, as the runtime computes it."""
+    """Return the 64-bit FNV-1a hash, as the runtime computes it."""
     value = 0xCBF29CE484222325
     for byte in data:
         value = (value ^ byte) * 0x100000001B3 & 0xFFFFFFFFFFFFFFFF
@@ -62,7 +62,7 @@ def hash_of(data: bytes) -> int:
 
 
 def _bytes(text: str) -> bytes:
-    """Return what LLVM has written: a backslash as two, what is not printed by its number."""
+    """Return the bytes of an LLVM string, which escapes backslashes and unprintable bytes."""
     plain = re.sub(
         r"\\(\\|[0-9A-Fa-f]{2})",
         lambda found: found[1] if found[1] == "\\" else chr(int(found[1], 16)),

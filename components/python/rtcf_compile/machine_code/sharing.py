@@ -1,4 +1,4 @@
-"""Whether two arrays share elements, as instructions that are constants for members of a record."""
+"""Tests whether two arrays share elements. LLVM folds the tests for members of a record."""
 
 from typing import Any
 
@@ -20,8 +20,9 @@ def _overlaps(typing: Any, target: Any, value: Any) -> Any:
 
 
 def _compared(target: Any, value: Any, but_same: bool) -> Any:
-    """Return numba's signature, and what generates the test; `but_same`: false if all elements lie
-    at the same places.
+    """Return the signature and the code generator of the test.
+
+    `but_same`: the test is false if both arrays have all elements at the same addresses.
     """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -29,7 +30,7 @@ def _compared(target: Any, value: Any, but_same: bool) -> Any:
             context.make_array(kind)(context, builder, array)
             for kind, array in zip(signature.args, arguments, strict=True)
         )
-        # What lies in different blocks, or in a block and a record, has nothing in common.
+        # Arrays in different blocks, or in a block and a record, do not overlap.
         owners = (builder.bitcast(each.meminfo, cgutils.voidptr_t) for each in (one, other))
         conditions = [builder.icmp_unsigned("==", *owners)]
         conditions += [builder.icmp_signed("!=", each.nitems, _SIZE(0)) for each in (one, other)]
@@ -55,7 +56,7 @@ def _compared(target: Any, value: Any, but_same: bool) -> Any:
 
 
 def _ends(context: Any, builder: Any, kind: Any, array: Any) -> tuple[Any, Any]:
-    """Return where the first and last byte of an array are, from its first element."""
+    """Return the offsets of the first and last byte of an array from its first element."""
     item = context.get_abi_sizeof(context.get_data_type(kind.dtype))
     low, high = _SIZE(0), _SIZE(item - 1)
     strides, shape = _numbers(builder, array, "strides"), _numbers(builder, array, "shape")
@@ -72,7 +73,7 @@ def _numbers(builder: Any, array: Any, name: str) -> Any:
 
 
 _shares.__annotations__ = _overlaps.__annotations__ = {}
-# Tells whether elements of a value may lie where the target's do, at other places.
+# Tells whether a value may overlap the target other than element by element.
 shares: Any = intrinsic(_shares)
-# Tells whether elements of a value may lie where the target's do.
+# Tells whether a value may overlap the target.
 overlaps: Any = intrinsic(_overlaps)

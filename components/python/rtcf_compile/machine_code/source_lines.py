@@ -1,8 +1,8 @@
-"""Debug information: the lines of the Python source that machine code was made of.
+"""Debug information: maps machine code to lines of the Python source.
 
-Only functions of the component's author have lines. Code of numba and of our helpers belongs to the
-line that calls it, as LLVM gives inlined code the line of the call. Variables have none, so that
-the machine code is the same as without. `strip` and dh_strip remove it.
+Only functions of the user have lines. Code of numba and of the helpers belongs to the line that
+calls it, as LLVM gives inlined code the line of the call. There is no information about variables,
+so that the machine code is the same as without it. `strip` and dh_strip remove it.
 """
 
 import copy
@@ -19,13 +19,13 @@ from numba.core import callconv, lowering
 from rtcf_compile.rewriting.functions import WRITTEN_NAME
 from rtcf_compile.source.prefix_map import mapped
 
-_ERROR = 1  # two modules that are linked have to agree
+_ERROR = 1  # linked modules must agree on the flag
 _DWARF, _FORM = 4, 3
 
 
 @contextmanager
 def emitted() -> Iterator[None]:
-    """Have numba note lines in machine code, and mapped paths in exceptions."""
+    """Make numba emit line numbers, and mapped paths in exceptions."""
     raises = callconv.CPUCallConv.set_static_user_exc
 
     def init(lower: Any) -> None:
@@ -39,8 +39,8 @@ def emitted() -> Iterator[None]:
             loc.filename = mapped(loc.filename)
         return raises(self, *given, loc=loc, **named)
 
-    # `init` is empty there and called when all else is made. numba's own debug information keeps
-    # variables in memory.
+    # BaseLower.init is an empty hook at the end of the constructor. numba's own debug information
+    # would keep variables in memory.
     with (
         mock.patch.object(lowering.BaseLower, "init", init),
         mock.patch.object(callconv.CPUCallConv, "set_static_user_exc", raised),
@@ -49,8 +49,9 @@ def emitted() -> Iterator[None]:
 
 
 def entered(assembly: str, symbol: str) -> str:
-    """Return assembly in which a hook's entry has the lines of the inner function that it has taken
-    in, if it has.
+    """Return assembly in which the entry of a hook has the line scope of its inner function.
+
+    Nothing changes if the inner function is not inlined into the entry.
     """
     entry = re.search(rf"^define [^\n]*@{re.escape(symbol)}\(.*?^\}}", assembly, re.M | re.S)
     assert entry is not None
@@ -73,12 +74,12 @@ def entered(assembly: str, symbol: str) -> str:
 
 
 def unwound(assembly: str) -> str:
-    """Return assembly whose functions have the tables by which stacks are read, as C++ has them."""
+    """Return assembly whose functions have unwind tables, as in C++."""
     return re.sub(r"^(define .*?)((?: !dbg !\d+)? \{)$", r"\1 uwtable\2", assembly, flags=re.M)
 
 
 class _Lines:
-    """The lines of one function, as numba's lowering asks for them."""
+    """Emits the lines of one function; implements the interface of numba's lowering."""
 
     def __init__(self, lower: Any, written: str) -> None:
         self._lower, self._written = lower, written
@@ -128,19 +129,19 @@ class _Lines:
         """Set the line of the instructions that follow."""
         place = self._lower.loc
         if getattr(place, "filename", None) != self._file:
-            line = self._lower.func_ir.loc.line  # of a function that numba has inlined
+            line = self._lower.func_ir.loc.line  # code of a function that numba has inlined
         builder.debug_metadata = self._module.add_debug_info(
             "DILocation", {"line": line, "column": 1, "scope": self._scope}
         )
 
     def mark_variable(self, *_: Any, **__: Any) -> None:
-        """Leave variables out."""
+        """Emit nothing for variables."""
 
     def initialize(self) -> None:
-        """Nothing is to be made before the function is."""
+        """Prepare nothing before the function exists."""
 
     def finalize(self) -> None:
-        """Add the unit to the module, once its functions are made."""
+        """Add the compile unit to the module after its functions."""
         self._named("llvm.dbg.cu").add(self._unit)
         flags = self._named("llvm.module.flags")
         for flag, value in (("Dwarf Version", _DWARF), ("Debug Info Version", _FORM)):

@@ -1,19 +1,19 @@
-"""Temporary arrays of constant size on the stack, by LLVM's assembly.
+"""Moves temporary arrays of constant size to the stack, by editing LLVM assembly.
 
-Once all functions of a hook are inlined, most arrays are made with a constant number of bytes, and
-their address goes nowhere but into loads and stores: these are no blocks of the arena then, but
-variables of the function, which LLVM keeps in registers where it can. A block that is passed on,
-that one of several names may mean, or that is large, stays in the arena.
+After all functions of a hook are inlined, most arrays have a constant size, and only loads and
+stores use their address. Such blocks of the arena become local variables, which LLVM keeps in
+registers if possible. A block stays in the arena if its address is passed on, if a pointer may
+refer to it or to another block, or if it is large.
 
-One variable stands for all arrays that one place makes: whatever derives from the place alone means
-the array that it made last.
+One variable replaces all arrays that one allocation in the code makes, for instance in a loop:
+pointers derived only from that allocation refer to the array that it made last.
 """
 
 import re
 from collections import defaultdict
 
 _LARGEST, _ALL = 2048, 16 * 1024  # bytes
-_DATA = 24  # where a block has the address of its data
+_DATA = 24  # offset of the data pointer in a block
 _NAME = r'%(?:"[^"]*"|[\w.$-]+)'
 _NAMES = re.compile(_NAME)
 _MADE = re.compile(
@@ -31,7 +31,7 @@ _BYTES = {"i8": 1, "i64": 8, "double": 8}
 
 
 def promoted(assembly: str) -> str:
-    """Return the assembly with variables in the place of blocks, where that is possible."""
+    """Return assembly with blocks replaced by local variables where possible."""
     lines = assembly.split("\n")
     begin = None
     for number, line in enumerate(lines):
@@ -47,7 +47,7 @@ def promoted(assembly: str) -> str:
 
 
 class _Function:
-    """The lines of one function."""
+    """The lines of one function in assembly."""
 
     def __init__(self, lines: list[str]) -> None:
         self._lines = lines
@@ -58,10 +58,10 @@ class _Function:
                     self._uses[name].append(number)
 
     def promoted(self) -> list[str]:
-        """Return the lines, changed."""
+        """Return the changed lines."""
         variables: list[str] = []
         left = _ALL
-        # A block that becomes a variable is null where its references are counted.
+        # Reference counting gets null for a block that becomes a variable.
         for number, line in enumerate(self._lines):
             if _COUNTED.match(line):
                 self._lines[number] = line.replace("nonnull ", "")
@@ -80,13 +80,13 @@ class _Function:
             self._lines[number] = f"  {name} = bitcast {typed} {variable} to {_pointer(typed)}"
             for place, text in changed.items():
                 self._lines[place] = text
-        # Behind the head and the label of the first block.
+        # Insert after the head and the label of the first basic block.
         first = next(i for i, line in enumerate(self._lines[1:], 1) if line.startswith("  "))
         return [*self._lines[:first], *variables, *self._lines[first:]]
 
     def _changed(self, made: str, where: int) -> dict[int, str] | None:
-        """Return the lines that change when a block becomes a variable; None if it cannot."""
-        # By name: how far into the block it points; None: somewhere into its data.
+        """Return the changed lines if a block becomes a variable; None if it cannot."""
+        # Offsets into the block by name; None: somewhere in its data.
         offsets: dict[str, int | None] = {made: 0}
         changed: dict[int, str] = {}
         merged: list[int] = []
@@ -140,7 +140,7 @@ class _Function:
         return changed
 
     def _is_counted(self, name: str) -> bool:
-        """Tell whether references to a block are counted by this name, and no more."""
+        """Tell whether a name is used only to count references to a block."""
         uses = [self._lines[number] for number in self._uses[name]]
         return all(_COUNTED.match(line) or line.startswith(f"  {name} = ") for line in uses if line)
 
@@ -149,7 +149,7 @@ class _Function:
         return stored is not None and stored[1] == name and line.count(name) == 1
 
     def _merged(self, number: int) -> list[str]:
-        """Return the values that one of several may be; a constant by its text."""
+        """Return the alternatives of a phi or select; constants as text."""
         result = _RESULT.match(self._lines[number])
         assert result is not None
         if result[2] == "phi":
@@ -159,7 +159,7 @@ class _Function:
 
 
 def _moved(rest: str, name: str, offset: int | None) -> int | None:
-    """Return how far into the block an address is that is computed from another one."""
+    """Return the offset into the block of an address computed from another one."""
     found = _OFFSET.match(rest)
     if offset is None or found is None or found[2] != name:
         return None

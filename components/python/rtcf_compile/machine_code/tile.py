@@ -1,9 +1,9 @@
-"""A row of a product of matrices in pieces that stay in the processor's registers.
+"""Computes a row of a matrix product in tiles that stay in processor registers.
 
-`out[j] = sum over k of factors[k] * matrix[k, j]`, for some neighbouring j at a time, each sum from
-the first k to the last, as a plain loop has it: LLVM does not make vectors of that loop, as it may
-not change the order of a sum. Two neighbouring j are one vector, which every processor of amd64 and
-of arm64 has.
+`out[j] = sum over k of factors[k] * matrix[k, j]`. A tile computes several adjacent j; each sum
+runs from the first k to the last, as in a plain loop. LLVM cannot vectorise that loop, because it
+must not reorder sums. Two adjacent j form a vector of two doubles, which every amd64 and arm64
+processor supports.
 """
 
 from typing import Any
@@ -69,25 +69,25 @@ def _row_along(along: str) -> Any:
 
 # Functions that compute a row of a product: (factors, its offset, its stride, matrix, its two
 # strides, number of products in a sum, out, its offset, number of elements). Offsets and strides
-# are bytes. By where neighbours in memory are: "out", elements j and j + 1 of the matrix; "sum",
-# elements k and k + 1; "", neither.
+# are in bytes. The key names the matrix elements that are adjacent in memory: "out", j and j + 1;
+# "sum", k and k + 1; "", neither.
 ROWS = {along: _row_along(along) for along in ("out", "sum", "")}
 
 
 class _Tile:
-    """The instructions of one tile."""
+    """Generates the instructions of one tile."""
 
     def __init__(
         self, builder: Any, width: int, along: str, adjacent: bool, factors: Any, step: Any,
         matrix: Any, down: Any, across: Any, count: Any, out: Any,
     ) -> None:  # fmt: skip
         self._builder, self._width, self._along = builder, width, along
-        self._adjacent = adjacent  # the factors are neighbours in memory
+        self._adjacent = adjacent  # the factors are adjacent in memory
         self._factors, self._step, self._count, self._out = factors, step, count, out
         self._matrix, self._down, self._across = matrix, down, across
 
     def emit(self) -> None:
-        """Sum up, then store."""
+        """Emit the sums, then the stores."""
         builder = self._builder
         pairs = self._width // 2 if self._along else 0
         kinds = [_PAIR] * pairs + [_NUMBER] * (self._width - 2 * pairs)
@@ -127,7 +127,7 @@ class _Tile:
             self._add(place, builder.fmul(self._pair(factor, factor), value))
 
     def _two_steps(self, k: Any, sums: list[Any], pairs: int) -> None:
-        """Add the products of k and k + 1, which are neighbours in the matrix."""
+        """Add the products of k and k + 1, which are adjacent in the matrix."""
         builder = self._builder
         both = self._two_factors(k)
         for number, place in enumerate(sums):

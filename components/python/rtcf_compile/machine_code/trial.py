@@ -1,6 +1,6 @@
-"""A first run in the interpreter: shapes that do not fit are found before there is a library.
+"""A trial run in the interpreter, which finds shapes that do not fit before a library is written.
 
-numba knows how many dimensions an array has, not how long they are; NumPy does when it runs.
+numba knows the number of dimensions of an array but not their sizes; NumPy checks them at run time.
 """
 
 import warnings
@@ -19,7 +19,7 @@ _CYCLES = 20
 
 
 def run(cls: type[Component], file: str) -> None:
-    """Run some cycles with values drawn from a fixed seed; raise Mistake if shapes do not fit."""
+    """Run some cycles with random values of a fixed seed; raise Mistake if shapes do not fit."""
     draw = np.random.default_rng(1)
     about = describe(cls)
     with warnings.catch_warnings(), np.errstate(all="ignore"):
@@ -28,9 +28,9 @@ def run(cls: type[Component], file: str) -> None:
             with limited(HOOK_S):
                 _cycles(cls(), about, draw)
         except TimeLimitError:
-            pass  # the comparison says where
+            pass  # the comparison reports it
         except Exception as error:
-            # What a component raises of its own is for the loop to see.
+            # The component's own exceptions are not errors here.
             line = _line(error, file)
             if said := numpy_errors.explained(error, source_line(file, line)):
                 raise Mistake(file, line, *said) from None

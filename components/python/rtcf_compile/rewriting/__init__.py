@@ -1,1 +1,1 @@
-"""From methods of a class to functions on a record, with helpers for arrays and logs."""
+"""Rewrites functions of a component so that numba can compile them."""

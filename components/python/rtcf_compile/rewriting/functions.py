@@ -1,4 +1,4 @@
-"""The functions of a component class as they are compiled: rewritten, and bound to each other."""
+"""The functions of a component class, rewritten for compilation and bound to each other."""
 
 import ast
 import dataclasses
@@ -21,17 +21,17 @@ from rtcf_compile.source.checks import check, resolve
 from rtcf_compile.source.mistake import Mistake, at, written
 from rtcf_compile.source.modules import Source, is_own, read
 
-# Functions of ours in rewritten ones, by name.
+# The helpers that rewritten functions call, by name.
 HELPERS = {**helpers.BY_NAME, **numpy_functions.BY_NAME}
-# What makes a compiled function of a Python one, and what stands for a log call.
+# Compiles a Python function.
 Compiler = Callable[[FunctionType], Any]
-# Attributes of rewritten functions: the name of the author's function, as `Observer.update`, and
-# its code.
+# Attributes of rewritten functions: the name of the original function, such as `Observer.update`,
+# and its code.
 WRITTEN_NAME, WRITTEN_CODE = "rtcf_written_name", "rtcf_written_code"
 
 
 class Functions:
-    """Hooks, methods and module functions of a class, made when they are asked for."""
+    """Hooks, methods and module functions of a class, rewritten on demand."""
 
     def __init__(
         self,
@@ -40,8 +40,9 @@ class Functions:
         compiler: Compiler,
         narrow: Collection[CodeType] = (),
     ) -> None:
-        """Prepare those of a class; `narrow`: the code of functions that compute with numbers of
-        other types than Python's.
+        """Prepare the functions of a class.
+
+        `narrow`: the code of functions that compute with narrow numbers, see operators.py.
         """
         self._narrow = narrow
         self.description = description
@@ -53,14 +54,14 @@ class Functions:
         self._made: dict[FunctionType, Any] = {}
         self._hooks: dict[FunctionType, Hook] = {}
         self._making: list[FunctionType] = []
-        # Which function calls which, and the arrays that are too large for the arena.
+        # The functions that each function calls, and the arrays that are too large for the arena.
         self._calls: dict[FunctionType, set[FunctionType]] = {}
         self._large: dict[FunctionType, Mistake] = {}
-        # File, line, text and name of calls that numba may compile to functions no loop has.
+        # File, line, text and name of calls that may need functions that the loop does not have.
         self.other_calls: list[tuple[str, int, str, str]] = []
 
     def hooks(self) -> dict[str, FunctionType]:
-        """Return the hooks that the class has, rewritten but not compiled."""
+        """Return the hooks of the class, rewritten but not compiled."""
         if self._methods.find("update") is None:
             file = inspect.getsourcefile(self._cls) or "?"
             line = inspect.getsourcelines(self._cls)[1]
@@ -87,21 +88,21 @@ class Functions:
         return found
 
     def _check_prepare(self, function: FunctionType, seen: set[FunctionType]) -> None:
-        """Refuse what prepare and the methods that it calls cannot know."""
+        """Reject members that prepare, and the methods that it calls, cannot read."""
         seen.add(function)
         hook = self._hooks[function]
         for node in hook.touched.values():
             raise at(
                 hook.source.file,
                 node,
-                "prepare runs beside the loop, with parameters alone",
+                "prepare runs beside the loop and reads only parameters",
                 "compute it in update, or declare a Parameter",
             )
         for called in self._calls.get(function, set()) & set(self._hooks) - seen:
             self._check_prepare(called, seen)
 
     def _check_large(self, function: FunctionType, seen: set[FunctionType]) -> None:
-        """Refuse arrays that find no room in the arena, whatever else lies there."""
+        """Reject arrays that are larger than the arena."""
         seen.add(function)
         if function in self._large:
             raise self._large[function]
@@ -123,7 +124,7 @@ class Functions:
             raise Mistake(
                 source.file,
                 source.tree.lineno,
-                "a hook takes self alone",
+                "a hook takes only self",
                 f"write def {source.tree.name}(self):",
             )
         for node in ast.walk(source.tree):
@@ -142,14 +143,14 @@ class Functions:
             file,
             line or inspect.getsourcelines(method.owner)[1],
             f"{method.name} is a {method.kind}",
-            "write a method, a static method or a property by `def`",
+            "write a method, a static method or a property with `def`",
         )
 
     def _method(self, source: Source, method: Method, is_hook: bool = False) -> FunctionType:
         function = source.function
         check(source)
         self._begin(function, source)
-        # Lines are those of one file: a base's hook in another one has the line of the class.
+        # Noted lines refer to one file: for a base's hook in another file, note the class's line.
         is_here = source.file == self.file()
         line = 0 if is_here or not is_hook else inspect.getsourcelines(self._cls)[1]
         hook = Hook(
@@ -180,7 +181,7 @@ class Functions:
         self._making.append(function)
 
     def _note(self, function: FunctionType) -> None:
-        """Note that the function in work calls another."""
+        """Record that the current function calls another."""
         if self._making:
             self._calls.setdefault(self._making[-1], set()).add(function)
 
@@ -197,7 +198,7 @@ class Functions:
             self._large[products.source.function] = at(
                 products.source.file,
                 node,
-                f"is larger than all temporaries of a cycle together, {ARENA // 1024} KiB",
+                f"is larger than the memory for temporary arrays, {ARENA // 1024} KiB",
                 "declare a State, or make it smaller",
             )
 
@@ -247,19 +248,19 @@ class Functions:
                     _constant(node, value, source)
             elif isinstance(node, ast.Attribute) and is_own(resolve(node, source)):
                 what = "a function of another module"
-                raise at(source.file, node, what, "import it by its name")
+                raise at(source.file, node, what, "import the function by name")
         return scope
 
 
 def operator_functions(
     function: FunctionType, narrow: Collection[CodeType]
 ) -> frozenset[type[ast.AST]]:
-    """Return the operators of a function that become functions themselves."""
+    """Return the operators that become calls of functions in a function."""
     return operators.NARROW if function.__code__ in narrow else operators.ALWAYS
 
 
 def drop_types(tree: ast.FunctionDef) -> None:
-    """Drop annotations and decorators, which mean nothing in a rewritten function."""
+    """Drop annotations and decorators, which have no meaning in a rewritten function."""
     tree.returns = None
     tree.decorator_list = []
     for each in tree.args.args:
@@ -267,7 +268,7 @@ def drop_types(tree: ast.FunctionDef) -> None:
 
 
 def frozen(value: Any) -> Any:
-    """Return a constant with tuples in the place of lists, whose numbers are of one type."""
+    """Return a constant with lists converted to tuples whose numbers have one type."""
     if not isinstance(value, list):
         return value
     elements = tuple(frozen(each) for each in value)
@@ -277,7 +278,7 @@ def frozen(value: Any) -> Any:
 
 
 def _constant(node: ast.Name, value: Any, source: Source) -> None:
-    """Refuse a global that is no constant of a kind that can be compiled."""
+    """Reject a global whose type cannot be compiled as a constant."""
     kinds: dict[type, str] = {
         dict: "a dict",
         set: "a set",
@@ -297,7 +298,7 @@ def _constant(node: ast.Name, value: Any, source: Source) -> None:
 
 
 def made(tree: ast.FunctionDef, scope: dict[str, Any], source: Source) -> FunctionType:
-    """Return a function of a rewritten tree, with the names that it sees."""
+    """Return the function of a rewritten tree; `scope`: its globals."""
     module = ast.fix_missing_locations(ast.Module([tree], []))
     code = compile(module, source.file, "exec", dont_inherit=True)
     inner = next(each for each in code.co_consts if isinstance(each, CodeType))

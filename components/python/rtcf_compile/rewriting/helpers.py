@@ -1,8 +1,9 @@
-"""What `@`, assignment, np.linalg and np.where become: functions for small arrays of fixed size.
+"""The functions that replace `@`, assignment, np.linalg and np.where, for small arrays.
 
-Each exists twice with the same operations in the same order: the function itself is for the
-interpreter, its overload is compiled. Neither calls BLAS or LAPACK, whose sums depend on the
-machine and which allocate; np.where of numba from 0.57 on makes lists of shapes.
+Each has two implementations with the same operations in the same order: the function here runs in
+the interpreter, its overload is compiled. Neither calls BLAS or LAPACK, which allocate and whose
+order of sums depends on the machine. np.where is replaced because numba 0.57 and later allocate
+lists for it.
 """
 
 import ast
@@ -21,7 +22,7 @@ _WHOLE = (int, np.integer)
 
 
 def rtcf_matmul(a: Any, b: Any) -> Any:
-    """Return a @ b, each sum from the first element to the last."""
+    """Return a @ b; each sum runs from the first element to the last."""
     a, b = np.asarray(a), np.asarray(b)
     if not a.ndim or not b.ndim or a.shape[-1] != b.shape[0]:
         raise ValueError(f"@ of shapes {a.shape} and {b.shape}")
@@ -39,7 +40,8 @@ def rtcf_matmul(a: Any, b: Any) -> Any:
 
 
 def rtcf_assign(target: Any, value: Any) -> None:
-    """Set all elements of an array, from a number or an array that NumPy broadcasts to its shape.
+    """Set all elements of an array to a number or to an array that NumPy can broadcast.
+
     The two may share memory.
     """
     new = _elements(target, value)
@@ -47,7 +49,7 @@ def rtcf_assign(target: Any, value: Any) -> None:
 
 
 def _elements(target: Any, value: Any) -> Any:
-    """Return what an array is set to; raise where its elements cannot be that."""
+    """Return the value for the elements of an array; raise if they cannot store it."""
     new = np.asarray(value)
     if new.dtype.kind == "f" and target.dtype.kind != "f":
         raise TypeError(f"elements are {target.dtype.name}, not {new.dtype.name}")
@@ -57,16 +59,17 @@ def _elements(target: Any, value: Any) -> Any:
 
 
 def rtcf_get(base: Any, index: Any) -> Any:
-    """Return base[index]: an element, a view, or a copy of what a mask or an array of numbers
-    selects. Of a tuple an element.
+    """Return base[index] of an array: an element, a view, or a copy of the elements selected by a
+    mask or an array of ints. Of a tuple, return an element.
     """
     return base[index] if isinstance(base, np.ndarray) else base[index[0]]
 
 
 def rtcf_set(base: Any, index: Any, value: Any) -> None:
-    """Set what NumPy takes for base[index]: an element, a view, or what a mask or an array of
-    numbers selects. The arrays may share memory, also where NumPy would not have it: the value for
-    an array of numbers is copied.
+    """Set base[index]: an element, a view, or the elements selected by a mask or an array of ints.
+
+    The arrays may share memory, even where NumPy does not support it: the value for an array of
+    ints is copied.
     """
     new = np.asarray(_elements(base, value))
     parts = index if isinstance(index, tuple) else (index,)
@@ -79,7 +82,7 @@ def _in_place(operation: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]
     operate = operators.OF[operation]
 
     def change(target: Any, value: Any) -> Any:
-        """Return what `target += value` leaves in target: an array is changed in place."""
+        """Return the target after `target += value`; an array changes in place."""
         if not isinstance(target, np.ndarray):
             return operate(target, value)
         rtcf_assign(target, operate(target, value))
@@ -89,7 +92,7 @@ def _in_place(operation: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]
     return change
 
 
-# `x += y` of a variable, by the operator's node.
+# `x += y` of a variable, by node type.
 IN_PLACE: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     node: _in_place(operation)
     for node, operation in {
@@ -104,7 +107,7 @@ IN_PLACE: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
 
 
 def rtcf_changed(target: Any, value: Any) -> Any:
-    """Return a value; an array that has it now, where the target is one."""
+    """Return a value, or the target array after setting it to the value."""
     if not isinstance(target, np.ndarray):
         return value
     np.copyto(target, value, casting="same_kind")
@@ -113,14 +116,14 @@ def rtcf_changed(target: Any, value: Any) -> Any:
 
 def _of_lists(operation: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
     def of_lists(left: Any, right: Any) -> Any:
-        """Return an operation of an array and a list."""
+        """Return the result of an operation on an array and a list."""
         return operation(np.asarray(left), np.asarray(right))
 
     of_lists.__name__ = f"rtcf_of_lists_{operation.__name__}"
     return of_lists
 
 
-# `x + [1.0, 2.0]`, by the operator's node.
+# `x + [1.0, 2.0]`, by node type.
 OF_LISTS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
     node: _of_lists(operation)
     for node, operation in {
@@ -137,12 +140,12 @@ def _checked(function: Callable[[float], float]) -> Callable[[Any], float]:
         return function(value)
 
     checked.__name__ = f"rtcf_math_{function.__name__}"
-    checked.__doc__ = f"Return math.{function.__name__}(value), which raises where it has no value."
+    checked.__doc__ = f"Return math.{function.__name__}(value), which raises outside its domain."
     return checked
 
 
 # Functions of one number that raise ValueError outside their domain and OverflowError beyond the
-# largest float. What the C library gives there, NaN and infinity, is no value to Python.
+# largest float. The C library returns NaN and infinity there.
 _MATH: list[Callable[[float], float]] = [
     *(math.sqrt, math.exp, math.expm1, math.log, math.log1p, math.log2, math.log10),
     *(math.sin, math.cos, math.tan, math.asin, math.acos, math.atan),
@@ -152,12 +155,12 @@ MATH: dict[Callable[..., Any], Callable[[Any], float]] = {each: _checked(each) f
 
 
 def rtcf_math_fmod(x: Any, y: Any) -> float:
-    """Return math.fmod(x, y), which raises where it has no value."""
+    """Return math.fmod(x, y), which raises outside its domain."""
     return math.fmod(x, y)
 
 
 def rtcf_pow(base: Any, exponent: Any) -> Any:
-    """Return base ** exponent; raises where that is no float, or no int of two ints."""
+    """Return base ** exponent; raise if the result is not a float, or not an int for two ints."""
     if isinstance(base, np.ndarray) or isinstance(exponent, np.ndarray):
         return operator.pow(*operators.alike(base, exponent))
     if isinstance(base, _WHOLE) and isinstance(exponent, _WHOLE):
@@ -172,19 +175,19 @@ def rtcf_pow(base: Any, exponent: Any) -> Any:
 
 
 def rtcf_negative_pow(base: Any, exponent: Any) -> Any:
-    """Return base ** exponent for a constant exponent below 0: a float, also of an int."""
+    """Return base ** exponent for a constant exponent below 0: a float, even for an int."""
     if isinstance(base, np.ndarray):
         return base**exponent
     return rtcf_pow(float(base), float(exponent))
 
 
 def rtcf_math_pow(base: Any, exponent: Any) -> Any:
-    """Return math.pow(base, exponent), which raises where it has no value."""
+    """Return math.pow(base, exponent), which raises outside its domain."""
     return rtcf_pow(float(base), float(exponent))
 
 
 def rtcf_to_int(value: Any) -> Any:
-    """Return int(value): towards 0. Raises where that is no int64."""
+    """Return int(value), rounded towards 0; raise if it does not fit int64."""
     whole = int(value)
     if not -(2**63) <= whole < 2**63:
         raise OverflowError("does not fit int64")
@@ -197,32 +200,32 @@ def rtcf_to_float(value: Any) -> Any:
 
 
 def rtcf_floor(value: Any) -> Any:
-    """Return math.floor(value). Raises where that is no int64."""
+    """Return math.floor(value); raise if it does not fit int64."""
     return rtcf_to_int(math.floor(value))
 
 
 def rtcf_ceil(value: Any) -> Any:
-    """Return math.ceil(value). Raises where that is no int64."""
+    """Return math.ceil(value); raise if it does not fit int64."""
     return rtcf_to_int(math.ceil(value))
 
 
 def rtcf_round(value: Any) -> Any:
-    """Return round(value): halves to the even one. Raises where that is no int64."""
+    """Return round(value), halves to even; raise if it does not fit int64."""
     return rtcf_to_int(round(float(value)) if isinstance(value, float) else round(value))
 
 
 def rtcf_index(value: Any) -> Any:
-    """Return an argument of range(), which is an int."""
+    """Return an argument of range() as an int."""
     return operator.index(value)
 
 
 def rtcf_float(value: Any) -> Any:
-    """Return a float, of a float or an int."""
+    """Return a float or an int as a float."""
     return float(value)
 
 
 def rtcf_int(value: Any) -> Any:
-    """Return an int, of an int or an enum."""
+    """Return an int or an enum as an int."""
     return int(value)
 
 
@@ -232,10 +235,10 @@ def rtcf_bool(value: Any) -> Any:
 
 
 def rtcf_items(values: Any, count: Any) -> Any:
-    """Return the elements of a value that is unpacked into as many names as `count` has."""
+    """Return the elements of a value that is unpacked into len(count) names."""
     values = tuple(values)
     if len(values) != len(count):
-        raise ValueError("another number of values than of names")
+        raise ValueError("the number of values differs from the number of names")
     return values
 
 
@@ -245,14 +248,16 @@ def rtcf_view(array: Any) -> Any:
 
 
 def rtcf_store(target: Any, value: Any) -> None:
-    """Set all elements of a member, from a number or an array of its shape."""
+    """Set all elements of a member to a number or to an array of its shape."""
     if np.shape(value) not in (target.shape, ()):
-        raise ValueError(f"an array of shape {target.shape} is set to one of {np.shape(value)}")
+        raise ValueError(
+            f"an array of shape {target.shape} is set to one of shape {np.shape(value)}"
+        )
     rtcf_assign(target, value)
 
 
 def rtcf_maybe(value: Any, is_known: Any) -> Any:
-    """Return a value that is None where it is not known."""
+    """Return a value, or None if it is not known."""
     return value if is_known else None
 
 
@@ -262,12 +267,12 @@ def rtcf_is_known(value: Any) -> Any:
 
 
 def rtcf_or_old(value: Any, old: Any) -> Any:
-    """Return a value, or the old one in the place of None."""
+    """Return a value, or the old one for None."""
     return old if value is None else value
 
 
 def rtcf_equal(a: Any, b: Any) -> Any:
-    """Return a == b; None is equal to no number."""
+    """Return a == b; None differs from every number."""
     return a == b
 
 
@@ -277,7 +282,7 @@ def rtcf_enum(value: Any, cls: Any) -> Any:
 
 
 def rtcf_member(value: Any, cls: Any) -> Any:
-    """Return the member of an enum with a value, which it has."""
+    """Return the member of an enum with a value that is known to exist."""
     return cls(value)
 
 
@@ -294,17 +299,17 @@ def rtcf_front(ring: Any, oldest: Any, count: Any) -> Any:
 
 
 def rtcf_age(now: Any, written: Any, oldest: Any, count: Any) -> Any:
-    """Return how long ago the oldest message of a queue was written, ns; -1 without one."""
+    """Return the age of the oldest message of a queue, ns; -1 for an empty queue."""
     return max(0, now - written[oldest]) if count else -1
 
 
 def rtcf_after(place: Any, size: Any) -> Any:
-    """Return the place behind another in a ring."""
+    """Return the next index in a ring."""
     return (place + 1) % size
 
 
 def rtcf_where(condition: Any, x: Any, y: Any) -> Any:
-    """Return x where the condition holds, else y: arrays of one shape, or numbers."""
+    """Return x where the condition is true, else y; all are arrays of one shape, or numbers."""
     shapes = {np.shape(each) for each in (condition, x, y)} - {()}
     if len(shapes) > 1:
         raise ValueError(f"np.where of shapes {sorted(shapes)}")
@@ -312,7 +317,7 @@ def rtcf_where(condition: Any, x: Any, y: Any) -> Any:
 
 
 def rtcf_solve(a: Any, b: Any) -> Any:
-    """Return x of a x = b, by elimination with row pivots."""
+    """Return x of a x = b, by Gaussian elimination with row pivots."""
     matrix, x = np.array(a, np.float64), np.array(b, np.float64)
     n = matrix.shape[0]
     if matrix.ndim != 2 or matrix.shape[1] != n or x.shape[0] != n:
@@ -359,7 +364,7 @@ def rtcf_cholesky(a: Any) -> Any:
     return result
 
 
-# By identity: functions of several modules are equal, or not to be hashed.
+# The helpers that replace functions.
 INSTEAD: dict[Callable[..., Any], Callable[..., Any]] = {
     np.linalg.solve: rtcf_solve,
     np.linalg.inv: rtcf_inv,

@@ -1,4 +1,4 @@
-"""A log call in compiled code: a call of a function of the library, arguments as they are."""
+"""A log call in compiled code: calls a function of the library with the arguments."""
 
 from typing import Any
 
@@ -15,12 +15,12 @@ _PRESENT: list[Logs] = []
 
 
 def logs_are(logs: Logs) -> None:
-    """Say whose calls are compiled from here on."""
+    """Set the log calls of the component that is compiled next."""
     _PRESENT[:] = [logs]
 
 
 def log_call(number: int, count: int) -> Any:
-    """Return the function that stands for a call with that many arguments."""
+    """Return the numba intrinsic for log call `number` with `count` arguments."""
     names = [f"argument_{i}" for i in range(count)]
     scope: dict[str, Any] = {"call": lambda *found: _typed(number, found)}
     exec(
@@ -32,10 +32,10 @@ def log_call(number: int, count: int) -> Any:
 
 
 def _kind(given: Any) -> str:
-    """Return the words for an argument that is no number."""
+    """Describe an argument that is not a number, in the plural."""
     kinds = {types.Array: "arrays", types.UnicodeType: "text", types.StringLiteral: "text"}
-    kinds |= {types.Optional: "what may be None", types.BaseTuple: "several values"}
-    return next((words for kind, words in kinds.items() if isinstance(given, kind)), "others")
+    kinds |= {types.Optional: "values that may be None", types.BaseTuple: "lists"}
+    return next((words for kind, words in kinds.items() if isinstance(given, kind)), "other values")
 
 
 def _typed(number: int, given: tuple[Any, ...]) -> tuple[Any, Any]:
@@ -53,7 +53,7 @@ def _typed(number: int, given: tuple[Any, ...]) -> tuple[Any, Any]:
         else:
             raise TypingError(
                 f"RTCF:a log call stores numbers and bools, not {_kind(each)}:"
-                "log elements one by one, texts within the constant text"
+                "log each element, and write text into the constant text"
             )
     logs.calls[number].types = [_SCALARS[each] for each in passed]
 
@@ -66,7 +66,7 @@ def _typed(number: int, given: tuple[Any, ...]) -> tuple[Any, Any]:
             values.append(cast)
         function = ir.FunctionType(ir.VoidType(), [each.type for each in values])
         name = logs.symbol(number)
-        # numba wants an address as it makes its own copy ready, which nobody calls.
+        # numba resolves symbols when it finalises its own copy, which is never called.
         llvm.add_symbol(name, 1)
         declared = builder.module.globals.get(name)
         if declared is None:

@@ -1,4 +1,4 @@
-"""Log calls of a component: the text and the types of the arguments that each stores."""
+"""The log calls of a component: their texts and the types of their arguments."""
 
 import ast
 import string
@@ -10,7 +10,7 @@ from rtcf_compile.source.modules import Source
 
 @dataclass
 class LogCall:
-    """One call in the source."""
+    """A log call in the source."""
 
     level: str
     text: str
@@ -18,29 +18,29 @@ class LogCall:
     line: int
     function: str
     count: int
-    types: list[str] = field(default_factory=list)  # scalars; known when it has been compiled
+    types: list[str] = field(default_factory=list)  # scalar types, set when the call is compiled
 
 
 class Logs:
-    """All log calls of a component class, by number."""
+    """The log calls of a component class, by number."""
 
     def __init__(self, component: str) -> None:
-        """Those of a class of that name."""
+        """Create an empty list for the component class of this name."""
         self.component = component
         self.calls: list[LogCall] = []
 
     def add(self, level: str, node: ast.Call, source: Source) -> int:
-        """Note a call; return its number."""
+        """Add a call; return its number."""
         text = node.args[0] if node.args else None
         if not isinstance(text, ast.Constant) or not isinstance(text.value, str):
             raise at(
                 source.file,
                 node,
-                "a log call has a constant text",
+                "a log call needs a constant text",
                 f'write self.{level}("x {{}}", x)',
             )
         if node.keywords:
-            raise at(source.file, node, "a log call has no named arguments", "give them in order")
+            raise at(source.file, node, "a log call takes no named arguments", "give them in order")
         count = len(node.args) - 1
         if count > 8:
             raise at(source.file, node, "has more than 8 arguments", "write two calls")
@@ -50,12 +50,12 @@ class Logs:
         return len(self.calls) - 1
 
     def symbol(self, number: int) -> str:
-        """Return the name of the C function that a call becomes."""
+        """Return the symbol of the C function for a call."""
         return f"rtcf_log_{self.component}_{number}"
 
 
 def with_name(text: str, number: int, name: str) -> str | None:
-    """Return a format with a name in the place of one of its {}; None where fields have numbers."""
+    """Return a format with one {} replaced by a name; None if fields are numbered or named."""
     result, place = "", 0
     try:
         parts = list(string.Formatter().parse(text))

@@ -1,4 +1,4 @@
-"""The methods of a component class as Python finds them: its own, those of bases and mixins."""
+"""The methods of a component class in Python's resolution order, with bases and mixins."""
 
 import functools
 import inspect
@@ -11,17 +11,17 @@ from rtcf.component import Component
 
 @dataclass(frozen=True)
 class Method:
-    """A method, a static method or a property of a class; others have no function."""
+    """A method, static method or property of a class; other kinds have no function."""
 
     name: str
     owner: type
-    place: int  # of its class among the component's
+    place: int  # index of the owner in the resolution order
     kind: str
     function: FunctionType | None
 
     @property
     def symbol(self) -> str:
-        """Return the name that its compiled function has in other functions."""
+        """Return the name of its compiled function in other functions."""
         return f"method_{self.place}_{self.name}"
 
 
@@ -29,7 +29,7 @@ class Methods:
     """The methods of one component class."""
 
     def __init__(self, cls: type[Component]) -> None:
-        """Look at a class and its bases."""
+        """Read the methods of a class and its bases."""
         self._classes = [
             each
             for each in cls.__mro__
@@ -37,12 +37,12 @@ class Methods:
         ]
 
     def find(self, name: str, behind: type | None = None) -> Method | None:
-        """Return the method self.name, or super().name in a class."""
+        """Return the method self.name, or super().name in the class `behind`; None if missing."""
         begin = 0 if behind is None else self._classes.index(behind) + 1
         return self._first(name, begin)
 
     def find_of(self, owner: Any, name: str) -> Method | None:
-        """Return the method Owner.name of a base; None for other classes."""
+        """Return the method Owner.name of a base, or None for other classes."""
         if owner not in self._classes:
             return None
         return self._first(name, self._classes.index(owner))

@@ -1,9 +1,9 @@
-"""Functions of NumPy and math that are compiled by overloads of our own: for numbers, vectors and
+"""Helpers for functions of NumPy and math with our own overloads: for numbers, vectors and
 matrices, without BLAS, LAPACK and lists.
 
-Each is registered once, by the functions that it stands for. Called by Python it is NumPy's
-function, except where the order of sums or the C library decides about the last place: there it
-does the same as the overload.
+Each helper is registered with the functions that it replaces. In the interpreter it calls NumPy's
+function, except where the order of sums or the C library determines the last place: there it
+computes as the overload does.
 """
 
 import ctypes
@@ -18,18 +18,18 @@ from rtcf_compile.rewriting import helpers, operators
 
 Function = Callable[..., Any]
 
-# By identity: functions of several modules are equal, or not to be hashed.
+# Compare functions by identity: some are equal to others or cannot be hashed.
 STANDS_FOR: list[tuple[Function, Function]] = []
-# `a.sum(axis=0)`: by the name of the method, with the array as the first argument.
+# The helpers for methods such as `a.sum(axis=0)`, by name; the array is the first argument.
 METHODS: dict[str, Function] = {}
 
 
-# Words among arguments, by their numbers for the functions below: None and True.
+# Text arguments and the values that stand for them in the helpers.
 WORDS = {"left": None, "right": True, "stable": None, "fro": None}
 
 
 def _stands_for(*functions: Function, method: str = "") -> Callable[[Function], Function]:
-    """Register a helper in the place of functions, and of a method of arrays."""
+    """Register a helper that replaces functions and a method of arrays."""
 
     def register(own: Function) -> Function:
         STANDS_FOR.extend((each, own) for each in functions)
@@ -45,19 +45,19 @@ def _stands_for(*functions: Function, method: str = "") -> Callable[[Function], 
 
 @_stands_for(np.array, np.copy)
 def rtcf_array(object: Any, dtype: Any = None) -> Any:
-    """Return a new array of a number, an array, or numbers and arrays in rows."""
+    """Return a new array from a number, an array, or rows of numbers and arrays."""
     return np.array(object, dtype)
 
 
 @_stands_for(np.asarray, np.ascontiguousarray)
 def rtcf_asarray(a: Any, dtype: Any = None) -> Any:
-    """Return an array, or a new array of a list."""
+    """Return an array as it is, or a list as a new array."""
     return np.asarray(a, dtype)
 
 
 @_stands_for(np.diag)
 def rtcf_diag(v: Any, k: Any = 0) -> Any:
-    """Return the matrix with a vector in its diagonal, or the diagonal of a matrix."""
+    """Return a matrix with a vector as its diagonal, or the diagonal of a matrix."""
     return np.array(np.diag(v, k))
 
 
@@ -69,7 +69,7 @@ def rtcf_diagonal(a: Any) -> Any:
 
 @_stands_for(np.linspace)
 def rtcf_linspace(start: Any, stop: Any, num: Any = 50, endpoint: Any = True) -> Any:
-    """Return numbers at the same distance from each other."""
+    """Return evenly spaced numbers."""
     return np.linspace(start, stop, num, endpoint)
 
 
@@ -78,7 +78,7 @@ def rtcf_linspace(start: Any, stop: Any, num: Any = 50, endpoint: Any = True) ->
 
 @_stands_for(np.reshape, method="reshape")
 def rtcf_reshape(a: Any, newshape: Any) -> Any:
-    """Return an array's elements in another shape: a view where NumPy makes one."""
+    """Return the elements of an array in another shape, a view where NumPy returns one."""
     return np.reshape(a, newshape)
 
 
@@ -91,75 +91,75 @@ def rtcf_vector_as(a: Any, shape: Any) -> Any:
 
 @_stands_for(np.ravel, method="ravel")
 def rtcf_ravel(a: Any) -> Any:
-    """Return an array's elements in a row: a view where NumPy makes one."""
+    """Return the elements of an array as a vector, a view where NumPy returns one."""
     return np.ravel(a)
 
 
 @_stands_for(method="flatten")
 def rtcf_flatten(a: Any) -> Any:
-    """Return a copy of an array's elements in a row."""
+    """Return the elements of an array as a new vector."""
     return np.array(np.ravel(a))
 
 
 @_stands_for(np.concatenate)
 def rtcf_concatenate(arrays: Any, axis: Any = 0) -> Any:
-    """Return arrays one after the other."""
+    """Return arrays joined along an axis."""
     return np.concatenate(arrays, axis)
 
 
 @_stands_for(np.hstack)
 def rtcf_hstack(tup: Any) -> Any:
-    """Return vectors one after the other, matrices side by side."""
+    """Return vectors joined, or matrices side by side."""
     return np.hstack(tup)
 
 
 @_stands_for(np.vstack)
 def rtcf_vstack(tup: Any) -> Any:
-    """Return vectors and matrices one below the other."""
+    """Return vectors and matrices below each other."""
     return np.vstack(tup)
 
 
 @_stands_for(np.stack)
 def rtcf_stack(arrays: Any, axis: Any = 0) -> Any:
-    """Return vectors as the rows of a matrix, or as its columns."""
+    """Return vectors as the rows or columns of a matrix."""
     return np.stack(arrays, axis)
 
 
 @_stands_for(np.column_stack)
 def rtcf_column_stack(tup: Any) -> Any:
-    """Return vectors as the columns of a matrix, beside matrices."""
+    """Return vectors, as columns, and matrices side by side."""
     return np.column_stack(tup)
 
 
 @_stands_for(np.roll)
 def rtcf_roll(a: Any, shift: Any) -> Any:
-    """Return a vector whose elements have moved, the last ones to the first places."""
+    """Return a vector with its elements shifted cyclically."""
     return np.roll(a, shift)
 
 
 @_stands_for(np.flip)
 def rtcf_flip(m: Any) -> Any:
-    """Return an array in reverse order, a view."""
+    """Return a view of an array in reverse order."""
     return np.flip(m)
 
 
 @_stands_for(np.diff)
 def rtcf_diff(a: Any) -> Any:
-    """Return the differences of elements that follow each other."""
+    """Return the differences of consecutive elements."""
     return np.diff(a)
 
 
-# One number of many, along all axes or one.
+# Reductions, along all axes or one.
 
 
 def _sequential(a: Any) -> Any:
-    """Return an array in the order of its elements, in which the overload sums it."""
+    """Return a contiguous array, because the overload sums in the order of elements."""
     return np.ascontiguousarray(a) if isinstance(a, np.ndarray) and a.ndim else a
 
 
 @_stands_for(np.sum, method="sum")
 def rtcf_sum(a: Any, axis: Any = None, keepdims: Any = None) -> Any:
-    """Return the sum, in pairs as NumPy has it."""
+    """Return the sum, by NumPy's pairwise summation."""
     return np.sum(_sequential(a), axis=axis, keepdims=bool(keepdims))
 
 
@@ -189,13 +189,13 @@ def rtcf_std(a: Any, axis: Any = None, ddof: Any = 0) -> Any:
 
 @_stands_for(np.max, np.amax, method="max")
 def rtcf_max(a: Any, axis: Any = None, keepdims: Any = None) -> Any:
-    """Return the largest element, NaN if one is."""
+    """Return the largest element; NaN if one is NaN."""
     return np.max(a, axis=axis, keepdims=bool(keepdims))
 
 
 @_stands_for(np.min, np.amin, method="min")
 def rtcf_min(a: Any, axis: Any = None, keepdims: Any = None) -> Any:
-    """Return the smallest element, NaN if one is."""
+    """Return the smallest element; NaN if one is NaN."""
     return np.min(a, axis=axis, keepdims=bool(keepdims))
 
 
@@ -207,19 +207,19 @@ def rtcf_ptp(a: Any, axis: Any = None) -> Any:
 
 @_stands_for(np.argmax, method="argmax")
 def rtcf_argmax(a: Any, axis: Any = None) -> Any:
-    """Return the place of the largest element, or of the first NaN."""
+    """Return the index of the largest element, or of the first NaN."""
     return np.argmax(a, axis=axis)
 
 
 @_stands_for(np.argmin, method="argmin")
 def rtcf_argmin(a: Any, axis: Any = None) -> Any:
-    """Return the place of the smallest element, or of the first NaN."""
+    """Return the index of the smallest element, or of the first NaN."""
     return np.argmin(a, axis=axis)
 
 
 @_stands_for(np.any, method="any")
 def rtcf_any(a: Any, axis: Any = None) -> Any:
-    """Tell whether an element is not 0."""
+    """Tell whether any element is not 0."""
     return np.any(a, axis=axis)
 
 
@@ -231,31 +231,31 @@ def rtcf_all(a: Any, axis: Any = None) -> Any:
 
 @_stands_for(np.count_nonzero)
 def rtcf_count_nonzero(a: Any) -> Any:
-    """Return how many elements are not 0."""
+    """Return the number of elements that are not 0."""
     return np.count_nonzero(a)
 
 
 @_stands_for(np.median)
 def rtcf_median(a: Any) -> Any:
-    """Return the median of all elements, NaN if one is."""
+    """Return the median of all elements; NaN if one is NaN."""
     return np.median(a)
 
 
 @_stands_for(np.trace, method="trace")
 def rtcf_trace(a: Any) -> Any:
-    """Return the sum of a matrix's diagonal, in pairs as NumPy has it."""
+    """Return the sum of the diagonal of a matrix, by NumPy's pairwise summation."""
     return np.trace(a)
 
 
 @_stands_for(np.cumsum, method="cumsum")
 def rtcf_cumsum(a: Any, axis: Any = None) -> Any:
-    """Return the sums up to each element."""
+    """Return the cumulative sums."""
     return np.cumsum(a, axis=axis)
 
 
 @_stands_for(np.cumprod, method="cumprod")
 def rtcf_cumprod(a: Any, axis: Any = None) -> Any:
-    """Return the products up to each element."""
+    """Return the cumulative products."""
     return np.cumprod(a, axis=axis)
 
 
@@ -282,23 +282,23 @@ def rtcf_fill(a: Any, value: Any) -> None:
 
 @_stands_for(np.argsort, method="argsort")
 def rtcf_argsort(a: Any, kind: Any) -> Any:
-    """Return the places of a vector's elements in their order, equal ones as they are."""
+    """Return the indices that sort a vector; the sort is stable."""
     return np.argsort(a, kind="stable")
 
 
 @_stands_for(np.searchsorted, method="searchsorted")
 def rtcf_searchsorted(a: Any, v: Any, side: Any = None) -> Any:
-    """Return where a number, or each of a vector, would stand in a sorted vector."""
+    """Return the insertion indices of a number or a vector in a sorted vector."""
     return np.searchsorted(a, v, "right" if side else "left")
 
 
-# Elements of arrays, and numbers.
+# Element-wise functions.
 
 
 @_stands_for(np.clip, method="clip")
 def rtcf_clip(a: Any, a_min: Any, a_max: Any) -> Any:
-    """Return numbers within bounds; one that is None is none, one that is NaN gives NaN. To older
-    versions of NumPy's a single NaN is no bound.
+    """Return numbers clipped to bounds; None: no bound. A NaN bound gives NaN, as in NumPy 2;
+    NumPy 1 ignores a single NaN bound.
     """
     if a_min is None and a_max is None:
         return np.clip(a, a_min, a_max)
@@ -308,25 +308,25 @@ def rtcf_clip(a: Any, a_min: Any, a_max: Any) -> Any:
 
 @_stands_for(any)
 def rtcf_is_any(values: Any) -> Any:
-    """Tell whether one of several values is true."""
+    """Tell whether any of the values is true."""
     return bool(np.any(np.ravel(values)))
 
 
 @_stands_for(all)
 def rtcf_is_all(values: Any) -> Any:
-    """Tell whether all of several values are true."""
+    """Tell whether all of the values are true."""
     return bool(np.all(np.ravel(values)))
 
 
 @_stands_for(method="astype")
 def rtcf_astype(a: Any, dtype: Any) -> Any:
-    """Return an array with elements of another type; floats become ints towards 0."""
+    """Return an array with elements of another type; floats are rounded towards 0 to ints."""
     return a.astype(dtype)
 
 
 @_stands_for(abs)
 def rtcf_abs(x: Any) -> Any:
-    """Return abs(x) of a number, or of the elements of an array."""
+    """Return abs(x) of a number or of the elements of an array."""
     return abs(x)
 
 
@@ -334,7 +334,7 @@ def rtcf_abs(x: Any) -> Any:
 def rtcf_isclose(
     a: Any, b: Any, rtol: Any = 1e-05, atol: Any = 1e-08, equal_nan: Any = False
 ) -> Any:
-    """Tell which numbers are about equal."""
+    """Return which numbers are equal within tolerances."""
     return np.isclose(a, b, rtol, atol, equal_nan)
 
 
@@ -342,7 +342,7 @@ def rtcf_isclose(
 def rtcf_allclose(
     a: Any, b: Any, rtol: Any = 1e-05, atol: Any = 1e-08, equal_nan: Any = False
 ) -> Any:
-    """Tell whether all numbers are about equal."""
+    """Tell whether all numbers are equal within tolerances."""
     return np.allclose(a, b, rtol, atol, equal_nan)
 
 
@@ -354,31 +354,31 @@ def rtcf_array_equal(a1: Any, a2: Any) -> Any:
 
 @_stands_for(math.isclose)
 def rtcf_math_isclose(a: Any, b: Any, rel_tol: Any = 1e-09, abs_tol: Any = 0.0) -> Any:
-    """Tell whether two numbers are about equal."""
+    """Tell whether two numbers are equal within tolerances."""
     return math.isclose(a, b, rel_tol=rel_tol, abs_tol=abs_tol)
 
 
 @_stands_for(np.round, np.around, method="round")
 def rtcf_np_round(a: Any, decimals: Any = 0) -> Any:
-    """Return numbers rounded to so many decimals, halves to the even one."""
+    """Return numbers rounded to a number of decimals, halves to even."""
     return np.round(a, decimals)
 
 
 @_stands_for(np.nan_to_num)
 def rtcf_nan_to_num(x: Any, nan: Any = 0.0, posinf: Any = None, neginf: Any = None) -> Any:
-    """Return numbers with others in the place of NaN and infinity."""
+    """Return numbers with NaN and infinity replaced."""
     return np.nan_to_num(x, nan=nan, posinf=posinf, neginf=neginf)
 
 
 @_stands_for(np.interp)
 def rtcf_interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None) -> Any:
-    """Return values of a function between the points at which it is known."""
+    """Return linearly interpolated values of a function given by points."""
     return np.interp(x, xp, fp, left, right)
 
 
 @_stands_for(np.polyval)
 def rtcf_polyval(p: Any, x: Any) -> Any:
-    """Return the values of a polynomial, whose highest power is the first."""
+    """Return the values of a polynomial; the coefficient of the highest power is first."""
     return np.polyval(p, x)
 
 
@@ -396,7 +396,7 @@ def rtcf_trapz(y: Any, x: Any = None, dx: Any = 1.0) -> Any:
 
 @_stands_for(np.outer)
 def rtcf_outer(a: Any, b: Any) -> Any:
-    """Return the products of each element with each."""
+    """Return the outer product of two vectors."""
     return np.outer(a, b)
 
 
@@ -410,7 +410,7 @@ def rtcf_cross(a: Any, b: Any) -> Any:
 
 @_stands_for(np.inner, np.vdot)
 def rtcf_inner(a: Any, b: Any) -> Any:
-    """Return the inner product of two vectors, from the first element to the last."""
+    """Return the inner product of two vectors, summed from the first element to the last."""
     if np.ndim(a) != 1 or np.ndim(b) != 1:
         raise ValueError(f"inner of shapes {np.shape(a)} and {np.shape(b)}")
     return helpers.rtcf_matmul(a, b)
@@ -424,13 +424,13 @@ def rtcf_norm(x: Any, ord: Any = None, axis: Any = None) -> Any:
         row = np.ravel(x).astype(np.float64)
         return np.sqrt(helpers.rtcf_matmul(row, row))
     if axis is None and x.ndim != 1:
-        raise ValueError("norm of a matrix: the one of all elements alone")
+        raise ValueError("norm of a matrix: only the Frobenius norm")
     return np.linalg.norm(_sequential(x), ord, axis)
 
 
 @_stands_for(np.linalg.det)
 def rtcf_det(a: Any) -> Any:
-    """Return the determinant, by elimination with row pivots."""
+    """Return the determinant, by Gaussian elimination with row pivots."""
     matrix = np.array(a, np.float64)
     n = matrix.shape[0]
     if matrix.ndim != 2 or matrix.shape[1] != n:
@@ -452,7 +452,7 @@ def rtcf_det(a: Any) -> Any:
 
 @_stands_for(np.linalg.matrix_power)
 def rtcf_matrix_power(a: Any, n: Any) -> Any:
-    """Return a power of a matrix, in NumPy's order of products."""
+    """Return a power of a matrix, with NumPy's order of products."""
     a = np.array(a, np.float64)
     if a.ndim != 2 or a.shape[0] != a.shape[1]:
         raise ValueError(f"matrix_power of shape {a.shape}")
@@ -472,7 +472,7 @@ def rtcf_matrix_power(a: Any, n: Any) -> Any:
 
 
 def rtcf_whole_pow(base: Any, exponent: Any) -> Any:
-    """Return a constant whole power above 0, as a product: squares of squares."""
+    """Return base ** exponent for a constant int above 0, by repeated squaring."""
     result = None
     while exponent > 0:
         if exponent % 2:
@@ -483,7 +483,7 @@ def rtcf_whole_pow(base: Any, exponent: Any) -> Any:
     return result
 
 
-# The C library decides about the last place of these, in the loop as here.
+# The C library computes these in the loop; call it here too, for the same last place.
 
 _LIBM = ctypes.CDLL(ctypes.util.find_library("m") or "libm.so.6")
 
@@ -518,7 +518,7 @@ def _of_the_c_library(function: Function, name: str) -> Function:
     return unary
 
 
-# By the names of NumPy's functions, those of the C library.
+# The names of functions in the C library, by their names in NumPy.
 LIBM = {
     **{name: name for name in ("sin", "cos", "tan", "exp", "exp2", "expm1", "cbrt", "hypot")},
     **{name: name for name in ("log", "log2", "log10", "log1p", "sinh", "cosh", "tanh")},

@@ -1,10 +1,9 @@
-"""Operators as functions, where the compiled one needs more than numba's, or the interpreter's more
-than NumPy's: shifts, division of single numbers by zero, and arrays whose elements are neither
-64 bits nor bools ("narrow").
+"""Functions that replace operators where numba's or NumPy's operator is not sufficient: shifts,
+division of single numbers by zero, and arrays of narrow numbers (elements other than 64 bits or
+bools).
 
-A number of Python with a narrow array has the array's type, as both releases of NumPy have it for
-numbers that fit. Older releases make the array wider for an int that does not fit; NumPy 2 raises,
-and so do these.
+A Python number takes the type of a narrow array, as in NumPy 1 and NumPy 2 for numbers that fit.
+For an int that does not fit, NumPy 1 widens the array; NumPy 2 raises, and so do these functions.
 """
 
 import ast
@@ -16,7 +15,7 @@ import numpy as np
 
 Function = Callable[..., Any]
 WIDE = frozenset(np.dtype(each) for each in (np.bool_, np.int64, np.float64))
-# Shifts by more have no bit left, and Python makes no endless number of it.
+# A longer shift leaves no bit of an int64. The limit keeps Python ints small.
 _LONGEST_SHIFT = 4096
 _DIVISIONS = (operator.truediv, operator.floordiv, operator.mod)
 _COMPARISONS: tuple[Function, ...] = (
@@ -26,38 +25,38 @@ _COMPARISONS: tuple[Function, ...] = (
 
 
 def is_narrow(dtype: np.dtype[Any]) -> bool:
-    """Tell whether elements are numbers of other types than Python's."""
+    """Tell whether a type is narrow: other than the types of Python numbers."""
     return dtype not in WIDE
 
 
 def fits(number: Any, dtype: np.dtype[Any]) -> bool:
-    """Tell whether ints of a type have a number."""
+    """Tell whether a number fits an int type."""
     limits = np.iinfo(dtype)
     return bool(limits.min <= number <= limits.max)
 
 
 def as_element(number: Any, dtype: np.dtype[Any]) -> Any:
-    """Return a number as an element of an array; OverflowError where ints do not have it."""
+    """Return a number as an element of an array; OverflowError if it does not fit an int type."""
     if dtype.kind in "iu" and not fits(number, dtype):
         raise OverflowError(f"a number does not fit {dtype.name}")
     return dtype.type(number)
 
 
 def _alike(number: Any, array: Any, operation: Function | None) -> Any:
-    """Return a number of Python as an array's elements are, where those are narrow."""
+    """Return a Python number converted to the element type of a narrow array."""
     if type(number) not in (int, float) or not isinstance(array, np.ndarray):
         return number
     if not is_narrow(array.dtype) or (type(number) is float and array.dtype.kind != "f"):
         return number
     if array.dtype.kind in "iu" and operation in _COMPARISONS:
-        return number  # compared as they are
+        return number  # compare without conversion
     if array.dtype.kind in "iu" and operation is operator.truediv:
         return float(number)
     return as_element(number, array.dtype)
 
 
 def alike(left: Any, right: Any, operation: Function | None = None) -> tuple[Any, Any]:
-    """Return two operands as both releases of NumPy take them."""
+    """Return two operands converted as in NumPy 1 and NumPy 2."""
     return _alike(left, right, operation), _alike(right, left, operation)
 
 
@@ -94,7 +93,7 @@ def _stored(operation: Function) -> Function:
         return operation(element, value)
 
     change.__name__ = f"rtcf_element_{operation.__name__.strip('_')}"
-    change.__doc__ = "Return what `x[i] += value` sets the element to."
+    change.__doc__ = "Return the new element for `x[i] += value`."
     return change
 
 
@@ -107,7 +106,7 @@ def _extreme(function: Function) -> Function:
     return extreme
 
 
-# By the operators' nodes.
+# The operators by node type.
 BINARY: dict[type[ast.operator], Function] = {
     **{ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul},
     **{ast.Div: operator.truediv, ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod},
@@ -123,24 +122,24 @@ COMPARISONS: dict[type[ast.cmpop], Function] = {
 }
 EXTREMES: tuple[Function, ...] = (np.minimum, np.maximum)
 _OPERATORS: tuple[Function, ...] = (*BINARY.values(), *_COMPARISONS)
-# Functions in the place of operators, by these.
+# The functions that replace operators.
 OF: dict[Function, Function] = {
     **{each: _operated(each) for each in _OPERATORS},
     **{each: _shifted(each) for each in SHIFTS.values()},
     **{each: _extreme(each) for each in EXTREMES},
 }
-# The nodes of operators that become functions: always, where arrays are narrow, and in the
-# comparison, whose single numbers divide as compiled ones do.
+# The nodes of operators that become functions: always; with narrow numbers; and in the comparison,
+# where single numbers must divide as in compiled code.
 ALWAYS: frozenset[type[ast.AST]] = frozenset(SHIFTS)
 NARROW: frozenset[type[ast.AST]] = frozenset((*BINARY, *SHIFTS, *COMPARISONS, ast.USub))
 COMPARED: frozenset[type[ast.AST]] = frozenset(
     node for node, operation in BINARY.items() if operation in _DIVISIONS
 )
-# `x[i] += value` of an element; what does not fit it goes round, as it does when it is stored.
+# `x[i] += value` of an element. A result that does not fit wraps around when it is stored.
 OF_ELEMENTS: dict[type[ast.operator], Function] = {
     node: _stored(operation) for node, operation in BINARY.items() if operation not in _DIVISIONS
 }
-# Functions of NumPy that are operators.
+# NumPy functions that act as operators.
 UFUNCS: dict[Function, Function] = {
     **{np.add: operator.add, np.subtract: operator.sub, np.multiply: operator.mul},
     **{np.true_divide: operator.truediv, np.floor_divide: operator.floordiv},
@@ -156,7 +155,7 @@ SHIFT_UFUNCS: dict[Function, Function] = {
 
 
 def rtcf_plain(value: Any) -> Any:
-    """Return a number of the record as Python's own."""
+    """Return a number of the record as a Python number."""
     return value
 
 

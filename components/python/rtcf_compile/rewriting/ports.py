@@ -1,7 +1,7 @@
-"""Members of `self` as fields of the component's record: ports, their messages, queues.
+"""Rewrites ports, their messages and queues to fields of the component's record.
 
-`self.u.value` becomes the field `self.u`, `self.twist.value.linear.x` one of its own,
-`self.goals.pop()` a step in a ring.
+`self.u.value` becomes the field `self.u`, `self.twist.value.linear.x` a field of its own, and
+`self.goals.pop()` a step in a ring buffer.
 """
 
 import ast
@@ -23,12 +23,12 @@ _QUEUE_FIELDS = {"size": "__count", "dropped": "__dropped", "connected": "__conn
 
 
 class Ports(Products):
-    """Puts fields of the record in the place of ports."""
+    """Replaces ports by fields of the record."""
 
     def __init__(
         self, source: Source, description: Description, functions: frozenset[type[ast.AST]]
     ) -> None:
-        """Rewrite a method of a class that has these members; see Products."""
+        """Rewrite a method of a class with these members; see Products."""
         self._description = description
         self._self = source.tree.args.args[0].arg if source.tree.args.args else ""
         super().__init__(source, functions)
@@ -36,12 +36,12 @@ class Ports(Products):
         self.touched: dict[str, ast.AST] = {}
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
-        """`self.z[2]`, whose size is declared."""
+        """Check the index of a member with a declared size, such as `self.z[2]`."""
         self._check_index(node)
         return super().visit_Subscript(node)
 
     def _check_index(self, node: ast.Subscript) -> None:
-        """Refuse constant indices beyond the declared sizes."""
+        """Reject constant indices beyond declared sizes."""
         base = node.value
         is_value = isinstance(base, ast.Attribute) and base.attr == "value"
         owner = base.value if is_value else base  # type: ignore[attr-defined]
@@ -51,7 +51,7 @@ class Ports(Products):
                 check_index(node, member.type.shape, ast.unparse(base), self.source.file)
 
     def _enum_of(self, node: ast.expr) -> type[enum.IntEnum] | None:
-        """Return the enum that a member, or the value of a port, is declared as."""
+        """Return the declared enum of a member or of the value of a port, or None."""
         is_value = isinstance(node, ast.Attribute) and node.attr == "value"
         owner = node.value if is_value else node  # type: ignore[attr-defined]
         if not isinstance(owner, ast.Attribute) or not self._is_self(owner.value):
@@ -72,9 +72,9 @@ class Ports(Products):
                 raise self.mistake(node, what, f"write self.{port.name}.value.{node.attr}")
             raise self.mistake(node, what, f"use {has}")
         if isinstance(node.ctx, ast.Store) and port.kind is Input:
-            raise self.mistake(node, "an Input is only read", "write an Output")
+            raise self.mistake(node, "an Input is read-only", "write an Output")
         if isinstance(node.ctx, ast.Store):
-            what = "a port's value is not set"
+            what = "a port's value cannot be assigned"
             raise self.mistake(node, what, f"write self.{port.name}.write(…)")
         if port.message and node.attr == "value":
             raise self._no_number(node, port.message, ())
@@ -90,8 +90,8 @@ class Ports(Products):
         return super()._is_uncertain(node, names)
 
     def _read(self, name: str, kind: ValueType) -> ast.expr:
-        """Return a field's value: a number as Python's own, an array as a view, whose type has no
-        sizes.
+        """Return the value of a field: a number as a Python number, an array as a view, whose type
+        has no sizes.
         """
         field: ast.expr = self._field(name, ast.Load())
         if kind.shape:
@@ -99,14 +99,14 @@ class Ports(Products):
         return call_of("rtcf_plain", field) if is_narrow(kind.scalar) else field
 
     def _as_enum(self, field: ast.expr, kind: ValueType, checked: bool = False) -> ast.expr:
-        """Return an int of the record as the enum that it is declared as."""
+        """Return an int of the record as its declared enum."""
         if kind.enumeration is None:
             return field
         function = "rtcf_enum" if checked else "rtcf_member"
         return call_of(function, field, self._enum(kind.enumeration))
 
     def _message(self, node: ast.AST) -> tuple[Member | None, tuple[str, ...]]:
-        """Return the port and the path of `self.port.value.path`, if it carries a message."""
+        """Return the port and the path of `self.port.value.path` if the port carries a message."""
         names: list[str] = []
         while isinstance(node, ast.Attribute):
             port = self._member(node)
@@ -117,7 +117,7 @@ class Ports(Products):
         return None, ()
 
     def _message_part(self, node: ast.AST) -> tuple[Member, tuple[str, ...]] | None:
-        """Return the port and the path of a message, or of a message in it."""
+        """Return the port and the path of a message or of a nested message, or None."""
         names: list[str] = []
         while isinstance(node, ast.Attribute):
             port = self._member(node)
@@ -129,16 +129,14 @@ class Ports(Products):
         return None
 
     def _copied(self, node: ast.stmt, target: ast.expr, value: ast.expr) -> list[ast.stmt] | None:
-        """Return the assignments of all numbers of a message, or of a part of one; None for
-        others.
-        """
+        """Return assignments that copy a message or a part of one; None for other values."""
         mine, theirs = self._message_part(target), self._message_part(value)
         if mine is None or theirs is None:
             return None
         (port, path), (source, place) = mine, theirs
         assert port.message is not None and source.message is not None
         if port.kind is Input:
-            raise self.mistake(target, "is of an Input, which is only read", "set an Output")
+            raise self.mistake(target, "belongs to an Input, which is read-only", "set an Output")
         try:
             pairs = port.message.pairs(path, source.message, place)
         except TypeError as error:
@@ -156,7 +154,7 @@ class Ports(Products):
         raise NotImplementedError
 
     def _without_aliases(self, tree: ast.FunctionDef) -> None:
-        """Put messages in the place of variables that stand for them: `m = self.twist.value`."""
+        """Replace variables that stand for messages, as in `m = self.twist.value`."""
         known: dict[str, ast.expr] = {}
         while True:
             _Named(known).visit(tree)
@@ -176,22 +174,22 @@ class Ports(Products):
         _Dropped(known).visit(tree)
 
     def _check_alias(self, tree: ast.FunctionDef, name: str, places: list[ast.Assign]) -> None:
-        """Refuse a variable that is not always the same message."""
+        """Reject a variable that does not always stand for the same message."""
         own = [each.targets[0] for each in places]
         for each in ast.walk(tree):
             if not isinstance(each, ast.Name) or isinstance(each.ctx, ast.Load):
                 continue
             if each.id == name and not any(each is target for target in own):
-                raise self.mistake(each, f"{name} is a message", "take another name")
+                raise self.mistake(each, f"{name} is a message", "use another name")
         for place in places:
             if ast.unparse(place.value) != ast.unparse(places[0].value):
-                raise self.mistake(place, f"{name} is once another message", "take another name")
+                raise self.mistake(place, f"{name} stands for two messages", "use another name")
 
     def _part(self, node: ast.Attribute, port: Member, path: tuple[str, ...]) -> ast.AST:
         assert port.message is not None
         leaf = port.message.leaf(path)
         if leaf is None:
-            # An attribute of an array, as .shape, belongs to what is before it.
+            # An attribute of an array field, such as .shape.
             if port.message.leaf(path[:-1]) is not None:
                 return super().visit_Attribute(node)
             raise self._no_number(node, port.message, path)
@@ -204,12 +202,12 @@ class Ports(Products):
         return like(node, ast.Subscript(field, ast.Slice(None, count), ast.Load()))
 
     def _settable_part(self, target: ast.expr) -> tuple[str, ValueType] | None:
-        """Return the field and the type of a part of a message that is set."""
+        """Return the field and the type of a part of a message that is assigned, or None."""
         port, path = self._message(target)
         if port is None or port.message is None:
             return None
         if port.kind is Input:
-            raise self.mistake(target, "is of an Input, which is only read", "set an Output")
+            raise self.mistake(target, "belongs to an Input, which is read-only", "set an Output")
         leaf = port.message.leaf(path)
         if leaf is None:
             raise self._no_number(target, port.message, path)
@@ -224,15 +222,15 @@ class Ports(Products):
         if path in message.others:
             return self.mistake(node, f"{name} is a list of messages", "read it in C++")
         if below := message.below(path):
-            return self.mistake(node, f"{name} is no number", f"use .{', .'.join(below)}")
+            return self.mistake(node, f"{name} is not a number", f"use .{', .'.join(below)}")
         has = ", .".join(message.below(path[:-1]))
-        return self.mistake(node, f"{name} is not there", f"use .{has}")
+        return self.mistake(node, f"{name} does not exist", f"use .{has}")
 
     def _queue(self, node: ast.Attribute, port: Member) -> ast.AST:
-        """`self.goals.front`, `.size`, `.age`, `.dropped`, `.connected`."""
+        """Rewrite `self.goals.front`, `.size`, `.age`, `.dropped`, `.connected`."""
         name = port.name
         if isinstance(node.ctx, ast.Store):
-            raise self.mistake(node, "a queue is only read", f"remove one by self.{name}.pop()")
+            raise self.mistake(node, "a queue is read-only", f"remove one with self.{name}.pop()")
         ring = [
             self._field(f"{name}{each}", ast.Load())
             for each in ("__times" if node.attr == "age" else "", "__oldest", "__count")
@@ -272,7 +270,7 @@ class Ports(Products):
         return len(member.type.shape), member.type.is_float
 
     def _touch(self, node: ast.AST, name: str) -> None:
-        """Note what prepare cannot know: all but parameters, what derives from them, constants."""
+        """Record the use of a member that prepare cannot read."""
         self.touched.setdefault(name, node)
 
     def _field(self, name: str, context: ast.expr_context | None = None) -> ast.Attribute:
@@ -292,13 +290,13 @@ class Ports(Products):
 
 
 def a_kind(member: Member) -> str:
-    """Return a member's kind with its article."""
+    """Return the kind of a member with its article."""
     kind = member.kind.__name__
     return f"{'an' if kind[0] in 'IO' else 'a'} {kind}"
 
 
 class _Named(ast.NodeTransformer):
-    """Puts expressions in the place of variables that are read."""
+    """Replaces variables by expressions where they are read."""
 
     def __init__(self, known: dict[str, ast.expr]) -> None:
         self._known = known

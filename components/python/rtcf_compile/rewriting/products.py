@@ -1,5 +1,5 @@
-"""What holds in hooks and in other functions alike: `@`, np.linalg and assignment to slices become
-the functions of `helpers`, constants their values.
+"""The rewriting that hooks and other functions share: `@`, np.linalg and assignment to slices
+become calls of helpers, and constants become their values.
 """
 
 import ast
@@ -25,47 +25,47 @@ _OPERATORS: dict[type[ast.AST], operators.Function] = {
     node: operators.OF[operation] for by_node in _BY_NODE for node, operation in by_node.items()
 }
 _STANDS_FOR = [*INSTEAD.items(), *numpy_functions.STANDS_FOR]
-# Temporaries of a cycle in the real-time thread, bytes.
+# Size of the arena for temporary arrays of a hook in the real-time thread, bytes.
 ARENA = 64 * 1024
 _NEW = (np.zeros, np.ones, np.empty, np.full, np.eye, np.identity)
 _PLAIN = (*_NEW, np.zeros_like, np.ones_like, np.empty_like, np.full_like, np.arange)
 _PLAIN_METHODS = ("copy", "fill", "flatten", "item", "view")
 _DTYPES = {float: np.float64, int: np.int64, bool: np.bool_}
-# Functions of NumPy whose argument of that place is a type of elements.
+# NumPy functions with the position of their element type argument.
 _TYPED = {np.zeros: 1, np.ones: 1, np.empty: 1, np.full: 2, np.zeros_like: 1, np.ones_like: 1}
 
 
 class Products(ast.NodeTransformer):
-    """Puts the helpers in the place of `@`, np.linalg and assignment to slices."""
+    """Replaces `@`, np.linalg and assignment to slices by calls of helpers."""
 
     def __init__(
         self, source: Source, functions: frozenset[type[ast.AST]] = operators.ALWAYS
     ) -> None:
-        """Rewrite a function of that source; `functions`: the operators that become some."""
+        """Rewrite a function; `functions`: the operators that become calls of functions."""
         self.source = source
         self._functions = functions
         self.constants: dict[str, Any] = {}
-        # Seen before anything is rewritten.
+        # These read the tree before it is rewritten.
         self._counters = self._find_counters()
         self._lists: set[str] = set()
         self._lists = self._find_lists()
         self._uncertain = self._find_uncertain()
         self.large: list[ast.AST] = []
-        # Calls that numba may compile to functions no loop has.
+        # Calls that may need functions that the loop does not have.
         self.others: list[ast.Call] = []
 
     def mistake(self, node: ast.AST, what: str, way_out: str) -> Exception:
-        """Return a mistake at a node."""
+        """Return an error at a node."""
         return at(self.source.file, node, what, way_out)
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
-        """`GAINS.kp` of a dataclass of constants, `Mode.RUN` of an enum."""
+        """Rewrite `GAINS.kp` of a dataclass of constants, `Mode.RUN` of an enum."""
         owner = resolve(node.value, self.source)
         if isinstance(member := resolve(node, self.source), enum.IntEnum):
             return like(node, ast.Attribute(self._enum(type(member)), member.name, ast.Load()))
         if node.attr == "name" and (isinstance(owner, enum.Enum) or self._is_enum(node.value)):
             raise self.mistake(
-                node, "text is not made in the cycle", 'log it: self.info("{}", self.mode.name)'
+                node, "text cannot be built in the cycle", 'log it: self.info("{}", self.mode.name)'
             )
         if owner is not None and not isinstance(node.ctx, ast.Load):
             name = ast.unparse(node.value)
@@ -89,17 +89,17 @@ class Products(ast.NodeTransformer):
         return False
 
     def visit(self, node: ast.AST) -> Any:
-        """Put `y := x` before the statement that it stands in."""
+        """Move `y := x` before the statement that contains it."""
         if isinstance(node, ast.stmt) and (before := self._before(node)):
             return self.statements(before)
         return super().visit(node)
 
     def visit_NamedExpr(self, node: ast.NamedExpr) -> ast.AST:
-        """`y := x` that is not always computed, or comes after a use of y."""
-        raise self.mistake(node, "a := within an expression", "write it as a statement before")
+        """Reject `y := x` that is not always computed or follows a use of y."""
+        raise self.mistake(node, "a := inside an expression", "write it as a statement before")
 
     def _before(self, node: ast.stmt) -> list[ast.stmt] | None:
-        """Return a statement with its `y := x` as statements before it; None without."""
+        """Return a statement preceded by its `y := x` as statements; None if it has none."""
         field = "test" if isinstance(node, ast.If | ast.While) else "value"
         value = getattr(node, field, None)
         if not isinstance(value, ast.expr) or not _has_walrus(value):
@@ -118,7 +118,7 @@ class Products(ast.NodeTransformer):
         return [*before, new]
 
     def _without_walrus(self, node: ast.expr, is_test: bool) -> tuple[list[ast.stmt], ast.expr]:
-        """Return the assignments of `y := x` in an expression, and the expression without them."""
+        """Return the `y := x` of an expression as assignments, and the expression without them."""
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
             before, operand = self._without_walrus(node.operand, True)
             return before, like(node, ast.UnaryOp(node.op, operand))
@@ -138,7 +138,7 @@ class Products(ast.NodeTransformer):
         found: list[ast.stmt] = []
 
         class First(ast.NodeTransformer):
-            """Takes out the parts that are computed in any case, in the order of the source."""
+            """Extracts assignments that are always computed, in source order."""
 
             def visit_BoolOp(self, each: ast.BoolOp) -> ast.AST:
                 each.values[0] = self.visit(each.values[0])
@@ -162,7 +162,7 @@ class Products(ast.NodeTransformer):
             calls = isinstance(each, ast.Call) and any(
                 _is_before(each, other) and not _contains(each, other) for other in found
             )
-            # A member that a method sets is read before.
+            # The expression reads a member before a method that may set it.
             reads = isinstance(each, ast.Attribute) and any(
                 _is_before(each, other) and self._changes(other.value, True)  # type: ignore[attr-defined]
                 for other in found
@@ -176,12 +176,12 @@ class Products(ast.NodeTransformer):
         return found, new
 
     def visit_Match(self, node: ast.Match) -> list[ast.stmt]:
-        """`match x:` becomes if and elif."""
+        """Rewrite `match x:` to if and elif."""
         place = f"{node.lineno}_{node.col_offset}"
         before: list[ast.stmt] = []
 
         def named(value: ast.expr, name: str) -> ast.expr:
-            """Return a subject, or its parts, by names."""
+            """Assign a subject, or its parts, to variables; return these."""
             if isinstance(value, ast.Tuple | ast.List):
                 parts = [named(each, f"{name}_{k}") for k, each in enumerate(value.elts)]
                 return ast.Tuple(parts, ast.Load())
@@ -214,7 +214,7 @@ class Products(ast.NodeTransformer):
     def _pattern(
         self, pattern: ast.pattern, subject: ast.expr
     ) -> tuple[list[ast.expr], list[tuple[str, ast.expr]]]:
-        """Return the conditions of a pattern, and the names that it sets."""
+        """Return the conditions of a pattern and the names that it sets."""
         value = copy.deepcopy(subject)
         if isinstance(pattern, ast.MatchValue):
             return [like(pattern, ast.Compare(value, [ast.Eq()], [pattern.value]))], []
@@ -248,11 +248,11 @@ class Products(ast.NodeTransformer):
                 )
             return [ast.Constant(False)], []
         raise self.mistake(
-            pattern, "a pattern that takes apart", "match numbers, enums, or (a, b) by (1, _)"
+            pattern, "a pattern that unpacks", "match numbers, enums, or (a, b) with (1, _)"
         )
 
     def visit_Compare(self, node: ast.Compare) -> ast.AST:
-        """`x in (1, 2)`, and comparison with a list."""
+        """Rewrite `x in (1, 2)` and comparisons with lists."""
         contained = node.comparators[0]
         if (
             len(node.ops) == 1
@@ -284,8 +284,8 @@ class Products(ast.NodeTransformer):
         return node
 
     def _may_be_none(self, node: ast.expr) -> bool:
-        """Tell whether a comparison has to look for None: of a variable that is given, or set to
-        an optional value. Types are not known here.
+        """Tell whether a comparison must check for None: a variable that is a parameter, or is set
+        to an optional value. Types are not known here.
         """
         return isinstance(node, ast.Name) and node.id in self._uncertain
 
@@ -312,13 +312,13 @@ class Products(ast.NodeTransformer):
         return isinstance(node, ast.Constant) and node.value is None
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
-        """`a @ b`, `a ** b`."""
+        """Rewrite `a @ b`, `a ** b` and other operators that become functions."""
         if (of_lists := self._of_lists(node)) is not None:
             return of_lists
         self.generic_visit(node)
         if isinstance(node.op, ast.MatMult):
             return like(node, call_of("rtcf_matmul", node.left, node.right))
-        # A constant power is a product, which has a value everywhere.
+        # A constant power becomes a product, which never raises.
         if isinstance(node.op, ast.Pow):
             power = _power(node.right)
             return like(node, call_of(power, node.left, node.right))
@@ -327,7 +327,7 @@ class Products(ast.NodeTransformer):
         return node
 
     def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.AST:
-        """`-a`."""
+        """Rewrite `-a`."""
         is_constant = isinstance(node.operand, ast.Constant)
         self.generic_visit(node)
         if type(node.op) not in self._functions or is_constant:
@@ -335,11 +335,11 @@ class Products(ast.NodeTransformer):
         return like(node, call_of("rtcf_negative", node.operand))
 
     def visit_List(self, node: ast.List) -> ast.AST:
-        """`[1.0, x]`, whose size is constant."""
+        """Rewrite a list of constant size to a tuple."""
         if isinstance(node.ctx, ast.Load):
             if not node.elts:
                 raise self.mistake(
-                    node, "a list that grows allocates", "use an array of State and a count"
+                    node, "a list that grows allocates memory", "use a State array and a count"
                 )
             numbers = [type(each.value) for each in node.elts if isinstance(each, ast.Constant)]
             mixed = len(numbers) == len(node.elts) and set(numbers) == {int, float}
@@ -351,7 +351,7 @@ class Products(ast.NodeTransformer):
         return node
 
     def _is_list(self, node: ast.expr) -> bool:
-        """Tell whether an expression is a list."""
+        """Tell whether an expression is known to be a list."""
         if isinstance(node, ast.Name):
             if node.id in self.source.function.__code__.co_varnames:
                 return node.id in self._lists
@@ -365,7 +365,7 @@ class Products(ast.NodeTransformer):
         return isinstance(node, ast.List)
 
     def _of_lists(self, node: ast.BinOp) -> ast.AST | None:
-        """`[0.0] * 3`, `[1.0] + values`, `x + [1.0, 2.0]`."""
+        """Rewrite `[0.0] * 3`, `[1.0] + values`, `x + [1.0, 2.0]`; return None for others."""
         left, right = self._is_list(node.left), self._is_list(node.right)
         if not left and not right:
             return None
@@ -375,9 +375,11 @@ class Products(ast.NodeTransformer):
             values, times = (node.left, node.right) if left else (node.right, node.left)
             count = self._constant(times)
             if not isinstance(count, int) or not isinstance(values, ast.List) or count < 1:
-                raise self.mistake(node, "repeats a list by a variable", "write its elements")
+                raise self.mistake(
+                    node, "repeats a list a variable number of times", "write its elements"
+                )
             if self._acts(values, surely=True):
-                raise self.mistake(node, "repeats calls", "give their values names before")
+                raise self.mistake(node, "repeats calls", "set variables to their results before")
             elements = [copy.deepcopy(each) for _ in range(count) for each in values.elts]
             return self.visit(like(node, ast.List(elements, ast.Load())))  # type: ignore[no-any-return]
         if isinstance(node.op, ast.Add) and left and right:
@@ -389,12 +391,12 @@ class Products(ast.NodeTransformer):
             sides = [self.visit(self._arrays(each)) for each in (node.left, node.right)]
             return like(node, call_of("rtcf_matmul", *sides))
         if type(node.op) not in OF_LISTS:
-            raise self.mistake(node, "is not done with a list", "use np.array([…])")
+            raise self.mistake(node, "is not compiled for a list", "use np.array([…])")
         helper = OF_LISTS[type(node.op)].__name__
         return like(node, call_of(helper, self.visit(node.left), self.visit(node.right)))
 
     def _constant(self, node: ast.expr) -> Any:
-        """Return the value of an expression of constants, or None."""
+        """Return the value of a constant expression, or None."""
         names = {each.id for each in ast.walk(node) if isinstance(each, ast.Name)}
         if names & set(self.source.function.__code__.co_varnames):
             return None
@@ -407,7 +409,7 @@ class Products(ast.NodeTransformer):
             return None
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
-        """`np.linalg.solve(a, b)`, `a.dot(b)`."""
+        """Rewrite calls such as `np.linalg.solve(a, b)` and `a.dot(b)`."""
         target = resolve(node.func, self.source)
         if target is math.log and len(node.args) == 2 and not node.keywords:
             parts = [like(node, ast.Call(node.func, [each], [])) for each in node.args]
@@ -434,14 +436,14 @@ class Products(ast.NodeTransformer):
                 return self._instead(node, operators.OF[of], node.args)
         if isinstance(target, np.ufunc) and len(node.args) + len(node.keywords) > target.nin:
             raise self.mistake(
-                node, f"{target.__name__} has an argument too many", "set what it returns: x[:] = …"
+                node, f"{target.__name__} has too many arguments", "set its result: x[:] = …"
             )
         if isinstance(target, np.ufunc) and len(node.args) < target.nin:
             what = f"{target.__name__} takes {target.nin} arguments"
             raise self.mistake(node, what, "give all of them")
         if target in (max, min, sum) and node.keywords:
             way_out = f"use np.{target.__name__}, np.argmax or a loop"
-            raise self.mistake(node, f"{target.__name__} has no {node.keywords[0].arg}", way_out)
+            raise self.mistake(node, f"{target.__name__} takes no {node.keywords[0].arg}", way_out)
         if isinstance(node.func, ast.Attribute) and (
             target is None or isinstance(resolve(node.func.value, self.source), np.ndarray)
         ):
@@ -466,7 +468,7 @@ class Products(ast.NodeTransformer):
         ):
             raise self.mistake(
                 node,
-                "calls LAPACK, which allocates",
+                "calls LAPACK, which allocates memory",
                 "use np.linalg.solve, inv, cholesky, det or norm",
             )
         if self._is_other(node, target):
@@ -478,7 +480,7 @@ class Products(ast.NodeTransformer):
         return node
 
     def _is_other(self, node: ast.Call, target: Any) -> bool:
-        """Tell whether nothing of ours stands for a function of NumPy, or a method of arrays."""
+        """Tell whether no helper replaces a NumPy function or a method of arrays."""
         if target is None:
             return isinstance(node.func, ast.Attribute) and node.func.attr not in _PLAIN_METHODS
         if isinstance(target, np.ufunc | type) or any(target is each for each in _PLAIN):
@@ -486,7 +488,7 @@ class Products(ast.NodeTransformer):
         return (getattr(target, "__module__", None) or "numpy").startswith("numpy")
 
     def _bytes(self, node: ast.Call, target: Any) -> int:
-        """Return how large a new array of constant size is."""
+        """Return the size of a new array, bytes; 0 if it is not constant."""
         if not node.args or not any(target is each for each in _NEW):
             return 0
         size = self._constant(node.args[0])
@@ -498,10 +500,10 @@ class Products(ast.NodeTransformer):
         return 8 * math.prod(sizes)
 
     def _reversed(self, node: ast.Call, of: ast.expr) -> ast.AST:
-        """`reversed(range(n))`, `reversed(x)` of a vector."""
+        """Rewrite `reversed(range(n))`, and `reversed(x)` of a vector."""
         if isinstance(of, ast.Call) and resolve(of.func, self.source) is range:
             if not 1 <= len(of.args) <= 2:
-                raise self.mistake(node, "reverses a range with steps", "write its numbers so")
+                raise self.mistake(node, "reverses a range with steps", "write the reverse range")
             low = of.args[0] if len(of.args) == 2 else ast.Constant(0)
             bounds = [ast.BinOp(each, ast.Sub(), ast.Constant(1)) for each in (of.args[-1], low)]
             step = ast.UnaryOp(ast.USub(), ast.Constant(1))
@@ -509,7 +511,7 @@ class Products(ast.NodeTransformer):
         return like(node, call_of("rtcf_flip", self.visit(of)))
 
     def _method(self, node: ast.Call, called: ast.Attribute) -> ast.AST:
-        """`a.sum(axis=0)`."""
+        """Rewrite a method call such as `a.sum(axis=0)`."""
         helper, arguments = numpy_functions.METHODS[called.attr], node.args
         if called.attr == "reshape" and len(arguments) > 1:
             arguments = [like(node, ast.Tuple(arguments, ast.Load()))]
@@ -518,7 +520,7 @@ class Products(ast.NodeTransformer):
     def _instead(
         self, node: ast.Call, helper: Callable[..., Any], arguments: Sequence[ast.expr]
     ) -> ast.AST:
-        """Return the call of what stands in the place of a function."""
+        """Return the call of the helper that replaces a function."""
         signature = inspect.signature(helper)
         try:
             named = {each.arg: each.value for each in node.keywords if each.arg}
@@ -550,7 +552,7 @@ class Products(ast.NodeTransformer):
         return self.visit(value)  # type: ignore[no-any-return]
 
     def _dtype(self, node: ast.expr) -> ast.expr:
-        """Return a type of elements as a constant."""
+        """Return an element type as a constant."""
         value: Any = node.value if isinstance(node, ast.Constant) else resolve(node, self.source)
         if value is None:
             return node
@@ -560,13 +562,13 @@ class Products(ast.NodeTransformer):
         except TypeError:
             scalar = np.dtype(object)
         if scalar.kind not in "fiub":
-            raise self.mistake(node, "is no type of a number", "use np.float64, np.int64 or bool")
+            raise self.mistake(node, "is not a number type", "use np.float64, np.int64 or bool")
         name = f"rtcf_dtype_{scalar.name}"
         self.constants[name] = scalar.type
         return like(node, ast.Name(name, ast.Load()))
 
     def _typed(self, node: ast.Call, target: Any) -> None:
-        """Give types of elements as numba knows them: dtype=float."""
+        """Convert element types, such as dtype=float, to constants that numba supports."""
         for each in node.keywords:
             if each.arg == "dtype":
                 each.value = self._dtype(each.value)
@@ -575,7 +577,7 @@ class Products(ast.NodeTransformer):
             node.args[place] = self._dtype(node.args[place])
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
-        """`x[i]`, where i may be an array."""
+        """Rewrite `x[i]`, where i may be an array."""
         node.slice = self._arrays(node.slice)
         parts = list(_parts(node))
         if isinstance(node.ctx, ast.Load) and any(_is_new(each) for each in parts):
@@ -587,14 +589,14 @@ class Products(ast.NodeTransformer):
         return node
 
     def _is_tuple(self, node: ast.Subscript) -> bool:
-        """Tell whether it is an element of a tuple, or of a list, at a variable place."""
+        """Tell whether a node is an element of a tuple or list with a variable index."""
         if isinstance(node.slice, ast.Constant | ast.Slice | ast.UnaryOp):
             return False
         known = self._is_list(node.value) or isinstance(node.value, ast.Tuple)
         return known or isinstance(resolve(node.value, self.source), tuple)
 
     def _arrays(self, node: ast.expr) -> ast.expr:
-        """Return an index, or an operand, with arrays in the place of lists."""
+        """Return an index or an operand with lists converted to arrays."""
         if isinstance(node, ast.Tuple):
             return like(node, ast.Tuple([self._arrays(each) for each in node.elts], ast.Load()))
         if self._is_list(node):
@@ -606,7 +608,7 @@ class Products(ast.NodeTransformer):
         return not _is_view(node) and not self._is_whole(node)
 
     def _with_new_axis(self, node: ast.Subscript, parts: list[ast.expr]) -> ast.AST:
-        """`v[:, None]`, `v[None, :]`: a vector as a column, or as a row."""
+        """Rewrite `v[:, None]` and `v[None, :]`: a vector as a column or a row."""
         others = [each for each in parts if not _is_new(each)]
         if len(parts) > 2 or len(others) > 1 or not all(_is_view(each) for each in others):
             raise self.mistake(node, "a new axis of an array that is no vector", "use np.reshape")
@@ -618,7 +620,7 @@ class Products(ast.NodeTransformer):
         return like(node, call_of("rtcf_vector_as", self.visit(like(node, vector)), shape))
 
     def visit_Assign(self, node: ast.Assign) -> ast.AST | list[ast.stmt]:
-        """`x[1:3] = value`, `x[i] = value`, `a, b = f()`."""
+        """Rewrite `x[1:3] = value`, `x[i] = value`, `a, b = f()`."""
         if (steps := self._steps(node)) is not None:
             return self.statements(steps)
         target = node.targets[0]
@@ -628,7 +630,7 @@ class Products(ast.NodeTransformer):
         return node
 
     def statements(self, statements: Sequence[ast.stmt]) -> list[ast.stmt]:
-        """Return statements rewritten, each as one or several."""
+        """Return rewritten statements."""
         found: list[ast.stmt] = []
         for each in statements:
             new = self.visit(each)
@@ -636,8 +638,9 @@ class Products(ast.NodeTransformer):
         return found
 
     def _steps(self, node: ast.Assign) -> list[ast.stmt] | None:
-        """Return single assignments in the place of one to several targets, values first; None for
-        a single assignment, or one of variables alone.
+        """Return an assignment to several targets as single assignments, values first.
+
+        Return None for a single target, and for variables only.
         """
         place = f"{node.lineno}_{node.col_offset}"
         if len(node.targets) > 1:
@@ -654,7 +657,7 @@ class Products(ast.NodeTransformer):
         if isinstance(values, ast.Tuple | ast.List):
             if len(values.elts) != len(parts):
                 raise self.mistake(
-                    node, f"{len(values.elts)} values for {len(parts)} names", "make them fit"
+                    node, f"{len(values.elts)} values for {len(parts)} names", "use as many names"
                 )
         elif _is_call(values, "rtcf_items"):
             return None
@@ -679,7 +682,7 @@ class Products(ast.NodeTransformer):
         return steps
 
     def _set_part(self, node: ast.Assign, target: ast.Subscript) -> ast.stmt | list[ast.stmt]:
-        """`x[…] = value`: of one element as it is, else by what looks at the index's type."""
+        """Rewrite `x[…] = value`, unless it surely sets one element."""
         parts = list(_parts(target))
         self._check_constant(target)
         self._check_index(target)
@@ -706,10 +709,10 @@ class Products(ast.NodeTransformer):
         return [*before, like(node, ast.Expr(call_of("rtcf_set", base, index, value)))]
 
     def _check_index(self, node: ast.Subscript) -> None:
-        """Refuse constant indices beyond sizes that are declared: see Ports."""
+        """Reject constant indices beyond declared sizes: see Ports."""
 
     def _check_constant(self, target: ast.Subscript) -> None:
-        """Refuse to set elements of constants of the module, and of lists."""
+        """Reject setting elements of module constants and of lists."""
         base: ast.expr = target
         while isinstance(base, ast.Subscript | ast.Attribute):
             base = base.value
@@ -718,16 +721,14 @@ class Products(ast.NodeTransformer):
                 target, f"{base.id} is a constant of the module", "declare a State, or copy it"
             )
         if self._is_list(target.value):
-            raise self.mistake(target, "a list that changes allocates", "use np.array([…])")
+            raise self.mistake(target, "a list that changes allocates memory", "use np.array([…])")
 
     def _known(self, base: ast.expr) -> tuple[int, bool]:
-        """Return how many dimensions an array is declared with, 0 if it is not, and whether its
-        elements are floats.
-        """
+        """Return the declared dimensions, 0 if undeclared, and whether elements are floats."""
         return 0, False
 
     def _is_whole(self, node: ast.expr) -> bool:
-        """Tell whether an index is an int, whatever the types of variables are."""
+        """Tell whether an index is surely an int."""
         if isinstance(node, ast.UnaryOp):
             return isinstance(node.op, ast.USub | ast.UAdd) and self._is_whole(node.operand)
         if isinstance(node, ast.BinOp):
@@ -741,7 +742,7 @@ class Products(ast.NodeTransformer):
         return type(resolve(node, self.source)) is int
 
     def _find_counters(self) -> set[str]:
-        """Return the variables that are set by `for … in range(…)` alone."""
+        """Return the variables that only `for … in range(…)` sets."""
         tree = self.source.tree
         sets = [each.id for each in ast.walk(tree)
                 if isinstance(each, ast.Name) and isinstance(each.ctx, ast.Store)]  # fmt: skip
@@ -761,7 +762,7 @@ class Products(ast.NodeTransformer):
         return found
 
     def visit_AugAssign(self, node: ast.AugAssign) -> ast.AST | list[ast.stmt]:
-        """`x += value`, `x[1:3] += value`, `x @= m`."""
+        """Rewrite `x += value`, `x[1:3] += value`, `x @= m`."""
         before, target = self._steady(node.target, node.value)
         in_parts = isinstance(target, ast.Subscript)
         is_function = type(node.op) in self._functions and type(node.op) not in IN_PLACE
@@ -769,7 +770,7 @@ class Products(ast.NodeTransformer):
             value: ast.expr = ast.BinOp(loaded(target), node.op, node.value)
             if in_parts and self._functions == operators.NARROW:
                 value = changed_elements(loaded(target), node.op, node.value)
-            # An array is changed, whatever names it has.
+            # Change an array in place: other variables may refer to it.
             if isinstance(target, ast.Name) and not isinstance(node.op, ast.MatMult):
                 value = call_of("rtcf_changed", loaded(target), value)
         elif type(node.op) in IN_PLACE:
@@ -781,8 +782,9 @@ class Products(ast.NodeTransformer):
         return [*before, *(new if isinstance(new, list) else [new])]
 
     def _steady(self, target: ast.expr, value: ast.expr) -> tuple[list[ast.stmt], ast.expr]:
-        """Return a target that may be evaluated twice with one effect, and the statements before
-        it: parts of its indices that change something, or that the value may change.
+        """Return a target that can be evaluated twice, and the statements before it.
+
+        The statements evaluate parts of the index that have effects, or that the value may change.
         """
         before: list[ast.stmt] = []
         changes = self._changes(value)
@@ -818,14 +820,14 @@ class Products(ast.NodeTransformer):
         return self.statements(before), target
 
     def _acts(self, node: ast.expr, surely: bool = False) -> bool:
-        """Tell whether an expression has a call or a property: it is to be computed once."""
+        """Tell whether an expression has a call or a property and must be computed only once."""
         return any(
             isinstance(each, ast.Call) or self._is_property(each, surely) for each in ast.walk(node)
         )
 
     def _changes(self, node: ast.expr, surely: bool = False) -> bool:
-        """Tell whether an expression may change members: it calls other functions
-        than those of NumPy and Python, or has a property.
+        """Tell whether an expression may change members: it has a property or calls functions other
+        than those of NumPy and Python.
         """
         calls = [each for each in ast.walk(node) if isinstance(each, ast.Call)]
         targets = [resolve(each.func, self.source) for each in calls]
@@ -834,8 +836,8 @@ class Products(ast.NodeTransformer):
         )
 
     def _is_property(self, node: ast.AST, surely: bool = False) -> bool:
-        """Tell whether a name is a property. The class is not known here: all names of self may
-        be one.
+        """Tell whether a node may be a property. The class is not known here, so any attribute of
+        self may be one.
         """
         return (
             not surely
@@ -858,7 +860,7 @@ def _is_view(index: ast.AST) -> bool:
 
 
 def _reads_members(index: ast.expr) -> bool:
-    """Tell whether an index depends on more than variables and constants."""
+    """Tell whether an index reads attributes or elements."""
     return any(isinstance(each, ast.Attribute | ast.Subscript) for each in ast.walk(index))
 
 
@@ -885,7 +887,7 @@ def _as_bool(node: ast.expr) -> ast.expr:
 
 
 def _all(tests: Sequence[ast.expr]) -> ast.expr:
-    """Return the condition that all of several hold."""
+    """Return the conjunction of conditions."""
     found = [copy.deepcopy(each) for each in tests]
     return found[0] if len(found) == 1 else ast.BoolOp(ast.And(), found)
 
@@ -904,7 +906,7 @@ def _is_range(node: ast.AST) -> bool:
 
 
 def _index(node: ast.expr) -> ast.expr:
-    """Return an index as a tuple; slices become objects."""
+    """Return an index as a tuple, with slices as slice objects."""
     parts = node.elts if isinstance(node, ast.Tuple) else [node]
     return like(node, ast.Tuple([_sliced(each) for each in parts], ast.Load()))
 
@@ -917,7 +919,7 @@ def _sliced(node: ast.expr) -> ast.expr:
 
 
 def changed_elements(target: ast.expr, operation: ast.operator, value: ast.expr) -> ast.expr:
-    """Return what `target += value` sets elements to."""
+    """Return the new elements for `target += value`."""
     helper = operators.OF_ELEMENTS.get(type(operation))
     if helper is None:
         return ast.BinOp(target, operation, value)
@@ -925,7 +927,7 @@ def changed_elements(target: ast.expr, operation: ast.operator, value: ast.expr)
 
 
 def _power(exponent: ast.expr) -> str:
-    """Return the helper for a power with that exponent."""
+    """Return the name of the helper for a power with this exponent."""
     is_negative = isinstance(exponent, ast.UnaryOp) and isinstance(exponent.op, ast.USub)
     number = exponent.operand if is_negative else exponent  # type: ignore[attr-defined]
     if not isinstance(number, ast.Constant) or type(number.value) is not int or number.value == 0:
@@ -953,6 +955,6 @@ def call_of(function: str, *arguments: Any) -> ast.Call:
 
 
 def like(node: ast.AST, new: _Node) -> _Node:
-    """Return a new node in the place of another."""
+    """Return a new node with the source location of another."""
     ast.copy_location(new, node)
     return ast.fix_missing_locations(new)

@@ -1,7 +1,7 @@
-"""From a hook as written to one that works on the component's record, and needs no object.
+"""Rewrites a hook or method to a function on the component's record, which needs no object.
 
 `self.u.value` becomes the field `self.u`, `self.x.write(v)` an assignment and a flag,
-`self.helper(v)` the function `method_helper(self, v)`, `@` the product of `helpers`.
+`self.helper(v)` the call `method_0_helper(self, v)`, `@` a call of a helper.
 """
 
 import ast
@@ -36,7 +36,7 @@ from rtcf_compile.source.modules import Source
 
 
 class Hook(Ports):
-    """Puts fields of the record in the place of `self`'s members."""
+    """Replaces members of `self` by fields of the record."""
 
     def __init__(
         self,
@@ -49,10 +49,10 @@ class Hook(Ports):
         is_noted: bool = True,
         entry_line: int = 0,
     ) -> None:
-        """Rewrite a method that a class defines, for one that has these members and methods.
+        """Rewrite a method defined by `owner` for a component with these members and methods.
 
-        `is_noted`: its lines are noted while it runs, as it is in the file of the component.
-        `entry_line`: a line that is noted before it runs.
+        `is_noted`: the method notes its lines while it runs, because it is in the component's file.
+        `entry_line`: a line to note at entry, or 0.
         """
         super().__init__(source, description, functions)
         self._is_noted, self._entry_line = is_noted, entry_line
@@ -79,7 +79,7 @@ class Hook(Ports):
         return like(tree, ast.FunctionDef(tree.name, arguments, body, []))
 
     def visit(self, node: Any) -> Any:
-        """Note the line before a statement that calls something: what it calls has other lines."""
+        """Note the line before a statement that may raise or call: callees have other lines."""
         calls = (ast.Call, ast.Subscript, ast.BinOp)
         simple = (ast.Expr, ast.Assign, ast.AugAssign, ast.Return)
         is_simple = isinstance(node, simple)
@@ -97,13 +97,13 @@ class Hook(Ports):
         return new
 
     def _mark(self, node: ast.AST, line: int) -> ast.stmt:
-        """Return the statement that notes a line."""
+        """Return a statement that notes a line."""
         self.lines.add(line)
         target = ast.Attribute(ast.Name(self._self, ast.Load()), "_line", ast.Store())
         return like(node, ast.Assign([target], ast.Constant(line)))
 
     def _may_raise(self, node: ast.AST) -> bool:
-        """Tell whether it is `self.goals.front`, or a state that may be None."""
+        """Tell whether a node is `self.goals.front` or a state that may be None."""
         if not isinstance(node, ast.Attribute):
             return False
         if node.attr == "front":
@@ -112,15 +112,15 @@ class Hook(Ports):
         return member is not None and member.type.optional
 
     def visit_Name(self, node: ast.Name) -> ast.AST:
-        """`self` alone is no value."""
+        """Reject `self` used as a value."""
         if node.id == self._self:
             raise self.mistake(
-                node, f"{self._self} is no value here", f"pass what is needed, as {self._self}.name"
+                node, f"{self._self} cannot be used as a value", f"pass a member: {self._self}.name"
             )
         return node
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
-        """`self.name`, `self.port.value` and `self.port.value.linear.x`."""
+        """Rewrite `self.name`, `self.port.value` and `self.port.value.linear.x`."""
         message, path = self._message(node)
         if message is not None:
             return self._part(node, message, path)
@@ -137,7 +137,7 @@ class Hook(Ports):
         return super().visit_Attribute(node)
 
     def visit_Compare(self, node: ast.Compare) -> ast.AST:
-        """`self.last is None` of an optional state."""
+        """Rewrite comparisons of an optional state, such as `self.last is None`."""
         if len(node.ops) == 1 and _is_none(node.comparators[0]):
             member = self._optional(node.left)
             if member is not None and isinstance(node.ops[0], ast.Is | ast.Eq):
@@ -148,7 +148,7 @@ class Hook(Ports):
             for one, other in ((node.left, node.comparators[0]), (node.comparators[0], node.left)):
                 member = self._optional(one)
                 if member is not None and self._optional(other) is None:
-                    # None is equal to no number.
+                    # None differs from every number.
                     value = self._as_enum(self._read(member.name, member.type), member.type)
                     equal = ast.Compare(value, [ast.Eq()], [self.visit(other)])
                     known = self._field(member.known, ast.Load())
@@ -159,7 +159,7 @@ class Hook(Ports):
         return super().visit_Compare(node)
 
     def _optional(self, node: ast.AST) -> Member | None:
-        """Return the state that may be None and that an expression is."""
+        """Return the state of an expression if it may be None, else None."""
         if not isinstance(node, ast.Attribute) or not self._is_self(node.value):
             return None
         member = self._description.members.get(node.attr)
@@ -169,7 +169,7 @@ class Hook(Ports):
         return member
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
-        """`self.method(…)`, `self.x.write(…)`, `self.info(…)`, `self.fault(…)`."""
+        """Rewrite `self.method(…)`, `self.x.write(…)`, `self.info(…)`, `self.fault(…)`."""
         called = node.func
         if isinstance(called, ast.Attribute) and self._is_self(called.value):
             if called.attr in LOG_LEVELS:
@@ -178,7 +178,7 @@ class Hook(Ports):
                 component = self._field("_component")
                 return like(node, call_of(f"rtcf_log_{number}", component, *arguments))
             if called.attr == "fault":
-                raise self.mistake(node, "ends the hook", "write it as a statement of its own")
+                raise self.mistake(node, "fault ends the hook", "write it as a separate statement")
             self._no_function(node, called)
             method = self._methods.find(called.attr)
             if method is not None and called.attr not in HOOKS:
@@ -195,31 +195,31 @@ class Hook(Ports):
             port = self._member(called.value)
             if port is not None and port.kind is Output and called.attr == "write":
                 raise self.mistake(
-                    node, "a write is no value", "write it as a statement of its own"
+                    node, "write returns no value", "write it as a separate statement"
                 )
             if port is not None and port.kind is not Queue and called.attr == "pop":
                 raise self.mistake(node, *METHODS["pop"])
             if port is not None and called.attr == "pop":
                 raise self.mistake(
                     node,
-                    "a pop is no value",
-                    f"look at self.{port.name}.front, then write it as a statement of its own",
+                    "pop returns no value",
+                    f"read self.{port.name}.front, then write pop as a separate statement",
                 )
             if port is not None and port.kind is Input and called.attr == "read":
                 raise self.mistake(
                     node,
                     "inputs are read before each update",
-                    f"look at self.{port.name}.new, .valid or .value",
+                    f"use self.{port.name}.new, .valid or .value",
                 )
         return super().visit_Call(node)
 
     def _call(self, node: ast.AST, method: Method, arguments: Sequence[ast.expr]) -> ast.AST:
-        """Return the call of a method's compiled function."""
+        """Return the call of the compiled function of a method."""
         if method.function is None:
             raise self.mistake(
                 node,
                 f"{method.name} is a {method.kind}",
-                "write a method, a static method or a property by `def`",
+                "write a method, a static method or a property with `def`",
             )
         if isinstance(node, ast.Call):
             written = like(node, ast.Call(node.func, list(arguments), node.keywords))
@@ -235,7 +235,7 @@ class Hook(Ports):
         return like(node, new)
 
     def _named(self, node: ast.Expr, call: ast.Call) -> ast.stmt | None:
-        """Return a log call with the name of an enum as one call for each name; None for others."""
+        """Return a log call of an enum's name as one call per name; None for other statements."""
         if not isinstance(call.func, ast.Attribute) or call.func.attr not in LOG_LEVELS:
             return None
         for number, each in enumerate(call.args[1:]):
@@ -250,7 +250,7 @@ class Hook(Ports):
             for member in enumeration:
                 new = with_name(str(text.value), number, member.name)
                 if new is None:
-                    raise self.mistake(call, "a name stands in a {} of its own", "write {}")
+                    raise self.mistake(call, "the name of an enum needs a plain {}", "write {}")
                 own = like(node, ast.Call(call.func, [ast.Constant(new), *rest], []))
                 test = ast.Compare(each.value, [ast.Eq()], [ast.Constant(int(member))])
                 statement = like(node, ast.Expr(copy.deepcopy(own)))
@@ -265,7 +265,7 @@ class Hook(Ports):
         return method
 
     def visit_Expr(self, node: ast.Expr) -> ast.AST | list[ast.stmt]:
-        """Statements that write and that end."""
+        """Rewrite calls as statements: log, write, publish, pop, fault."""
         call = node.value
         if isinstance(call, ast.Call) and (logged := self._named(node, call)) is not None:
             return self.statements([logged])
@@ -276,12 +276,14 @@ class Hook(Ports):
             and call.func.attr in ("prepare", "start", "safe")
             and self._methods.find(call.func.attr, behind=self._owner) is None
         ):
-            return like(node, ast.Pass())  # that of Component, which does nothing
+            return like(node, ast.Pass())  # the method of Component, which does nothing
         if isinstance(call, ast.Call) and isinstance(call.func, ast.Attribute):
             port = self._member(call.func.value)
             if port is not None and port.kind is Output and call.func.attr == "publish":
                 if call.args or call.keywords:
-                    raise self.mistake(call, "takes nothing", f"write self.{port.name}.publish()")
+                    raise self.mistake(
+                        call, "takes no arguments", f"write self.{port.name}.publish()"
+                    )
                 flag = ast.Assign([self._field(f"{port.name}__written")], ast.Constant(True))
                 return like(node, flag)
             if port is not None and port.kind is Output and call.func.attr == "write":
@@ -294,26 +296,26 @@ class Hook(Ports):
                 if port.message:
                     raise self.mistake(
                         call,
-                        "a message is not written as a whole",
+                        "a message cannot be written as a whole",
                         f"set self.{port.name}.value.… = …, then self.{port.name}.publish()",
                     )
                 if len(call.args) != 1 or call.keywords:
                     raise self.mistake(
-                        call, "writes one value", f"write self.{port.name}.write(value)"
+                        call, "takes one value", f"write self.{port.name}.write(value)"
                     )
                 flag = ast.Assign([self._field(f"{port.name}__written")], ast.Constant(True))
                 value = self._set_field(node, port.name, port.type, self.visit(call.args[0]))
                 return [value, like(node, flag)]
             if port is not None and port.kind is Queue and call.func.attr == "pop":
                 if call.args or call.keywords:
-                    raise self.mistake(call, "takes nothing", f"write self.{port.name}.pop()")
+                    raise self.mistake(call, "takes no arguments", f"write self.{port.name}.pop()")
                 return self._pop(node, port)
             if self._is_self(call.func.value) and call.func.attr == "fault":
                 return self._fault(node, call)
         return super().generic_visit(node)
 
     def visit_Assign(self, node: ast.Assign) -> ast.AST | list[ast.stmt]:
-        """`self.name = value`."""
+        """Rewrite `self.name = value`."""
         if (steps := self._steps(node)) is not None:
             return self.statements(steps)
         for target in node.targets:
@@ -333,16 +335,16 @@ class Hook(Ports):
         return super().visit_Assign(node)
 
     def visit_AnnAssign(self, node: ast.AnnAssign) -> ast.AST:
-        """`self.name: State[float] = 0.0` in a hook."""
+        """Reject declarations in a hook; drop the annotations of variables."""
         if self._owned(node.target):
-            raise self.mistake(node, "declares in a hook", "declare it in the class")
+            raise self.mistake(node, "a hook cannot declare members", "declare it in the class")
         if node.value is None:
             return like(node, ast.Pass())
         plain = ast.Assign([node.target], node.value)
         return self.visit(like(node, plain))  # type: ignore[no-any-return]
 
     def visit_AugAssign(self, node: ast.AugAssign) -> ast.AST | list[ast.stmt]:
-        """`self.name += value`."""
+        """Rewrite `self.name += value`."""
         target = node.target
         self._check_elements(target)
         if isinstance(target, ast.Attribute) and self._is_self(target.value):
@@ -357,7 +359,7 @@ class Hook(Ports):
         return super().visit_AugAssign(node)
 
     def _check_elements(self, target: ast.expr) -> None:
-        """Refuse to set elements of members that are neither State nor Output."""
+        """Reject setting elements of members other than State and Output."""
         while isinstance(target, ast.Subscript):
             target = target.value
             if isinstance(target, ast.Attribute) and self._is_self(target.value):
@@ -367,7 +369,7 @@ class Hook(Ports):
                 port = self._message(target)[0] if port is None else port
                 if port is not None and port.kind is not Output:
                     raise self.mistake(
-                        target, f"is of {a_kind(port)}, which is only read", "set an Output"
+                        target, f"belongs to {a_kind(port)}, which is read-only", "set an Output"
                     )
 
     def _settable(self, node: ast.Attribute) -> Member:
@@ -376,7 +378,7 @@ class Hook(Ports):
             self._touch(node, node.attr)
         if member is None:
             if node.attr in TIME_FIELDS:
-                raise self.mistake(node, "is the loop's", "keep a time of your own in a State")
+                raise self.mistake(node, "belongs to the loop", "keep your own time in a State")
             if node.attr in self._description.constants:
                 raise self.mistake(
                     node, "is a constant of the class", f"declare {node.attr}: State[…]"
@@ -385,7 +387,7 @@ class Hook(Ports):
             if method is not None and method.kind == "property":
                 raise self.mistake(
                     node,
-                    f"{node.attr} is a property, which is only read",
+                    f"{node.attr} is a read-only property",
                     f"set the members that it is computed from, or write a method: "
                     f"self.set_{node.attr}(…)",
                 )
@@ -394,13 +396,13 @@ class Hook(Ports):
             raise self.mistake(node, "a parameter is set from outside", "declare a State for it")
         if member.kind is Derived and self.source.tree.name != "prepare":
             raise self.mistake(
-                node, "is Derived: prepare alone sets it", "set it in prepare, or declare a State"
+                node, "is Derived: only prepare sets it", "set it in prepare, or declare a State"
             )
         if member.kind in PORTS:
             if member.kind is Output:
                 way_out = f"write self.{node.attr}.write(…)"
                 raise self.mistake(node, f"is {a_kind(member)}", way_out)
-            raise self.mistake(node, f"is {a_kind(member)}, which is only read", "write an Output")
+            raise self.mistake(node, f"is {a_kind(member)}, which is read-only", "write an Output")
         return member
 
     def _undeclared(self, node: ast.Attribute) -> Exception:
@@ -408,28 +410,28 @@ class Hook(Ports):
         words = (*names, *TIME_FIELDS, *LOG_LEVELS, *self._methods.names())
         way_out = f"write `{node.attr}: State[float]` in the class"
         if near := difflib.get_close_matches(node.attr, words, 1, 0.75):
-            way_out = f"mend its name (self.{near[0]}), or {way_out}"
+            way_out = f"correct its name (self.{near[0]}), or {way_out}"
         return self.mistake(node, "is not declared", way_out)
 
     def _no_function(self, node: ast.Call, called: ast.Attribute) -> None:
-        """Refuse to call a member, a time or a property of `self`."""
+        """Reject the call of a member, a time or a property of `self`."""
         name = called.attr
         method = self._methods.find(name)
         if name in TIME_FIELDS or (method is not None and method.kind == "property"):
-            raise self.mistake(node, f"self.{name} is no function", "leave the ( ) out")
+            raise self.mistake(node, f"self.{name} is not a function", "leave the ( ) out")
         member = self._description.members.get(name)
         if member is not None or name in self._description.constants:
             way_out = f"write self.{name}[0] for an element, * to multiply"
-            raise self.mistake(node, f"self.{name} is no function", way_out)
+            raise self.mistake(node, f"self.{name} is not a function", way_out)
         if name in HOOKS:
-            way_out = "call a method that both use"
+            way_out = "call a method that both hooks use"
             raise self.mistake(node, f"{name} is a hook, which the loop calls", way_out)
         if method is None and name not in (*HOOKS, *LOG_LEVELS, "fault"):
             near = difflib.get_close_matches(name, (*self._methods.names(), *LOG_LEVELS), 1, 0.6)
             way_out = f"define it: def {name}(self, …):"
             if near:
-                way_out = f"mend its name (self.{near[0]}), or {way_out}"
-            raise self.mistake(node, f"no method is called {name}", way_out)
+                way_out = f"correct its name (self.{near[0]}), or {way_out}"
+            raise self.mistake(node, f"there is no method {name}", way_out)
 
     def _is_property(self, node: ast.AST, surely: bool = False) -> bool:
         if not isinstance(node, ast.Attribute):
@@ -440,7 +442,7 @@ class Hook(Ports):
         return method is not None and method.kind == "property"
 
     def _plain_member(self, node: ast.Attribute) -> None:
-        """Refuse attributes of ports on other members: `self.kp.value`, `self.f.write(…)`."""
+        """Reject port attributes of other members: `self.kp.value`, `self.f.write(…)`."""
         owner = node.value
         if not isinstance(owner, ast.Attribute) or not self._is_self(owner.value):
             return
@@ -454,7 +456,7 @@ class Hook(Ports):
             raise self.mistake(node, f"{kind} has no {node.attr}", f"write {name} = …")
 
     def _value(self, node: ast.Attribute, name: str, member: Member) -> ast.AST:
-        """Return a state's, a parameter's or a derived value."""
+        """Return the value of a State, Parameter or Derived member."""
         if isinstance(node.ctx, ast.Store):
             return like(node, self._field(name))
         field = self._read(name, member.type)
@@ -490,7 +492,7 @@ class Hook(Ports):
         text = call.args[0] if len(call.args) == 1 else None
         if not isinstance(text, ast.Constant) or not isinstance(text.value, str):
             raise self.mistake(
-                call, "a fault has one constant text", "log the values before it by self.error(…)"
+                call, "a fault takes one constant text", "log the values with self.error(…)"
             )
         return like(node, ast.Raise(call_of("rtcf_fault", text)))
 
@@ -515,11 +517,11 @@ class Hook(Ports):
         if method is not None and method.kind == "property":
             return self._call(node, method, [])
         if method is not None:
-            raise self.mistake(node, "a method is no value", f"call it: self.{name}(…)")
+            raise self.mistake(node, "a method is not a value", f"call it: self.{name}(…)")
         raise self._undeclared(node)
 
     def _owned(self, target: ast.AST) -> list[ast.AST]:
-        """Return what is set of `self` by a target; not elements of arrays."""
+        """Return the members of `self` that a target sets, without elements of arrays."""
         if isinstance(target, ast.Tuple | ast.List):
             return [found for each in target.elts for found in self._owned(each)]
         return [target] if isinstance(target, ast.Attribute) and self._is_self(target.value) else []

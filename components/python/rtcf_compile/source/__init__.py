@@ -1,1 +1,1 @@
-"""A component as it is written: its source, what it may not contain, how a mistake is told."""
+"""The source of a component: its syntax trees, the checks of the source, error messages."""

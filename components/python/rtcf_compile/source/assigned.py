@@ -1,5 +1,5 @@
-"""Variables that have a value wherever they are used: Python raises UnboundLocalError where one has
-none, compiled code would go on with whatever is there.
+"""Checks that each variable has a value before its use. Python raises UnboundLocalError otherwise;
+compiled code would read undefined memory.
 """
 
 import ast
@@ -9,34 +9,34 @@ from collections.abc import Sequence
 from rtcf_compile.source.mistake import at
 from rtcf_compile.source.modules import Source
 
-# Variables that have a value at a place; None: the place is never reached.
+# The variables that have a value at a place; None: the place is unreachable.
 _Known = frozenset[str] | None
 
 
 def check_assigned(source: Source) -> None:
-    """Raise Mistake at the first use of a variable that has no value on some way there."""
+    """Raise Mistake at the first use of a variable that has no value on some path."""
     _Flow(source).function()
 
 
 def _both(one: _Known, other: _Known) -> _Known:
-    """Return the assigned variables where two ways meet."""
+    """Return the assigned variables where two paths meet."""
     if one is None or other is None:
         return other if one is None else one
     return one & other
 
 
 class _Flow:
-    """Follows a function's statements in the order of their execution."""
+    """Follows the statements of a function in execution order."""
 
     def __init__(self, source: Source) -> None:
         self._source = source
         self._variables = set(source.function.__code__.co_varnames)
-        # Of the loops around the present statement: known at break, and at continue.
+        # Per enclosing loop: the variables assigned at break and at continue.
         self._breaks: list[_Known] = []
         self._continues: list[_Known] = []
 
     def function(self) -> None:
-        """Follow all of it."""
+        """Check the whole function."""
         tree = self._source.tree
         arguments = (*tree.args.posonlyargs, *tree.args.args, *tree.args.kwonlyargs)
         self._block(tree.body, frozenset(each.arg for each in arguments))
@@ -44,7 +44,7 @@ class _Flow:
     def _block(self, body: Sequence[ast.stmt], known: _Known) -> _Known:
         for statement in body:
             if known is None:
-                return None  # nothing after it runs
+                return None  # the rest is unreachable
             known = self._statement(statement, known)
         return known
 
@@ -93,7 +93,7 @@ class _Flow:
     def _for(self, node: ast.For, known: frozenset[str]) -> _Known:
         known = self._used(node.iter, known)
         end, left = self._loop(node, self._target(node.target, known))
-        # It has run once where that is known; else what it sets may have no value.
+        # A loop that may run zero times leaves its variables without a value.
         ended = end if _runs(node.iter) else _both(known, end)
         return _both(self._block(node.orelse, ended) if ended is not None else None, left)
 
@@ -106,7 +106,7 @@ class _Flow:
         return _both(self._block(node.orelse, ended) if ended is not None else None, left)
 
     def _loop(self, node: ast.For | ast.While, known: frozenset[str]) -> tuple[_Known, _Known]:
-        """Return the assigned variables after one turn of the body, and where break leaves it."""
+        """Return the variables assigned after one iteration of the body, and those after break."""
         self._breaks.append(None)
         self._continues.append(None)
         end = self._block(node.body, known)
@@ -141,13 +141,13 @@ class _Flow:
         return known
 
     def _test(self, node: ast.expr, known: frozenset[str]) -> tuple[frozenset[str], frozenset[str]]:
-        """Look at a condition; return the assigned variables if it holds, and if it does not."""
+        """Check a condition; return the assigned variables if it is true, and if it is false."""
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
             if_true, if_false = self._test(node.operand, known)
             return if_false, if_true
         if isinstance(node, ast.BoolOp):
             all_of = isinstance(node.op, ast.And)
-            ended: frozenset[str] | None = None  # where one of them has decided
+            ended: frozenset[str] | None = None  # after an operand that decides the result
             for each in node.values:
                 if_true, if_false = self._test(each, known)
                 known, out = (if_true, if_false) if all_of else (if_false, if_true)
@@ -160,15 +160,13 @@ class _Flow:
     def _without_value(self, name: str) -> tuple[str, str]:
         scope = self._source.function.__globals__
         if callable(scope.get(name, getattr(builtins, name, None))):
-            return f"{name} is a function, and set here", "take another name for the variable"
+            return f"{name} is a function, but is set here", "use another name for the variable"
         if name in scope:
-            return f"{name} is a constant of the module, and set here", "declare a State"
-        return f"{name} has no value on every way here", (
-            f"set {name} before, where all ways come by"
-        )
+            return f"{name} is a constant of the module, but is set here", "declare a State"
+        return f"{name} may have no value here", f"set `{name}` on every path to this line"
 
     def _used(self, node: ast.expr, known: frozenset[str]) -> frozenset[str]:
-        """Look at an expression; return the assigned variables after it."""
+        """Check an expression; return the assigned variables after it."""
         if isinstance(node, ast.Name):
             if isinstance(node.ctx, ast.Load) and node.id in self._variables - known:
                 raise at(self._source.file, node, *self._without_value(node.id))
@@ -190,7 +188,7 @@ class _Flow:
 
 
 def _read(target: ast.expr) -> ast.expr:
-    """Return a target as what `x += 1` reads of it."""
+    """Return the target of `x += 1` as the expression that it reads."""
     if isinstance(target, ast.Name):
         return ast.copy_location(ast.Name(target.id, ast.Load()), target)
     return target
@@ -201,7 +199,7 @@ def _constant(test: ast.expr) -> bool | None:
 
 
 def _runs(iterated: ast.expr) -> bool:
-    """Tell whether a loop over it is known to run once at least: range(3), (1, 2), range(1, 4)."""
+    """Tell whether a loop over it surely runs at least once: range(3), (1, 2), range(1, 4)."""
     if isinstance(iterated, ast.Tuple):
         return bool(iterated.elts)
     if not isinstance(iterated, ast.Call) or not isinstance(iterated.func, ast.Name):
@@ -230,7 +228,7 @@ def _matches_all(pattern: ast.pattern) -> bool:
 
 
 def _is_fault(node: ast.stmt) -> bool:
-    """`self.fault("…")` ends the hook."""
+    """Tell whether a statement is `self.fault("…")`, which ends the hook."""
     call = node.value if isinstance(node, ast.Expr) else None
     return (
         isinstance(call, ast.Call)

@@ -1,4 +1,7 @@
-"""What a hook and the functions that it calls may not contain, seen from their trees alone."""
+"""Rejects constructs that hooks and the functions that they call must not contain.
+
+The checks read syntax trees only; types are not known here.
+"""
 
 import ast
 import enum
@@ -16,123 +19,134 @@ from rtcf_compile.source.mistake import Mistake, at
 from rtcf_compile.source.modules import Source, is_own
 
 _REFUSED: dict[type[ast.AST], tuple[str, str]] = {
-    ast.ListComp: ("a list allocates", "use a loop that fills an array"),
-    ast.Dict: ("a dict allocates", "use an enum.IntEnum and `if`, or an array by number"),
-    ast.DictComp: ("a dict allocates", "use an array by number"),
-    ast.Set: ("a set allocates", "compare one by one: x == 1 or x == 2"),
-    ast.SetComp: ("a set allocates", "use a loop"),
-    ast.GeneratorExp: ("a generator is no machine code", "use a loop"),
-    ast.Yield: ("a generator is no machine code", "keep what goes on in a State"),
-    ast.YieldFrom: ("a generator is no machine code", "keep what goes on in a State"),
-    ast.Await: ("the cycle waits for nothing", "keep what is awaited in a State and look again"),
-    ast.AsyncFunctionDef: ("the cycle waits for nothing", "use `def`"),
-    ast.JoinedStr: ("text is not made in the cycle", 'log with arguments: self.info("x {}", x)'),
+    ast.ListComp: ("a list allocates memory", "use a loop that fills an array"),
+    ast.Dict: (
+        "a dict allocates memory",
+        "use an enum.IntEnum and `if`, or an array indexed by an int",
+    ),
+    ast.DictComp: ("a dict allocates memory", "use an array indexed by an int"),
+    ast.Set: ("a set allocates memory", "compare with each value: x == 1 or x == 2"),
+    ast.SetComp: ("a set allocates memory", "use a loop"),
+    ast.GeneratorExp: ("a generator cannot be compiled", "use a loop"),
+    ast.Yield: ("a generator cannot be compiled", "keep the progress in a State"),
+    ast.YieldFrom: ("a generator cannot be compiled", "keep the progress in a State"),
+    ast.Await: ("the cycle cannot wait", "keep the request in a State and test it in each cycle"),
+    ast.AsyncFunctionDef: ("the cycle cannot wait", "use `def`"),
+    ast.JoinedStr: (
+        "text cannot be built in the cycle",
+        'log with arguments: self.info("x {}", x)',
+    ),
     ast.Global: ("a global variable is shared by all instances", "declare a State"),
-    ast.Nonlocal: ("a variable of another function", "declare a State, or return the value"),
-    ast.Try: ("nothing is caught in the cycle", "test for it with `if` before it happens"),
-    ast.With: ("there is nothing to open or lock in the cycle", "leave `with` out"),
-    ast.Import: ("an import is no machine code", "import at the head of the file"),
-    ast.ImportFrom: ("an import is no machine code", "import at the head of the file"),
+    ast.Nonlocal: ("nonlocal is not compiled", "declare a State, or return the value"),
+    ast.Try: ("exceptions cannot be caught in the cycle", "test the condition with `if` first"),
+    ast.With: ("the cycle cannot open or lock anything", "remove the `with`"),
+    ast.Import: ("an import cannot be compiled", "import at the top of the file"),
+    ast.ImportFrom: ("an import cannot be compiled", "import at the top of the file"),
     ast.Lambda: ("a lambda is not compiled", "define a function in the module"),
-    ast.FunctionDef: ("a function in a function", "define it in the module"),
-    ast.ClassDef: ("a class in a hook", "define it in the module"),
-    ast.Delete: ("nothing is deleted in the cycle", "set it to 0, or leave it"),
-    ast.Starred: ("a * takes apart what has no fixed size", "write the elements"),
+    ast.FunctionDef: ("a nested function is not compiled", "define it in the module"),
+    ast.ClassDef: ("a class in a hook is not compiled", "define it in the module"),
+    ast.Delete: ("nothing can be deleted in the cycle", "set it to 0, or remove the del"),
+    ast.Starred: ("* unpacks a value that has no fixed size", "write the elements"),
 }
 _BUILTINS: dict[str, tuple[str, str]] = {
-    "print": ("printing calls the system", 'log: self.info("x {}", x)'),
-    "open": ("a file is opened by the system", "read it in the module, when it is compiled"),
-    "input": ("waits for a person", "use an Input or a Parameter"),
-    "str": ("text is not made in the cycle", 'log with arguments: self.info("x {}", x)'),
-    "repr": ("text is not made in the cycle", 'log with arguments: self.info("x {}", x)'),
-    "format": ("text is not made in the cycle", 'log with arguments: self.info("x {}", x)'),
-    "list": ("a list allocates", "use an array"),
-    "dict": ("a dict allocates", "use an array by number"),
-    "set": ("a set allocates", "use an array of bools"),
-    "sorted": ("a list allocates", "use np.sort on an array"),
-    "map": ("a generator is no machine code", "use a loop"),
-    "filter": ("a generator is no machine code", "use a loop with `if`"),
-    "getattr": ("names are fixed when compiled", "write self.name"),
-    "setattr": ("names are fixed when compiled", "write self.name = …"),
-    "hasattr": ("names are fixed when compiled", "declare it"),
-    "isinstance": ("types are fixed when compiled", "declare ports of that type"),
-    "eval": ("no Python runs in the cycle", "write the expression"),
-    "exec": ("no Python runs in the cycle", "write the statements"),
-    "type": ("types are fixed when compiled", "leave it out, or convert: float(x), int(x)"),
+    "print": ("printing calls the system", 'log instead: self.info("x {}", x)'),
+    "open": ("opening a file calls the system", "read it at module level, at compile time"),
+    "input": ("input() waits for the user", "use an Input or a Parameter"),
+    "str": ("text cannot be built in the cycle", 'log with arguments: self.info("x {}", x)'),
+    "repr": ("text cannot be built in the cycle", 'log with arguments: self.info("x {}", x)'),
+    "format": ("text cannot be built in the cycle", 'log with arguments: self.info("x {}", x)'),
+    "list": ("a list allocates memory", "use an array"),
+    "dict": ("a dict allocates memory", "use an array indexed by an int"),
+    "set": ("a set allocates memory", "use an array of bools"),
+    "sorted": ("a list allocates memory", "use np.sort on an array"),
+    "map": ("a generator cannot be compiled", "use a loop"),
+    "filter": ("a generator cannot be compiled", "use a loop with `if`"),
+    "getattr": ("names are fixed at compile time", "write self.name"),
+    "setattr": ("names are fixed at compile time", "write self.name = …"),
+    "hasattr": ("names are fixed at compile time", "declare it"),
+    "isinstance": ("types are fixed at compile time", "declare ports of that type"),
+    "eval": ("the cycle cannot run Python code", "write the expression"),
+    "exec": ("the cycle cannot run Python code", "write the statements"),
+    "type": ("types are fixed at compile time", "remove it, or convert: float(x), int(x)"),
     "id": ("values have no identity in the cycle", "compare them: a == b"),
-    "vars": ("names are fixed when compiled", "write self.name"),
-    "dir": ("names are fixed when compiled", "write self.name"),
-    "globals": ("names are fixed when compiled", "write the name"),
-    "locals": ("names are fixed when compiled", "write the name"),
-    "callable": ("types are fixed when compiled", "leave it out"),
+    "vars": ("names are fixed at compile time", "write self.name"),
+    "dir": ("names are fixed at compile time", "write self.name"),
+    "globals": ("names are fixed at compile time", "write the name"),
+    "locals": ("names are fixed at compile time", "write the name"),
+    "callable": ("types are fixed at compile time", "remove it"),
     "hash": ("values have no hash in the cycle", "compare them: a == b"),
-    "next": ("an iterator is no machine code", "use a loop, or an index"),
-    "iter": ("an iterator is no machine code", "use a loop, or an index"),
-    "complex": ("a complex number", "use two floats"),
+    "next": ("an iterator cannot be compiled", "use a loop, or an index"),
+    "iter": ("an iterator cannot be compiled", "use a loop, or an index"),
+    "complex": ("complex numbers are not compiled", "use two floats"),
     "bytes": ("bytes are not compiled", "use an array of np.uint8"),
     "bytearray": ("bytes are not compiled", "use an array of np.uint8"),
-    "frozenset": ("a set allocates", "use an array of bools"),
+    "frozenset": ("a set allocates memory", "use an array of bools"),
 }
 _GROWS = {
-    "append": "use an array of State and a count",
-    "insert": "use an array of State and a count",
-    "delete": "use an array of State and a count",
+    "append": "use a State array and a count",
+    "insert": "use a State array and a count",
+    "delete": "use a State array and a count",
     "resize": "declare the largest size",
 }
 METHODS = {
-    "append": ("grows", "use an array of State and a count"),
-    "extend": ("grows", "use an array of State and a count"),
-    "insert": ("grows", "use an array of State and a count"),
-    "remove": ("shrinks", "use an array of State and a count"),
-    "pop": ("shrinks", "use an array of State and a count"),
-    "format": ("text is not made in the cycle", 'log with arguments: self.info("x {}", x)'),
-    "tolist": ("a list allocates", "use the array"),
+    "append": ("a list or an array cannot grow", "use a State array and a count"),
+    "extend": ("a list or an array cannot grow", "use a State array and a count"),
+    "insert": ("a list or an array cannot grow", "use a State array and a count"),
+    "remove": ("a list or an array cannot shrink", "use a State array and a count"),
+    "pop": ("a list or an array cannot shrink", "use a State array and a count"),
+    "format": ("text cannot be built in the cycle", 'log with arguments: self.info("x {}", x)'),
+    "tolist": ("a list allocates memory", "use the array"),
 }
 _MODULES = {
-    "time": ("reads another clock than the loop's", "use self.time, self.dt or .age"),
-    "datetime": ("reads another clock than the loop's", "use self.stamp"),
+    "time": ("reads a clock other than the loop's", "use self.time, self.dt or .age"),
+    "datetime": ("reads a clock other than the loop's", "use self.stamp"),
     "random": (
-        "draws other numbers in a replay",
+        "would draw different numbers in a replay",
         "compute them from a seed in a State",
     ),
-    "os": ("calls the system", "do it in the module, when it is compiled"),
-    "sys": ("is the interpreter's", "read it in the module, when it is compiled"),
-    "itertools": ("an iterator is no machine code", "write loops with range(…)"),
+    "os": ("calls the system", "call it at module level, at compile time"),
+    "sys": ("belongs to the interpreter", "read it at module level, at compile time"),
+    "itertools": ("an iterator cannot be compiled", "write loops with range(…)"),
     "functools": ("is not compiled", "write the calls"),
-    "collections": ("allocates", "use an array of State and a count"),
-    "contextlib": ("there is nothing to open or lock in the cycle", "leave it out"),
-    "json": ("is not compiled", "read files in the module, when it is compiled"),
-    "copy": ("is not compiled", "copy an array by x.copy(), a message by ="),
-    "scipy": ("is not compiled", "compute constants in the module, write the rest with NumPy"),
+    "collections": ("allocates memory", "use a State array and a count"),
+    "contextlib": ("the cycle cannot open or lock anything", "remove it"),
+    "json": ("is not compiled", "read files at module level, at compile time"),
+    "copy": ("is not compiled", "copy an array with x.copy(), a message with ="),
+    "scipy": ("is not compiled", "compute constants at module level, write the rest with NumPy"),
     "threading": ("the cycle has one thread", "keep it in a State"),
-    "asyncio": ("the cycle waits for nothing", "keep it in a State"),
-    "socket": ("calls the system", "use an Input or Output; a device is for C++"),
+    "asyncio": ("the cycle cannot wait", "keep the progress in a State"),
+    "socket": ("calls the system", "use an Input or an Output; write device access in C++"),
     "subprocess": ("calls the system", "do it outside the loop"),
-    "logging": ("formats and writes", 'log by self.info("x {}", x)'),
-    "rospy": ("is not real-time", "use an Input or Output: ROS is connected to ports"),
+    "logging": ("formats and writes text", 'log with self.info("x {}", x)'),
+    "rospy": ("is not real-time", "use an Input or an Output, which rtcf connects to ROS"),
 }
-# Decorators that change nothing of a function, or only its calls.
+# Decorators that leave the body of a function as it is.
 _DECORATORS = ("property", "staticmethod", "override", "final")
-# Packages whose functions are compiled, or refused one by one.
+# Packages whose functions are compiled, or rejected individually.
 _COMPILED = ("builtins", "math", "numpy", "operator", "rtcf", "_operator")
 _LARGEST, _SMALLEST = 2**63 - 1, -(2**63)
 
 
 def check(source: Source) -> None:
-    """Raise the first Mistake of a function."""
+    """Raise Mistake for the first error in a function."""
     tree, file = source.tree, source.file
     for each in tree.decorator_list:
         if ast.unparse(each).rpartition(".")[2] not in _DECORATORS:
-            raise at(file, each, "a decorator is not compiled", "call the function")
+            raise at(file, each, "a decorator is not compiled", "call the function instead")
     arguments = tree.args
     if arguments.vararg or arguments.kwarg:
-        raise Mistake(file, tree.lineno, f"{tree.name} takes any number of arguments", "name them")
+        raise Mistake(file, tree.lineno, f"{tree.name} takes any number of arguments", "name each")
     if arguments.kwonlyargs:
-        what = f"{tree.name} takes {arguments.kwonlyargs[0].arg} by its name alone"
-        raise Mistake(file, tree.lineno, what, "leave the * out")
+        what = f"{tree.name} takes {arguments.kwonlyargs[0].arg} only as a keyword"
+        raise Mistake(file, tree.lineno, what, "remove the *")
     for default in (*arguments.defaults, *arguments.kw_defaults):
         if isinstance(default, ast.List | ast.Dict | ast.Set):
-            raise at(file, default, "a default is shared by all calls", "write a number or a tuple")
+            raise at(
+                file,
+                default,
+                "a mutable default is shared by all calls",
+                "write a number or a tuple",
+            )
     known = _names(source)
     for node in _walk(tree):
         if type(node) in _REFUSED:
@@ -146,7 +160,7 @@ def check(source: Source) -> None:
         if isinstance(node, ast.Attribute):
             _module(node, source)
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load) and node.id not in known:
-            raise at(file, node, f"{node.id} is not defined", "declare it, or mend its name")
+            raise at(file, node, f"{node.id} is not defined", "define it, or correct its name")
         if isinstance(node, ast.Raise):
             _raised(node, file)
         if isinstance(node, ast.Slice):
@@ -154,16 +168,16 @@ def check(source: Source) -> None:
         if isinstance(node, ast.Subscript):
             _indexed(node, source)
         if isinstance(node, ast.Attribute) and getattr(node.value, "id", "") == "super":
-            raise at(file, node.value, "super is a call", f"write super().{node.attr}")
+            raise at(file, node.value, "super must be called", f"write super().{node.attr}")
         if isinstance(node, ast.While) and _endless(node):
-            raise Mistake(file, node.lineno, "a loop without end", "bound it: for _ in range(…)")
+            raise Mistake(file, node.lineno, "an endless loop", "bound it: for _ in range(…)")
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod) and _is_text(node.left):
             raise at(file, node, *_REFUSED[ast.JoinedStr])
     check_assigned(source)
 
 
 def resolve(node: ast.AST, source: Source) -> Any:
-    """Return what a dotted name stands for in the module, or None."""
+    """Return the object that a dotted name refers to in the module, or None."""
     if isinstance(node, ast.Name):
         scope = source.function.__globals__
         if node.id in source.function.__code__.co_varnames:
@@ -180,7 +194,7 @@ def resolve(node: ast.AST, source: Source) -> Any:
 
 
 def _walk(tree: ast.FunctionDef) -> Iterator[ast.AST]:
-    """Yield the nodes of a body in order of the source; not annotations and docstrings."""
+    """Yield the nodes of a body in source order, without annotations and docstrings."""
     body = tree.body
     if isinstance(body[0], ast.Expr) and _is_text(body[0].value):
         body = body[1:]
@@ -210,13 +224,13 @@ def _constant(node: ast.Constant, file: str) -> None:
                 file, node, "does not fit int64", "write it as a float, or keep it below 2**63"
             )
     elif isinstance(value, complex):
-        raise at(file, node, "a complex number", "use two floats")
+        raise at(file, node, "complex numbers are not compiled", "use two floats")
     elif isinstance(value, bytes):
         raise at(file, node, "bytes are not compiled", "use an array of np.uint8")
 
 
 def _folded(node: ast.BinOp | ast.UnaryOp, file: str) -> None:
-    """Refuse arithmetic of literals that ends beyond int64, as 2**63."""
+    """Reject arithmetic of literals whose result exceeds int64, such as 2**63."""
     parts = list(ast.walk(node))
     arithmetic = (ast.BinOp, ast.UnaryOp, ast.Constant, ast.operator, ast.unaryop)
     if not all(isinstance(each, arithmetic) for each in parts):
@@ -246,38 +260,38 @@ def _call(node: ast.Call, source: Source) -> None:
     if target is not None:
         _called(node, target, source)
     if name in _GROWS and getattr(np, name, None) is target:
-        raise at(file, node, f"np.{name} makes an array that grows", _GROWS[name])
+        raise at(file, node, f"np.{name} changes the size of an array", _GROWS[name])
     if isinstance(called, ast.Attribute) and isinstance(resolve(called.value, source), list):
         name = ast.unparse(called.value)
         raise at(file, node, f"{name} is a constant of the module", "declare a State, or copy it")
     if isinstance(called, ast.Attribute) and target is None and called.attr in METHODS:
-        # What is declared as a queue has a pop() of its own: seen where declarations are known.
+        # A declared queue has its own pop(). The rewriter, which knows declarations, checks it.
         may_be_queue = called.attr == "pop" and isinstance(called.value, ast.Attribute)
         if not may_be_queue:
             raise at(file, node, *METHODS[called.attr])
     if any(keyword.arg is None for keyword in node.keywords):
-        raise at(file, node, "** takes a dict apart", "write the arguments")
+        raise at(file, node, "** unpacks a dict", "write the arguments")
 
 
 def _called(node: ast.Call, target: Any, source: Source) -> None:
-    """Refuse a call of an object that is no function, or of a function that is not compiled."""
+    """Reject a call of an object that is not a function, or of a function that is not compiled."""
     file, name = source.file, ast.unparse(node.func)
     if not callable(target):
-        raise at(file, node, f"{name} is no function", f"write {name}[0] for an element")
+        raise at(file, node, f"{name} is not a function", f"write {name}[0] for an element")
     if is_own(target):
         check_arguments(node, target, source.file)
         return
     if isinstance(target, type):
         if hasattr(target, "_md5sum"):
             way_out = "set the fields of an Output: self.port.value.x = 1.0"
-            raise at(file, node, "a message is made by an Output alone", way_out)
+            raise at(file, node, "only an Output makes messages", way_out)
         if issubclass(target, enum.Enum) and not issubclass(target, enum.IntEnum):
-            raise at(file, node, f"{name} is no enum of ints", "derive it from enum.IntEnum")
+            raise at(file, node, f"{name} is not an enum of ints", "derive it from enum.IntEnum")
     root = (getattr(target, "__module__", None) or "numpy").partition(".")[0]
     if target in (max, min) and not node.args:
-        raise at(file, node, f"{name} of nothing", "give it values")
+        raise at(file, node, f"{name} needs arguments", "give it values")
     if isinstance(target, BuiltinFunctionType) and root in ("math", "builtins"):
-        with suppress(ValueError):  # some have no signature
+        with suppress(ValueError):  # some builtins have no signature
             check_arguments(node, target, source.file)
     if root in _MODULES:
         raise at(file, node, *_MODULES[root])
@@ -285,15 +299,20 @@ def _called(node: ast.Call, target: Any, source: Source) -> None:
         known = issubclass(target, np.generic | BaseException | enum.Enum)
         if not known and root not in ("builtins", "numpy"):
             what = f"an object of {target.__name__} is not compiled"
-            raise at(file, node, what, "keep its values in State members, write its methods here")
+            raise at(file, node, what, "keep its values in State members, define its methods here")
     elif isinstance(target, FunctionType | BuiltinFunctionType) and root not in _COMPILED:
-        raise at(file, node, f"{name} is not compiled", "write it with NumPy, or call it above")
+        raise at(
+            file, node, f"{name} is not compiled", "write it with NumPy, or call it at module level"
+        )
 
 
 def check_arguments(
     node: ast.Call, function: Callable[..., Any], file: str, given: int = 0
 ) -> None:
-    """Refuse a call whose arguments a function does not take; `given` are not in the source."""
+    """Reject a call whose arguments do not match a function.
+
+    `given`: the number of leading arguments that are not in the source.
+    """
     if any(isinstance(each, ast.Starred) for each in node.args):
         return
     named = [each.arg for each in node.keywords]
@@ -301,7 +320,7 @@ def check_arguments(
         return
     signature = inspect.signature(function)
     if any(each.kind is each.KEYWORD_ONLY for each in signature.parameters.values()):
-        return  # refused where it is defined
+        return  # rejected at its definition
     try:
         signature.bind(*[None] * (given + len(node.args)), **dict.fromkeys(map(str, named)))
     except TypeError:
@@ -312,37 +331,37 @@ def check_arguments(
             for each in signature.parameters.values()
         ][given:]
         name, words = ast.unparse(node.func), ", ".join(map(str, takes))
-        what = f"{name} takes {words}" if words else f"{name} takes no argument"
+        what = f"{name} takes {words}" if words else f"{name} takes no arguments"
         raise at(file, node, what, f"write {name}({words})") from None
 
 
 def _raised(node: ast.Raise, file: str) -> None:
-    """Refuse an exception with more than a constant text."""
+    """Reject an exception with more than a constant text."""
     made = node.exc
     if made is None or isinstance(made, ast.Name):
         return
     if not isinstance(made, ast.Call):
-        raise at(file, node, "is no exception", 'write raise ValueError("constant text")')
+        raise at(file, node, "is not an exception", 'write raise ValueError("constant text")')
     plain = all(_is_text(each) for each in made.args) and len(made.args) < 2
     if any(isinstance(each, ast.JoinedStr) for each in made.args):
-        return  # refused as text
+        return  # rejected as an f-string
     if not plain or made.keywords:
-        way_out = "log the values before it by self.error(…)"
-        raise at(file, node, "an exception has one constant text", way_out)
+        way_out = "log the values before it with self.error(…)"
+        raise at(file, node, "an exception takes one constant text", way_out)
 
 
 def _slice(node: ast.Slice, file: str) -> None:
-    """Refuse a slice that NumPy refuses: a step of 0, a bound that is no int."""
+    """Reject a slice that NumPy rejects: a step of 0, a bound that is not an int."""
     for each in (node.lower, node.upper, node.step):
         value = each.operand if isinstance(each, ast.UnaryOp) else each
         if isinstance(value, ast.Constant) and not isinstance(value.value, int | None):
-            raise at(file, node, "a bound is no int", "use ints: x[0:2]")
+            raise at(file, node, "a bound is not an int", "use ints: x[0:2]")
     if isinstance(node.step, ast.Constant) and node.step.value == 0:
-        raise at(file, node, "a step of 0", "use a step of 1 or more, or of -1")
+        raise at(file, node, "the step is 0", "use a step of 1 or more, or -1")
 
 
 def check_index(node: ast.Subscript, shape: Sequence[int], name: str, file: str) -> None:
-    """Refuse constant indices beyond the sizes of an array or a list."""
+    """Reject constant indices beyond the size of an array or a list."""
     parts = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
     words = ("elements",) if len(shape) == 1 else ("rows", "columns")
     for part, size, word in zip(parts, shape, words, strict=False):
@@ -356,18 +375,18 @@ def check_index(node: ast.Subscript, shape: Sequence[int], name: str, file: str)
 
 
 def _indexed(node: ast.Subscript, source: Source) -> None:
-    """Refuse constant indices of constants, and of enums, that are not there."""
+    """Reject constant indices out of range of module constants, and indices of enums."""
     owner = resolve(node.value, source)
     if isinstance(owner, list | tuple):
         if isinstance(node.slice, ast.Tuple):
-            what = f"{ast.unparse(node.value)} is no array"
-            raise at(source.file, node, what, "make it one by np.array(…), or use x[i][k]")
+            what = f"{ast.unparse(node.value)} is not an array"
+            raise at(source.file, node, what, "make it an array with np.array(…), or use x[i][k]")
         check_index(node, (len(owner),), ast.unparse(node.value), source.file)
     elif isinstance(owner, np.ndarray) and owner.ndim in (1, 2):
         check_index(node, owner.shape, ast.unparse(node.value), source.file)
     if isinstance(owner, type) and issubclass(owner, enum.Enum):
         first = next(iter(owner.__members__), "X")
-        what = f"a name of {owner.__name__} is fixed when compiled"
+        what = f"a name of {owner.__name__} is fixed at compile time"
         raise at(source.file, node, what, f"write {owner.__name__}.{first}")
 
 
@@ -384,7 +403,7 @@ def _module(node: ast.Attribute, source: Source) -> None:
     if name in _MODULES:
         raise at(source.file, node, *_MODULES[name])
     if owner in (np, math) and not hasattr(owner, node.attr):
-        raise at(source.file, node, f"{owner.__name__} has no {node.attr}", "mend the name")
+        raise at(source.file, node, f"{owner.__name__} has no {node.attr}", "correct the name")
 
 
 def _endless(node: ast.While) -> bool:

@@ -1,4 +1,4 @@
-"""A mistake in a component's source: one line that says where, what, and what to write instead."""
+"""An error in the source of a component: one line with the place, the error and a way out."""
 
 import ast
 import io
@@ -8,28 +8,28 @@ from pathlib import Path
 
 
 class Mistake(Exception):
-    """What cannot be compiled."""
+    """An error that prevents compiling."""
 
     def __init__(self, file: str, line: int, what: str, way_out: str, text: str = "") -> None:
-        """Say where; `text` is the expression, else it is the source line."""
+        """Describe an error and a way out; `text`: the expression (default: the source line)."""
         self.file, self.line, self.what, self.way_out = file, line, what, way_out
         self.text = text or source_line(file, line)
         super().__init__(str(self))
 
     def __str__(self) -> str:
-        """Return the one line."""
+        """Return the message, one line."""
         place = f"{display(self.file)}:{self.line}: " if self.line else f"{display(self.file)}: "
         text = f"`{self.text}`: " if self.text else ""
         return f"{place}{text}{self.what}: {self.way_out}"
 
 
 def at(file: str, node: ast.AST, what: str, way_out: str) -> Mistake:
-    """Return a mistake at a node of the source."""
+    """Return the error at a node of the source."""
     return Mistake(file, getattr(node, "lineno", 0), what, way_out, written(file, node))
 
 
 def written(file: str, node: ast.AST) -> str:
-    """Return a short expression of one line as the source has it; else nothing."""
+    """Return the source text of a node; empty if it is longer than 60 characters or one line."""
     line, last, begin, end = (
         getattr(node, each, None)
         for each in ("lineno", "end_lineno", "col_offset", "end_col_offset")
@@ -48,12 +48,12 @@ def source_line(file: str, line: int) -> str:
             if each.type == tokenize.COMMENT:
                 return text[: each.start[1]].strip() or text
     except (tokenize.TokenError, SyntaxError):
-        pass  # a part of a statement, before a comment
+        pass  # the line is only a part of a statement
     return text
 
 
 def display(file: str) -> str:
-    """Return a file's name, relative where it is below the present folder."""
+    """Return the path of a file, relative if it is below the working directory."""
     path = Path(file)
     try:
         return str(path.relative_to(Path.cwd()))

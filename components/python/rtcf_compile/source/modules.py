@@ -1,4 +1,4 @@
-"""The source of a component: modules are run once, as Python, and their functions read as trees."""
+"""The source of a component: runs a module once in Python, and parses its functions to trees."""
 
 import ast
 import hashlib
@@ -20,7 +20,7 @@ from rtcf_compile.source.prefix_map import mapped
 
 @dataclass(frozen=True)
 class Source:
-    """A function of the component's author: its tree, with the line numbers of its file."""
+    """A function of the user: its syntax tree, with the line numbers of its file."""
 
     function: FunctionType
     tree: ast.FunctionDef
@@ -28,17 +28,17 @@ class Source:
 
 
 def load(file: Path) -> ModuleType:
-    """Run a module as Python does and return it; raise Mistake where that fails."""
+    """Run a module in Python and return it; raise Mistake on failure."""
     file = file.resolve()
     try:
         path = mapped(str(file)).encode()
     except UnicodeEncodeError:
-        raise Mistake(str(file), 0, "its path is not UTF-8", "rename it") from None
+        raise Mistake(str(file), 0, "its path is not UTF-8", "rename the file") from None
     name = f"rtcf_source_{hashlib.sha256(path).hexdigest()[:8]}_{file.stem}"
     linecache.checkcache(str(file))
     spec = importlib.util.spec_from_file_location(name, file)
     if spec is None or spec.loader is None or not file.is_file():
-        raise Mistake(str(file), 0, "no such Python file", "give the path of one that ends in .py")
+        raise Mistake(str(file), 0, "no such Python file", "give the path of a .py file")
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
     sys.path.insert(0, str(file.parent))
@@ -46,7 +46,7 @@ def load(file: Path) -> ModuleType:
         spec.loader.exec_module(module)
     except SyntaxError as error:
         raise Mistake(
-            str(error.filename or file), error.lineno or 0, str(error.msg), "mend the syntax"
+            str(error.filename or file), error.lineno or 0, str(error.msg), "correct the syntax"
         ) from None
     except DeclarationError as error:
         raise Mistake(str(file), _line_in(file, error), *_parts(str(error))) from None
@@ -62,7 +62,7 @@ def load(file: Path) -> ModuleType:
 
 
 def components(module: ModuleType) -> list[type[Component]]:
-    """Return the component classes that a module defines, in order; `_Name` is none."""
+    """Return the component classes that a module defines, in source order, without `_Name`."""
     found = [
         each
         for each in vars(module).values()
@@ -72,13 +72,13 @@ def components(module: ModuleType) -> list[type[Component]]:
         and not each.__name__.startswith("_")
     ]
     bases = {base for each in found for base in each.__mro__[1:]}
-    # A base without update is there for its subclasses.
+    # A base class without update is not a component.
     whole = [each for each in found if each not in bases or each.update is not Component.update]
     return sorted(dict.fromkeys(whole), key=lambda each: inspect.getsourcelines(each)[1])
 
 
 def read(function: FunctionType) -> Source:
-    """Return a function's tree."""
+    """Return the syntax tree of a function."""
     file = inspect.getsourcefile(function) or "?"
     try:
         lines, begin = inspect.getsourcelines(function)
@@ -87,7 +87,7 @@ def read(function: FunctionType) -> Source:
             file, 0, f"{function.__name__} has no source", "define it in a file"
         ) from None
     if lines[0][:1].isspace():
-        # The block around a method keeps its columns.
+        # Parse a method inside a block, which keeps its column numbers.
         block = ast.parse("".join(["if True:\n", *lines])).body[0]
         tree, above = block.body[0], 2  # type: ignore[attr-defined]
     else:
@@ -95,12 +95,12 @@ def read(function: FunctionType) -> Source:
     ast.increment_lineno(tree, begin - above)
     if not isinstance(tree, ast.FunctionDef):
         kind = "is async" if isinstance(tree, ast.AsyncFunctionDef) else "is a lambda"
-        raise Mistake(file, begin, f"{function.__name__} {kind}", "write it by `def`")
+        raise Mistake(file, begin, f"{function.__name__} {kind}", "write it with `def`")
     return Source(function, tree, file)
 
 
 def is_own(value: Any) -> bool:
-    """Tell whether it is a Python function of the component's author, to be compiled too."""
+    """Tell whether a value is a Python function of the user, which must be compiled too."""
     if not isinstance(value, FunctionType):
         return False
     if value.__module__ == "rtcf.signal":
@@ -112,7 +112,7 @@ def is_own(value: Any) -> bool:
 
 
 def _parts(text: str) -> tuple[str, str]:
-    """Return the error of a declaration, and its way out."""
+    """Split the message of a DeclarationError into the error and the way out."""
     what, _, way_out = text.rpartition(": ")
     return what, way_out
 

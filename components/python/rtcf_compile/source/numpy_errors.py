@@ -1,4 +1,4 @@
-"""Errors of NumPy about shapes and indices in plain words, with a way out."""
+"""Rewords NumPy's errors about shapes and indices, and adds a way out."""
 
 import ast
 import re
@@ -6,19 +6,19 @@ import re
 import numpy as np
 
 _FIT = "make the shapes fit"
-# `{0}` is all that was found, `{1}` its first group.
+# `{0}` is the whole match, `{1}` its first group.
 _KNOWN: tuple[tuple[type[Exception], str, str, str], ...] = (
     (
         ValueError,
         "inhomogeneous|setting an array element with a sequence",
-        "rows of different length make no array",
-        "make them fit",
+        "the rows of an array have different lengths",
+        "make the rows equally long",
     ),
     (
         ValueError,
         "must have same number of dimensions",
-        "vectors and matrices are joined",
-        "make them of one dimension",
+        "vectors are joined with matrices",
+        "give all the same number of dimensions",
     ),
     (
         ValueError,
@@ -41,18 +41,18 @@ _KNOWN: tuple[tuple[type[Exception], str, str, str], ...] = (
     (
         ValueError,
         "truth value of an array",
-        "an array is no condition",
-        "use np.any(…) or np.all(…), & and | in place of and and or",
+        "an array is not a condition",
+        "use np.any(…) or np.all(…), & and | instead of `and` and `or`",
     ),
-    (ValueError, "values to unpack.*", "another number of {0}", "make them fit"),
+    (ValueError, ".*values to unpack.*", "{0}", "use as many names"),
     (ValueError, "fp and xp .*", "np.interp: {0}", "give xp and fp the same number of points"),
     (ValueError, r"cannot reshape array of size \d+ into shape .*", "{0}", _FIT),
     (ValueError, "incompatible dimensions for cross product.*", "{0}", "use three elements"),
-    (ValueError, "slice step cannot be zero", "a step of 0", "use a step of 1 or more, or of -1"),
+    (ValueError, "slice step cannot be zero", "the step is 0", "use a step of 1 or more, or -1"),
     (
         ValueError,
         r"all the input array dimensions .* must match exactly, but along dimension \d, (.*)",
-        "arrays to join do not fit: {1}",
+        "the joined arrays do not fit: {1}",
         _FIT,
     ),
     (
@@ -65,10 +65,10 @@ _KNOWN: tuple[tuple[type[Exception], str, str, str], ...] = (
     (
         IndexError,
         "boolean index did not match .*; (.*)",
-        "a mask of another size: {1}",
+        "a mask of a different size: {1}",
         "make the sizes the same",
     ),
-    (TypeError, "slice indices must be integers.*", "a bound is no int", "use int(…)"),
+    (TypeError, "slice indices must be integers.*", "a bound is not an int", "use int(…)"),
     (
         ValueError,
         "diag requires an array of at least two.*",
@@ -77,13 +77,13 @@ _KNOWN: tuple[tuple[type[Exception], str, str, str], ...] = (
     ),
     (ValueError, ".*(?:broadcast|shape|dimension|aligned).*", "{0}", _FIT),
 )
-# A number set to an array is explained by the types.
+# The compiler reports a number set to an array from the types, with better words.
 _BY_TYPES = re.compile(r"has shape \(\), not ")
 
 
 def explained(error: BaseException, source: str) -> tuple[str, str] | None:
-    """Return the mistake of a line and the way out, if any input leads there; None for other
-    errors.
+    """Return the error of a line and the way out; None for other errors, and for those that depend
+    on inputs.
     """
     text = " ".join(str(error).split())
     by_input = isinstance(error, ValueError | IndexError) and _has_variable_slice(source)
@@ -96,7 +96,7 @@ def explained(error: BaseException, source: str) -> tuple[str, str] | None:
 
 
 def _has_variable_slice(source: str) -> bool:
-    """Tell whether sizes in a line depend on variables; constants have names in capitals."""
+    """Tell whether a slice in a line depends on variables; names in capitals are constants."""
     for text in (source, f"{source} pass"):
         try:
             tree = ast.parse(text)

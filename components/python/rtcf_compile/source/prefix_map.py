@@ -1,4 +1,4 @@
-"""Paths in libraries, mapped as in C++ objects: packages do not name the folder of their build."""
+"""Maps paths in libraries as for C++ objects, so that packages do not contain the build folder."""
 
 import os
 import shlex
@@ -7,9 +7,9 @@ _FLAGS = ("-ffile-prefix-map", "-fdebug-prefix-map")
 
 
 def mapped(file: str) -> str:
-    """Return a file's path as flags of CXXFLAGS map it: -ffile-prefix-map=/build/x=. for instance.
+    """Return the path of a file, mapped by flags in CXXFLAGS such as -ffile-prefix-map=/build/x=.
 
-    The last one that fits counts, as for gcc.
+    The last matching flag wins, as in gcc.
     """
     for word in reversed(shlex.split(os.environ.get("CXXFLAGS", ""))):
         flag, _, rule = word.partition("=")

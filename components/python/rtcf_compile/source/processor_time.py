@@ -1,6 +1,6 @@
-"""A bound on the processor time of Python code, by a timer's signal.
+"""Limits the processor time of Python code, with a timer signal.
 
-Processor time, not time of day: a busy machine changes no result.
+A limit of processor time gives the same result on a busy machine; a limit of wall time would not.
 """
 
 import ast
@@ -11,17 +11,19 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import FrameType
 
-HOOK_S = 2.0  # of a hook: thousands of times what a cycle has
+HOOK_S = 2.0  # limit of one hook, thousands of times a typical period
 
 
 class TimeLimitError(BaseException):
-    """The time is over. No Exception, so that nobody takes it for one of a component."""
+    """The limit is exceeded. A BaseException, so that components cannot catch it."""
 
 
 @contextmanager
 def limited(seconds: float) -> Iterator[None]:
-    """Raise TimeLimitError where Python code takes longer. Only in the main thread, where Python
-    runs handlers of signals; elsewhere there is no limit."""
+    """Raise TimeLimitError if the Python code in the context takes longer.
+
+    Works in the main thread only, where Python runs signal handlers; other threads have no limit.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -35,7 +37,7 @@ def limited(seconds: float) -> Iterator[None]:
 
 
 def loop_line(error: BaseException, file: str) -> int:
-    """Return the line of the loop in which a file's code was interrupted; 0 if it was in none."""
+    """Return the line of the loop in which code of a file was interrupted, else that line."""
     line, trace = 0, error.__traceback__
     while trace is not None:
         if trace.tb_frame.f_code.co_filename == file:
@@ -45,8 +47,9 @@ def loop_line(error: BaseException, file: str) -> int:
 
 
 def enclosing_loop(file: str, line: int) -> int:
-    """Return the line of the innermost `while`, else the outermost `for`, around a line; else the
-    line itself."""
+    """Return the line of the innermost `while` around a line, else of the outermost `for`, else the
+    line itself.
+    """
     try:
         tree = ast.parse(Path(file).read_bytes())
     except (OSError, SyntaxError, ValueError):
