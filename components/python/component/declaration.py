@@ -325,9 +325,7 @@ def _message(annotation: Declared) -> MessageType | None:
     if not is_message(cls):
         return None
     if annotation.kind not in (Input, Output):
-        raise DeclarationError(
-            f"has the message type {cls._type}: declare an Input or an Output"
-        )
+        raise DeclarationError(f"has the message type {cls._type}: declare an Input or an Output")
     if len(sizes) > 1 or not all(type(each) is int and each > 0 for each in sizes):
         raise DeclarationError(
             f"needs one size for all arrays of {cls._type}: write {cls.__name__}, 6"
@@ -357,9 +355,7 @@ def _queue_fields(member: Member) -> list[tuple[Any, ...]]:
 
 def _check_size(name: str, size: Any) -> None:
     if size is None:
-        raise DeclarationError(
-            f"has no size, in messages: write {name}: Queue[…] = Queue(size=8)"
-        )
+        raise DeclarationError(f"has no size, in messages: write {name}: Queue[…] = Queue(size=8)")
     if not isinstance(size, int) or isinstance(size, bool) or not 1 <= size <= 1024:
         raise DeclarationError(f"has size={size!r}: use 1 to 1024 messages")
 
