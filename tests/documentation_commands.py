@@ -55,6 +55,7 @@ ELSEWHERE: dict[str, dict[str, str]] = {
     "scope.md": {
         "rtcfctl scope ": "runs until Ctrl-C: tests/integration/test_scope.py",
         "sudo ": "needs the unit of the package",
+        "curl ": "needs the unit of the package",
     },
     "security.md": {"journalctl ": _BOOTED},
     "signals.md": {"sudo rtcfctl trace ": "needs tracefs: tests/integration/test_trace_kernel.py"},

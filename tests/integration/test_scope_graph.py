@@ -83,9 +83,11 @@ def test_large_graphs_are_as_wide_as_the_panel(shared: Daemon, page: Page, name:
     with rtcf.Client(shared.socket) as client:
         client.apply([], "rt_runner")
         client.apply(graphs.GRAPHS[name], "rt_runner")
+    lines = ",".join(sorted(f"{graphs.name(a)} {graphs.name(b)}" for a, b in graphs.LINES[name]))
     page.wait(
         "document.querySelectorAll('div[data-drawer=graph] .node').length === 200 && "
-        f"document.querySelectorAll('.edge').length === {len(graphs.LINES[name])} && "
+        "[...document.querySelectorAll('.edge')].map((each) => "
+        f"`${{each.dataset.from}} ${{each.dataset.to}}`).sort().join() === {json.dumps(lines)} && "
         "document.querySelectorAll('.break').length === "
         f"{sum(graphs.is_break(*each) for each in graphs.LINES[name])}"
     )
