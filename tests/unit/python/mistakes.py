@@ -596,8 +596,8 @@ CLASS: dict[str, tuple[str, str]] = {
         "itself",
     ),
     "method that returns two types": (
-        "def k(self):\n    if self.on:\n        return 1.0\n    return self.z\n\n"
-        "def start(self):\n    self.f = self.k()  # here",
+        "def k(self):\n    if self.on:\n        return 1.0\n    return self.z  # here\n\n"
+        "def start(self):\n    self.f = self.k()",
         "return",
     ),
     "method that returns nothing": (

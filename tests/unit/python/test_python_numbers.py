@@ -427,3 +427,123 @@ def test_results_that_differ_from_python_are_rejected(way: str, tmp_path: Path) 
     first = text.index("    def way_0(self):") + 4
     in_either = text.index("        return n") + 1
     assert raised.value.line == (in_either if "either" in way else marked or first)
+
+
+DIVISIONS = """\
+import enum
+
+import numpy as np
+from rtcf.component import Component, State
+
+
+class Mode(enum.IntEnum):
+    OFF = 0
+    RUN = 1
+
+
+class Divisions(Component):
+    which: State[int]
+    x: State[float]
+    n: State[int]
+    y: State[float]
+    m: State[int]
+    on: State[bool]
+    mode: State[Mode]
+    last: State[float | None]
+    g: State[np.float32, 3]
+
+    def narrow(self, x):
+        y = self.g * 0.1
+        x = x / self.mode
+        return x if y[0] < 1.0 else 0.0
+
+    def update(self):
+        x, n, y, m, on, mode = self.x, self.n, self.y, self.m, self.on, self.mode
+"""
+# Statements that divide x or n by a number that is 0 or not.
+DIVIDING = [
+    *("x /= y", "x //= y", "x %= y", "n //= m", "n %= m", "x /= m", "n //= mode", "n %= mode"),
+    *("x /= mode", "x = x / mode", "x /= on", "x /= self.last", "x = self.narrow(x)"),
+    *("x = x / y", "n = n // m", "n = n % m", "x = divmod(x, y)[1]", "n = divmod(n, mode)[0]"),
+    *("self.x /= y", "self.n //= mode"),
+]
+
+
+def test_single_numbers_are_not_divided_by_zero(tmp_path: Path) -> None:
+    lines = DIVISIONS.splitlines()
+    for number, text in enumerate(DIVIDING):
+        name = text.split()[0]
+        lines += [f"        if self.which == {number}:", f"            {text}"]
+        lines += [] if "." in name else [f"            self.{name} = {name}"]
+    file = tmp_path / "divisions.py"
+    file.write_text("\n".join(lines) + "\n")
+    (cls,) = modules.components(modules.load(file))
+    compiled = Inside(lowering.compile_component(cls))
+    for which, text in enumerate(DIVIDING):
+        for y, m, on in ((0.0, 0, False), (-0.0, 0, False), (0.75, -3, True)):
+            component: Any = cls()
+            component.which, component.x, component.n = which, 3.5, 7
+            component.y, component.m, component.on, component.last = y, m, on, y
+            component.mode = int(on)
+            record = component._record.copy()
+            said = compiled.call("update", record)
+            if not on:
+                assert said is not None and "ZeroDivisionError: " in said, text
+                continue
+            component.update()
+            assert said is None, text
+            assert (record["x"], record["n"]) == (component.x, component.n), text
+
+
+QUOTIENTS = """\
+import numpy as np
+from rtcf.component import Component, State
+
+
+class Quotients(Component):
+"""
+OF_PAIRS = ["a // b", "a % b", "np.floor_divide(a, b)", "np.mod(a, b)", "a // -1", "a % -1"]
+
+
+def test_arrays_of_ints_are_divided_as_by_numpy(tmp_path: Path) -> None:
+    # The smallest int by -1, too: the machine's instruction ends the process.
+    steps = []
+    lines = QUOTIENTS.splitlines()
+    kinds = [np.int8, np.int16, np.int32, np.int64, np.uint8]
+    for kind in kinds:
+        limits = np.iinfo(kind)
+        few = [
+            *{
+                limits.min,
+                limits.min + 1,
+                limits.max,
+                0,
+                1,
+                3,
+                7,
+                *(-1, -2, -3, -7) * (limits.min < 0),
+            }
+        ]
+        pairs = np.array([(a, b) for a in few for b in few], kind)
+        texts = [each for each in OF_PAIRS if limits.min < 0 or "-1" not in each]
+        texts += ["np.fmod(a, b)"] * (kind is np.int64)
+        steps.append((kind.__name__, pairs, texts))
+        for name in ("a", "b", "out"):
+            size = f"{len(texts)}, {len(pairs)}" if name == "out" else str(len(pairs))
+            lines += [f"    {name}_{kind.__name__}: State[np.{kind.__name__}, {size}]"]
+    lines += ["", "    def update(self):"]
+    for kind_name, _, texts in steps:
+        lines += [f"        a, b = self.a_{kind_name}, self.b_{kind_name}"]
+        lines += [f"        self.out_{kind_name}[{i}] = {text}" for i, text in enumerate(texts)]
+    file = tmp_path / "quotients.py"
+    file.write_text("\n".join(lines) + "\n")
+    (cls,) = modules.components(modules.load(file))
+    record = cls()._record
+    for kind_name, pairs, _ in steps:
+        record[f"a_{kind_name}"], record[f"b_{kind_name}"] = pairs[:, 0], pairs[:, 1]
+    assert Inside(lowering.compile_component(cls)).call("update", record) is None
+    for kind_name, pairs, texts in steps:
+        for found, text in zip(record[f"out_{kind_name}"], texts, strict=True):
+            names = {"a": pairs[:, 0], "b": pairs[:, 1], "np": np}
+            with np.errstate(all="ignore"):
+                np.testing.assert_array_equal(found, eval(text, names), f"{kind_name} {text}")

@@ -86,11 +86,11 @@ WRAP = """\
             x -= 2 * np.pi
         self.out.write(x)
 """
-# Compiled, 2**64 is 0; both divide the array to infinity.
+# Compiled, an odd number times 2**64 is 0; the array divides to infinity in both.
 DIVISIONS = """\
     def update(self):
-        whole = self.a.value * 2**32 * 2**32
-        self.out.write(np.sum(1.0 / np.zeros(2)) + 1.0 / (whole + 2**40 * 2**24))
+        whole = (self.a.value * 2 + 1) * 2**32 * 2**32
+        self.out.write(np.sum(1.0 / np.zeros(2)) + 1.0 / whole)
 """
 ENDLESS_PREPARE = """\
     def prepare(self):
@@ -156,8 +156,12 @@ def test_numpy_scalars_divide_as_in_compiled_code(tmp_path: Path) -> None:
         x = v[0] / (v[1] - v[1]) if v[0] > 0.0 else 1.0
         y = v[0] % v[3] + v[0] // v[2]
         y /= v[1]
+        y //= v[2]
+        y %= v[3]
         v = v / 0.0
-        self.out.write(x + y + divmod(y, x)[1])
+        k = 7
+        k //= 1 - int(x > 100.0)
+        self.out.write(x + y + k + divmod(y, x)[1])
 """
     file = written(tmp_path, body, "np.float64, 4", "float")
     assert main.main([file, "--verify", "2000"]) == main.DONE

@@ -115,9 +115,13 @@ def mistake(error: Any, function: FunctionType) -> Mistake:
     file = function.__code__.co_filename
     # numba gives the path of a file as it is, or relative to the working directory.
     name = re.escape(file.rpartition("/")[2])
-    lines = [int(each) for each in re.findall(rf'File "(?:[^"]*/)?{name}", line (\d+)', text)]
-    place = getattr(error, "loc", None)
-    line = lines[0] if lines else getattr(place, "line", function.__code__.co_firstlineno)
+    place = re.compile(rf'File "(?:[^"]*/)?{name}", line (\d+)')
+    # Returns of several types are named in the order of a set: the last in the source is reported.
+    returns = text.partition("Can't unify return type")[2].partition("During:")[0]
+    lines = sorted(map(int, place.findall(returns)), reverse=True)
+    lines = lines or [int(each) for each in place.findall(text)]
+    known = getattr(error, "loc", None)
+    line = lines[0] if lines else getattr(known, "line", function.__code__.co_firstlineno)
     return Mistake(file, line, *_said(text, source_line(file, line)))
 
 

@@ -271,6 +271,9 @@ class Numbers:
                 self._met(operation, variables)
         elif function in (helpers.rtcf_assign, helpers.rtcf_store, helpers.rtcf_set):
             self._set(value.args[0], value.args[-1])
+        elif function is helpers.rtcf_bool:
+            if isinstance(self.type_of(value.args[0].name), types.Integer):
+                raise self.stop("a bool is set to an int", "compare it: x != 0")
         elif isinstance(function, np.ufunc):
             self._ufunc(value, function)
         elif getattr(function, "__module__", None) == "math":

@@ -16,13 +16,14 @@ from rtcf_compile.machine_code.overloads import (
     compiled_as,
     conversion,
     conversions,
+    is_any_enum,
     plain,
+    plain_value,
     require_kind,
     words,
 )
 from rtcf_compile.rewriting import operators as own
 
-_DIVISIONS = (operator.truediv, operator.floordiv, operator.mod)
 _COMPARISONS = tuple(own.COMPARISONS.values())
 
 
@@ -33,6 +34,8 @@ def _operating(helper: Callable[..., Any], operation: Callable[..., Any]) -> Non
     @compiled_as(helper)
     def _operate(left: Any, right: Any) -> Any:
         one, other = operand(left), operand(right)
+        if operation in own.DIVISIONS and is_any_enum(left, right):
+            return lambda left, right: helper(plain_value(left), plain_value(right))
         if one is None or other is None:
             return lambda left, right: operation(left, right)
         if shifts and not all(each.dtype.kind in "iub" for each in (one, other)):
@@ -74,7 +77,7 @@ def _of_numbers(operation: Callable[..., Any], one: Operand, other: Operand) -> 
         if operation is operator.truediv and result.kind != "f":
             result = np.dtype(np.float64)
         to = result.type
-    if operation not in _DIVISIONS:
+    if operation not in own.DIVISIONS:
         if to is None:
             return lambda left, right: operation(left, right)
         return lambda left, right: to(operation(to(left), to(right)))

@@ -301,6 +301,9 @@ def _int(value: Any) -> Any:
 def _bool(value: Any) -> Any:
     if isinstance(value, types.Boolean):
         return lambda value: value
+    if isinstance(value, types.Integer):
+        # numbers.py rejects it, after what made an int of bools.
+        return lambda value: value != 0
     raise TypingError(f"RTCF:a bool is set to {words(value)}:compare it: x != 0")
 
 
@@ -1061,14 +1064,36 @@ def _item_of(value: Any, place: Any) -> Any:
     return lambda value, place: value
 
 
+def is_any_enum(*kinds: Any) -> bool:
+    """Tell whether one of some types is that of an enum's members."""
+    return any(isinstance(each, types.IntEnumMember) for each in kinds)
+
+
+def plain_value(value: Any) -> Any:
+    """Return the int of an enum's member, other values as they are. Compiled only."""
+    raise NotImplementedError
+
+
+@compiled_as(plain_value)
+def _plain_value(value: Any) -> Any:
+    if isinstance(value, types.IntEnumMember):
+        return lambda value: value.value
+    return lambda value: value
+
+
 def _changing(helper: Any, operation: Any) -> None:
     """Register `target += value` for one operation."""
 
     @compiled_as(helper)
     def _change(target: Any, value: Any) -> Any:
+        if operation in operators.DIVISIONS and is_any_enum(target, value):
+            return lambda target, value: helper(plain_value(target), plain_value(value))
         numbers = operand(target), operand(value)
         plainly = None in numbers or not any(each.is_narrow for each in numbers if each)
-        operate = operation if plainly else operators.OF[operation]
+        # The plain division of a single number by zero gives infinity here (_OPTIONS): own raises.
+        is_division = operation in operators.DIVISIONS and not isinstance(target, types.Array)
+        is_own = not plainly or (is_division and None not in numbers)
+        operate = operators.OF[operation] if is_own else operation
         if not isinstance(target, types.Array):
             return lambda target, value: operate(target, value)
         require_kind(operation, target, value)

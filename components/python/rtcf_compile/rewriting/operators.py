@@ -17,7 +17,7 @@ Function = Callable[..., Any]
 WIDE = frozenset(np.dtype(each) for each in (np.bool_, np.int64, np.float64))
 # A longer shift leaves no bit of an int64. The limit keeps Python ints small.
 _LONGEST_SHIFT = 4096
-_DIVISIONS = (operator.truediv, operator.floordiv, operator.mod)
+DIVISIONS = (operator.truediv, operator.floordiv, operator.mod)
 _COMPARISONS: tuple[Function, ...] = (
     *(operator.lt, operator.le, operator.gt, operator.ge),
     *(operator.eq, operator.ne),
@@ -63,7 +63,7 @@ def alike(left: Any, right: Any, operation: Function | None = None) -> tuple[Any
 def _operated(operation: Function) -> Function:
     def operate(left: Any, right: Any) -> Any:
         single = not isinstance(left, np.ndarray) and not isinstance(right, np.ndarray)
-        if single and operation in _DIVISIONS and right == 0:
+        if single and operation in DIVISIONS and right == 0:
             raise ZeroDivisionError("division by zero")
         return operation(*alike(left, right, operation))
 
@@ -133,11 +133,11 @@ OF: dict[Function, Function] = {
 ALWAYS: frozenset[type[ast.AST]] = frozenset(SHIFTS)
 NARROW: frozenset[type[ast.AST]] = frozenset((*BINARY, *SHIFTS, *COMPARISONS, ast.USub))
 COMPARED: frozenset[type[ast.AST]] = frozenset(
-    node for node, operation in BINARY.items() if operation in _DIVISIONS
+    node for node, operation in BINARY.items() if operation in DIVISIONS
 )
 # `x[i] += value` of an element. A result that does not fit wraps around when it is stored.
 OF_ELEMENTS: dict[type[ast.operator], Function] = {
-    node: _stored(operation) for node, operation in BINARY.items() if operation not in _DIVISIONS
+    node: _stored(operation) for node, operation in BINARY.items() if operation not in DIVISIONS
 }
 # NumPy functions that act as operators.
 UFUNCS: dict[Function, Function] = {
