@@ -128,6 +128,11 @@ def traces(schema: PortSchema) -> list[dict[str, str]]:
     for signal in schema.signals.values():
         count = int(np.prod(signal.shape)) if signal.shape else 0
         names = [f"{signal.name}[{i}]" for i in range(min(count, ELEMENTS))] or [signal.name]
-        kind = "bool" if signal.format == "?" else "number"
+        kind = kind_of(signal.format)
         found += [{"name": name, "unit": signal.unit, "kind": kind} for name in names]
     return found
+
+
+def kind_of(form: str) -> str:
+    """Return "bool", "integer" or "number" for a format of NumPy."""
+    return {"b": "bool", "i": "integer", "u": "integer"}.get(np.dtype(form).kind, "number")

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rtcf.recording.reader import RecordedColumn, Recording, RecordingError
 
 from rtcf_scope import wire
-from rtcf_scope.chunk import ELEMENTS, split_element
+from rtcf_scope.chunk import ELEMENTS, kind_of, split_element
 
 MOST_VALUES = 16_000_000  # 128 MB; above it, windows are reduced to minima and maxima
 
@@ -35,9 +35,10 @@ class Recordings:
                 names = [signal.name] if count is None else [
                     f"{signal.name}[{i}]" for i in range(min(count, ELEMENTS))
                 ]  # fmt: skip
-                signals += [{"name": each, "unit": signal.unit} for each in names]
+                kind = kind_of(signal.leaf.format)
+                signals += [{"name": each, "unit": signal.unit, "kind": kind} for each in names]
             return {"name": name, "whole": recording.whole, "signals": signals,
-                    "cycles": len(recording.cycles),
+                    "cycles": len(recording.cycles), "begin_ns": str(recording.begin_ns),
                     "seconds": (recording.end_ns - recording.begin_ns) / 1e9}  # fmt: skip
 
     def columns(

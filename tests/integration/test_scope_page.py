@@ -229,19 +229,20 @@ def test_the_legend_of_a_shot_shows_the_values_at_its_hit(
     assert told[0] == told[1] != told[2]
 
 
-def test_a_layout_with_a_duplicate_signal_keeps_the_others(
-    visit: Opener, scope: ScopeProcess
-) -> None:
+def test_a_layout_may_have_a_signal_in_several_panes(visit: Opener, scope: ScopeProcess) -> None:
     page = visit(
         scope,
         '{"panes":[{"traces":["/w0.wave"]},{"traces":["/w0.wave"]},{"traces":["/w0.wave","/w1.wave"],'
         '"scale":{"low":-3,"high":3}},{"traces":[]},null,{"traces":"/w2.wave"}],"span":1}',
     )  # fmt: skip
-    page.wait("scope.live.end > 100 && scope.live.column('/w1.wave')")
+    page.wait("scope.live.end > 100 && scope.live.column('/w1.wave') !== undefined")
     panes = page.ask(
         "scope.panes.map((pane) => [pane.traces.map((each) => each.name), pane.scale])"
     )
-    assert panes[:2] == [[["/w0.wave"], None], [["/w1.wave"], {"low": -3, "high": 3}]]
+    assert panes[:3] == [
+        [["/w0.wave"], None], [["/w0.wave"], None],
+        [["/w0.wave", "/w1.wave"], {"low": -3, "high": 3}],
+    ]  # fmt: skip
     assert page.errors == []
 
 

@@ -1,41 +1,62 @@
 // What is shown and how, as a small object: in the address, and saved on the server.
+import { errorOf, isDerived } from "./data/derived.js";
+import { isAxis } from "./drawing/pane.js";
 import { ask } from "./server.js";
 
 const AFTER_MS = 300;
 
-export function taken(scope, runner, drawer) {
-  const { trigger, panes, view, mode } = scope;
+export function taken(scope, runner, drawer, xy) {
+  const { trigger, panes, view, mode, ruler } = scope;
   return {
     runner, mode: mode === "recording" ? "roll" : mode, drawer, span: Number((mode === "roll" ? view.span : scope.rollSpan ?? 10).toPrecision(4)),
-    panes: panes.map((pane) => ({ traces: pane.traces.map((each) => each.name), ...(pane.scale ? { scale: pane.scale } : {}) })),
-    trigger: trigger.told,
+    ruler, panes: panes.map(paneTaken), trigger: trigger.told, xy: { ...xy.chosen, equal: xy.isEqual },
   };
+}
+
+// Only what is not as it is without a layout.
+function paneTaken(pane) {
+  const traces = pane.traces.map(({ name, axis, own }) => (axis || own.set ? { name, ...(axis && { axis }), ...(own.set && { scale: own.set }) } : name));
+  const weight = Number(pane.weight.toPrecision(3));
+  return { traces, ...(pane.scale && { scale: pane.scale }), ...(pane.right.set && { right: pane.right.set }), ...(weight !== 1 && { height: weight }) };
 }
 
 // What a layout may say of a trigger.
 const TRIGGER = { signal: "string", kind: "string", slope: "string", condition: "string", low: "number", high: "number",
   window: "number", position: "number", holdoff: "number", single: "boolean" };
 
-// The panes' traces by name; a signal is in the first pane that has it.
-function panesOf(layout) {
-  const seen = new Set();
+// The panes of a layout; `wrong` gets the errors of derived signals, which are left out.
+function panesOf(layout, wrong) {
   return layout.panes.slice(0, 12).map((pane) => {
-    const { traces, scale } = pane ?? {};
-    const names = (Array.isArray(traces) ? traces : []).filter((name) => typeof name === "string");
-    const own = names.filter((name) => !seen.has(name) && seen.add(name));
-    return { traces: own, scale, asked: names.length };
-  }).filter(({ traces, asked }) => traces.length || !asked);
+    const { traces, scale, right, height } = pane ?? {};
+    const found = new Map(); // by name: a signal is in a pane once
+    for (const each of Array.isArray(traces) ? traces : []) {
+      const trace = typeof each === "string" ? { name: each } : each ?? {};
+      if (typeof trace.name !== "string") continue;
+      const error = isDerived(trace.name) ? errorOf(trace.name) : "";
+      if (error) wrong.push(error); else if (!found.has(trace.name)) found.set(trace.name, trace);
+    }
+    return { traces: [...found.values()], scale: rangeOf(scale), right: rangeOf(right), height: height > 0.05 && height < 20 ? height : 1 };
+  });
 }
 
+function rangeOf(range) {
+  const { low, high } = range ?? {};
+  return Number.isFinite(low) && Number.isFinite(high) && low < high ? { low, high } : null;
+}
+
+// Shows a layout; returns what of it is left out, in a line.
 export function given(scope, layout) {
+  const wrong = [];
   if (Array.isArray(layout.panes) && layout.panes.length) {
     while (scope.panes.length > 1) scope.removePane(scope.panes.at(-1));
     const [first] = scope.panes;
     for (const { name } of [...first.traces]) first.remove(name);
-    panesOf(layout).forEach(({ traces, scale }, i) => {
+    panesOf(layout, wrong).forEach(({ traces, scale, right, height }, i) => {
       const pane = i ? scope.addPane() : first;
-      for (const name of traces) pane.add(name);
-      pane.scale = Number.isFinite(scale?.low) && Number.isFinite(scale.high) && scale.low < scale.high ? { low: scale.low, high: scale.high } : null;
+      for (const { name, axis, scale: own } of traces) pane.add(name, isAxis(axis) ? axis : undefined).own.set = rangeOf(own);
+      pane.left.set = scale;
+      pane.right.set = right;
+      pane.weigh(height);
     });
     scope.activate(scope.panes[0]);
   }
@@ -44,8 +65,10 @@ export function given(scope, layout) {
     const value = layout.trigger?.[name];
     if (typeof value === type && (type !== "number" || Number.isFinite(value))) scope.trigger.told[name] = value;
   }
+  scope.setRuler(layout.ruler);
   scope.onTraces();
   scope.changed();
+  return wrong.length ? `left out: ${wrong.join("; ")}` : "";
 }
 
 export function ofAddress() {

@@ -4,6 +4,7 @@ import * as exporting from "./export.js";
 import { KEYS, mind } from "./keys.js";
 import * as layout from "./layout.js";
 import { Cycles } from "./panels/cycles.js";
+import { Derive } from "./panels/derive.js";
 import { Events } from "./panels/events.js";
 import { Graph } from "./panels/graph.js";
 import { Measurements } from "./panels/measurements.js";
@@ -12,8 +13,11 @@ import { Recordings } from "./panels/recordings.js";
 import { Spectrum } from "./panels/spectrum.js";
 import { Tree } from "./panels/tree.js";
 import { TriggerPanel } from "./panels/trigger.js";
+import { XY } from "./panels/xy.js";
+import { sizesPart } from "./resize.js";
 import { isForInformation, Scope } from "./scope.js";
 import { Stream, ask, enter, onSession, query } from "./server.js";
+import { sources } from "./data/derived.js";
 import { DURATION, LATENCY } from "./data/store.js";
 
 const SLOW_MS = 250; // between two looks at figures
@@ -29,10 +33,12 @@ const recordings = new Recordings(scope, $("recordings"), told.trouble);
 const triggering = new TriggerPanel(scope, $("trigger"), arm);
 const measurements = new Measurements(scope, drawerOf("measurements"));
 const spectrum = new Spectrum(scope, $("spectrum"));
+const xy = new XY(scope, drawerOf("xy"));
 const cycles = new Cycles(scope, $("cycles"));
 const events = new Events(scope, drawerOf("events"));
 const graph = new Graph(drawerOf("graph"), async (name) => (await ask(`/api/component?${query({ runner: told.runner(), name })}`)).values);
 const figures = { frames: 0, perSecond: 0, since: performance.now(), state: {} };
+new Derive(scope, $("derive"));
 let stream = null, drawer = "measurements", generation = -1, liveCatalog = [];
 const troubles = new Map();
 window.scope = scope; // for who looks at the page with the browser's tools
@@ -56,8 +62,8 @@ function watch() {
   watching = true;
   queueMicrotask(() => {
     watching = false;
-    const names = [...new Set(scope.traces().map((each) => each.name))];
-    stream?.want({ watch: names });
+    const names = scope.traces().map((each) => each.name);
+    stream?.want({ watch: sources(names) });
     scope.live.keep(names);
   });
 }
@@ -68,6 +74,7 @@ function triggerIs(words) {
 }
 const OFF = { state: "off", armed: [], missing: [] };
 
+scope.onActive = () => tree.show();
 scope.onTraces = () => {
   watch();
   tree.show();
@@ -158,7 +165,7 @@ async function renew(all) {
     const found = await ask(`/api/graph?${query({ runner })}`);
     if (runner !== told.runner()) return;
     liveCatalog = found.signals;
-    for (const { name, unit } of found.signals) scope.units.set(name, unit);
+    scope.know(found.signals);
     if (all) { catalog(); parameters.show(found.components); graph.show(found); watch(); }
     else parameters.tell(found.components);
     await parameters.who();
@@ -212,7 +219,7 @@ async function slow() {
   }
   if (scope.mode === "recording") recordings.look();
   for (const pane of scope.panes) pane.tell();
-  ({ measurements, spectrum, cycles, events }[drawer] ?? { show() {} }).show();
+  ({ measurements, spectrum, xy, cycles, events }[drawer] ?? { show() {} }).show();
   $("span").textContent = scaled(scope.view.span, "s");
   const frozen = scope.mode === "roll" && !scope.view.follows;
   $("freeze").textContent = frozen ? "Run" : "Freeze";
@@ -233,7 +240,7 @@ async function layouts() {
 async function chooseLayout(choice) {
   if (choice === "save") {
     const name = prompt("Save this layout as");
-    if (name) await layout.save(name, layout.taken(scope, told.runner(), drawer));
+    if (name) await layout.save(name, layout.taken(scope, told.runner(), drawer, xy));
   } else if (choice === "remove") {
     const name = prompt("Remove which layout?");
     if (name) await layout.remove(name);
@@ -247,9 +254,10 @@ function apply(found) {
     $("runner").value = found.runner;
     connect(found.runner);
   } else arm(null); // the layout's is another
-  layout.given(scope, found ?? {});
+  xy.take(found?.xy ?? {});
+  trouble("layout", layout.given(scope, found ?? {}));
   mode(found?.mode === "trigger" ? "trigger" : "roll");
-  if (["measurements", "spectrum", "cycles", "graph", "events"].includes(found?.drawer)) open(found.drawer);
+  if (["measurements", "spectrum", "xy", "cycles", "graph", "events"].includes(found?.drawer)) open(found.drawer);
 }
 
 const systemsLight = matchMedia("(prefers-color-scheme: light)");
@@ -294,7 +302,13 @@ function buttons() {
   };
   $("keys").querySelector("dl").replaceChildren(...KEYS.flatMap(([key, does]) => [
     Object.assign(document.createElement("dt"), { textContent: key }), Object.assign(document.createElement("dd"), { textContent: does })]));
-  mind(scope, { freeze, theme: other, search: () => $("search").focus(), help: () => $("keys").showModal(),
+  const pointing = () => {
+    scope.isPointing = !scope.isPointing;
+    scope.pointAt(null);
+  };
+  sizesPart($("beside"), "--list", { axis: "x", sign: 1, size: () => $("list").offsetWidth, least: 140, most: () => innerWidth * 0.6 });
+  sizesPart($("above"), "--drawer", { axis: "y", sign: -1, size: () => drawerOf(drawer).offsetHeight, least: 60, most: () => innerHeight * 0.65 });
+  mind(scope, { freeze, pointing, theme: other, search: () => $("search").focus(), help: () => $("keys").showModal(),
     mode: () => mode(scope.mode === "trigger" ? "roll" : "trigger") });
 }
 
@@ -314,7 +328,7 @@ async function begin() {
   connect(told.runner());
   if (asked) apply(asked);
   // Not before: the address has what is asked for until then.
-  scope.onLayout = () => layout.toAddress(() => layout.taken(scope, told.runner(), drawer));
+  scope.onLayout = () => layout.toAddress(() => layout.taken(scope, told.runner(), drawer, xy));
   await Promise.all([layouts(), recordings.show()]);
   new ResizeObserver(() => scope.changed()).observe($("panes"));
   setInterval(slow, SLOW_MS);

@@ -3,7 +3,9 @@
 import { Pane } from "./drawing/pane.js";
 import { Pace, View } from "./drawing/view.js";
 import { minded } from "./drawing/pointer.js";
+import { RULERS, rulerOf, secondOfDay } from "./drawing/ruler.js";
 import { DURATION, LATENCY, Store } from "./data/store.js";
+import { sizesPanes } from "./resize.js";
 
 const SHOTS = 32;
 
@@ -18,16 +20,21 @@ export class Scope {
     this.active = null;
     this.cursors = { a: null, b: null };
     this.units = new Map([[LATENCY, "µs"], [DURATION, "µs"]]);
+    this.kinds = new Map(); // of signals by name: "number", "integer" or "bool"
     this.catalog = [];
-    this.shots = []; // {store, cycle}, newest last
+    this.ruler = RULERS[0]; // the numbers of the time axis
+    this.isPointing = true; // values under the pointer are shown
+    this.shots = []; // {store, cycle, hitTime, baseNs}, newest last
     this.shotNumber = -1;
-    this.recordings = []; // {name, store}: one, or two over each other
+    this.recordings = []; // {name, store, shift, beginNs}: one, or two over each other
     this.events = []; // newest last
     // `told`: as it is set; `armed`: the signals that the server looks at; `missing`: those of them
     // that the graph does not have.
     this.trigger = { told: { kind: "edge", signal: "", slope: "rising", low: 0, high: 1 }, state: "off", armed: [], missing: [] };
     this.baseNs = 0n;
     this.onTraces = () => {}; // others are watched
+    this.onActive = () => {}; // another pane is the active one
+    this.onShift = () => {}; // the second recording has moved
     this.onLayout = () => {}; // something that a layout holds is another
     this.dirty = true;
     this.drawn = { end: NaN, time: NaN }; // of the live cycles, in the frame before
@@ -49,8 +56,77 @@ export class Scope {
   // The place whose values the legends tell where no cursor is: the hit, or the newest.
   get readAt() { return this.mode === "trigger" ? this.store.nearest(0) : this.store.end - 1; }
 
+  // Takes notice of signals: {name, unit, kind}.
+  know(signals) {
+    for (const { name, unit, kind } of signals) {
+      this.units.set(name, unit);
+      this.kinds.set(name, kind);
+    }
+    this.dirty = true;
+  }
+
   unit(name) { return this.units.get(name) ?? ""; }
-  traces() { return this.panes.flatMap((pane) => pane.traces); }
+
+  // All traces, a signal that is in several panes once.
+  traces() {
+    const found = new Map();
+    for (const pane of this.panes) for (const trace of pane.traces) if (!found.has(trace.name)) found.set(trace.name, trace);
+    return [...found.values()];
+  }
+
+  get hasRight() { return this.panes.some((pane) => pane.traces.some((each) => pane.axisOf(each) === "right")); }
+
+  // Panes beside which no axis stands at the right are as wide as the others, too.
+  arrange() { this.box.classList.toggle("both", this.hasRight); }
+
+  // The ns since 1970 of the time 0 of the axis, null where it is not known.
+  get origin() {
+    if (this.mode === "recording") return this.recordings[0]?.beginNs ?? null;
+    const { shot } = this, base = BigInt((this.mode === "trigger" ? shot?.baseNs : this.baseNs) ?? 0);
+    return base ? base + BigInt(Math.round((this.mode === "trigger" ? shot.hitTime : 0) * 1e9)) : null;
+  }
+
+  // The time of day of the time 0 of the axis, s.
+  secondOfDay() {
+    const { origin } = this;
+    if (origin !== this.day?.origin) this.day = { origin, second: origin === null ? null : secondOfDay(origin) };
+    return this.day.second;
+  }
+
+  // The numbers of the time axis of a plot of so many CSS pixels.
+  rulerOf(width) {
+    const { store, view } = this;
+    // Of the live cycles it does not change from frame to frame.
+    const own = this.mode === "roll" ? NaN : (store.cycle(store.end - 1) - store.cycle(store.begin)) / (store.lastTime - store.firstTime);
+    const rate = own > 0 && isFinite(own) ? own : this.rate || 1000;
+    return rulerOf(this.ruler, { span: view.span, width, zero: this.ruler === "clock" ? this.secondOfDay() : null, store, rate });
+  }
+
+  setRuler(name) {
+    this.ruler = RULERS.includes(name) ? name : RULERS[0];
+    this.changed();
+  }
+
+  nextRuler() { this.setRuler(RULERS[(RULERS.indexOf(this.ruler) + 1) % RULERS.length]); }
+
+  // Where the pointer is in a plot, CSS pixels; null: in none.
+  pointAt(pane, x, y) {
+    for (const each of this.panes) {
+      if (pane && this.isPointing) each.readout.point(x, each === pane ? y : null);
+      else each.readout.leave();
+    }
+    pane?.readout.show();
+  }
+
+  // Moves the second of two recordings, s from where it was at first.
+  shiftSecond(seconds) {
+    const [, second] = this.recordings;
+    if (!second || !Number.isFinite(seconds)) return;
+    second.shift = seconds;
+    this.onShift(seconds);
+    this.changed();
+  }
+
   changed() {
     this.dirty = true;
     if (this.found) this.found.baseNs = null;
@@ -60,6 +136,7 @@ export class Scope {
   addPane() {
     const pane = new Pane(this);
     minded(pane, this);
+    sizesPanes(pane.bar, pane, this);
     this.panes.push(pane);
     this.box.append(pane.box);
     pane.describe();
@@ -71,24 +148,26 @@ export class Scope {
     if (this.panes.length === 1) return;
     this.panes = this.panes.filter((each) => each !== pane);
     pane.box.remove();
+    this.arrange();
     if (this.active === pane) this.activate(this.panes[0]);
     this.onTraces();
     this.changed();
   }
 
   activate(pane) {
+    const isOther = pane !== this.active;
     this.active = pane;
     for (const each of this.panes) each.box.classList.toggle("active", each === pane);
+    if (isOther) this.onActive();
     this.changed();
   }
 
-  // Show a signal in a pane, or no more; one that is in another pane goes.
-  toggle(name, pane = null) {
-    const there = this.panes.find((each) => each.has(name));
-    if (there) {
-      there.remove(name);
-      if (!there.traces.length && this.panes.length > 1) this.removePane(there);
-    } else (pane ?? this.active).add(name);
+  // Shows a signal in a pane, or takes it away there.
+  toggle(name, pane = this.active) {
+    if (pane.has(name)) {
+      pane.remove(name);
+      if (!pane.traces.length && this.panes.length > 1) this.removePane(pane);
+    } else pane.add(name);
     this.onTraces();
     this.changed();
   }
@@ -116,7 +195,7 @@ export class Scope {
     if (mode === "roll") { this.view.span = this.rollSpan ?? 10; this.view.follow(); }
     else this.rollSpan ??= this.view.span;
     if (mode === "trigger" && this.shot) this.showShot(this.shots.length - 1);
-    for (const pane of this.panes) pane.shown = { low: -1, high: 1 };
+    for (const pane of this.panes) pane.forget();
     this.onTraces();
     this.changed();
   }
@@ -126,7 +205,7 @@ export class Scope {
     const hitTime = message.times[message.hit], cycle = message.cycles[message.hit];
     const times = Float64Array.from(message.times, (time) => time - hitTime);
     const store = Store.of({ ...message, times, lost: 0 }, names);
-    this.shots.push({ store, cycle, hitTime });
+    this.shots.push({ store, cycle, hitTime, baseNs: String(this.baseNs) });
     if (this.shots.length > SHOTS) this.shots.shift();
     if (this.mode === "trigger") this.showShot(this.shots.length - 1);
   }

@@ -41,6 +41,7 @@ export class Column {
 
   get(at) { return this.values[at % this.values.length]; }
   isOdd(at) { return this.odd[at % this.odd.length] !== 0; }
+  isBlank(at) { return !this.isOdd(at) && Number.isNaN(this.get(at)); }
 
   // Minimum and maximum from `begin` to before `end`: [Infinity, -Infinity] where no number is.
   range(begin, end) {

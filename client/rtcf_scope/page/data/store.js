@@ -1,5 +1,8 @@
 // The cycles that are at hand: times, numbers, and a column for each trace.
 import { BLOCK, Column } from "./column.js";
+import { Derivation } from "./derivation.js";
+import { derived, isDerived, sources } from "./derived.js";
+import { RECORDED } from "./wire.js";
 
 export const LATENCY = "~latency", DURATION = "~duration";
 const KEPT = 128 * BLOCK; // cycles: 4 minutes of 2 kHz, 5 MB a trace
@@ -15,6 +18,7 @@ export class Store {
   // What came as one message: a shot, or a recording.
   static of(message, names) {
     const store = new Store(message.count + 1);
+    store.hasAll = message.kind !== RECORDED || !(message.hit > 1);
     store.push(message, names);
     return store;
   }
@@ -23,9 +27,12 @@ export class Store {
     this.times = new Float64Array(this.capacity);
     this.cycles = new Float64Array(this.capacity);
     this.columns = new Map([[LATENCY, new Column(this.capacity)], [DURATION, new Column(this.capacity)]]);
+    this.derivations = new Map(); // by name; their values are in a column of that name
+    this.hasAll = true; // each cycle is here, not only minima and maxima
+    this.shift = 0; // seconds that are added to all times
     this.end = 0; // all that have come
     this.lost = 0;
-    this.gaps = []; // {from, to, cycles}: times between which cycles are missing, oldest first
+    this.gaps = []; // {from, to, cycles}: times, without `shift`, between which cycles are missing, oldest first
     this.serial = ++serial; // no other content has the same
   }
 
@@ -33,13 +40,29 @@ export class Store {
   get empty() { return this.end === 0; }
   get firstTime() { return this.time(this.begin); }
   get lastTime() { return this.time(this.end - 1); }
-  time(at) { return this.times[at % this.capacity]; }
+  time(at) { return this.times[at % this.capacity] + this.shift; }
   cycle(at) { return this.cycles[at % this.capacity]; }
-  column(name) { return this.columns.get(name); }
+  column(name) { return this.columns.get(name) ?? (isDerived(name) ? this.#derive(name) : undefined); }
+
+  // Moves all cycles in time, by so many seconds from where they were at first.
+  move(seconds) {
+    this.shift = seconds;
+    this.serial = ++serial;
+  }
+
+  // A derived signal has a column as soon as its signals have one.
+  #derive(name) {
+    if (!this.hasAll || !derived(name).signals.every((each) => this.columns.has(each))) return undefined;
+    const column = new Column(this.capacity), derivation = new Derivation(name, this, column);
+    derivation.run(this.begin, this.end);
+    this.columns.set(name, column);
+    this.derivations.set(name, derivation);
+    return column;
+  }
 
   push(message, names) {
     if (!message.count) return;
-    if (!this.empty && message.times[0] < this.lastTime) this.clear(); // a clock that went back
+    if (!this.empty && message.times[0] + this.shift < this.lastTime) this.clear(); // a clock that went back
     this.lost += message.lost;
     const columns = new Map([[LATENCY, message.latencies], [DURATION, message.durations]]);
     names.forEach((name, i) => columns.set(name, message.traces[i]));
@@ -48,32 +71,38 @@ export class Store {
     // Where cycles are missing, and where a loop begins anew, lines are broken.
     const missing = this.empty ? 0 : message.lost || message.cycles[0] - this.cycle(this.end - 1) - 1;
     if (missing !== 0) this.#gap(message.times[0], Math.max(missing, 0));
-    for (const [name, column] of this.columns) {
-      const values = columns.get(name);
-      if (values) column.write(this.end, values);
-      else for (let i = 0; i < message.count; i++) column.blank(this.end + i);
-    }
     for (let i = 0; i < message.count; i++) {
       this.times[(this.end + i) % this.capacity] = message.times[i];
       this.cycles[(this.end + i) % this.capacity] = message.cycles[i];
     }
+    for (const [name, column] of this.columns) {
+      const values = columns.get(name);
+      if (values) column.write(this.end, values);
+      else if (!this.derivations.has(name)) for (let i = 0; i < message.count; i++) column.blank(this.end + i);
+    }
+    for (const derivation of this.derivations.values()) derivation.run(this.end, this.end + message.count);
     this.end += message.count;
-    while (this.gaps.length && this.gaps[0].to <= this.firstTime) this.gaps.shift();
+    while (this.gaps.length && this.gaps[0].to + this.shift <= this.firstTime) this.gaps.shift();
   }
 
   // A place that is no cycle, and has the time of the last one.
   #gap(until, cycles) {
-    const time = this.lastTime, at = this.end++;
+    const time = this.times[(this.end - 1) % this.capacity], at = this.end++;
     this.gaps.push({ from: time, to: until, cycles });
     this.times[at % this.capacity] = time;
     this.cycles[at % this.capacity] = NaN;
-    for (const column of this.columns.values()) column.blank(at);
+    for (const [name, column] of this.columns) if (!this.derivations.has(name)) column.blank(at);
+    for (const derivation of this.derivations.values()) derivation.run(at, at + 1);
   }
 
   // Columns that nobody looks at any more.
   keep(names) {
-    const kept = new Set([LATENCY, DURATION, ...names]);
-    for (const name of this.columns.keys()) if (!kept.has(name)) this.columns.delete(name);
+    const kept = new Set([LATENCY, DURATION, ...names, ...sources(names)]);
+    for (const name of this.columns.keys())
+      if (!kept.has(name)) {
+        this.columns.delete(name);
+        this.derivations.delete(name);
+      }
   }
 
   // The place of the first cycle that is not before `time`.

@@ -51,7 +51,7 @@ export function tickTexts(at, step) {
 const superscript = (power) => String(power).replace(/./g, (each) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(each)]);
 
 // Thousands apart, from five digits on.
-function grouped(text) {
+export function grouped(text) {
   const [whole, part] = text.split(".");
   const apart = whole.replace("−", "").length < 5 ? whole : whole.replace(/\B(?=(\d{3})+$)/g, THIN);
   return part === undefined ? apart : `${apart}.${part}`;

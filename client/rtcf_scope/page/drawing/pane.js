@@ -1,96 +1,157 @@
-// One pane: its traces and their scale, a plot of them with axes, marks and cursors, and a legend.
-import { figure, tickText, ticks } from "./axes.js";
+// One pane: its traces and their scales, a plot of them with axes, marks and cursors, and a legend.
+import { figure } from "./axes.js";
 import { drawMark, Marks } from "./marks.js";
 import { colour, ink, isInSymbol, symbol } from "./palette.js";
 import { drawColumns, newsOf } from "./picture.js";
 import { Raster } from "./raster.js";
+import { Readout } from "./readout.js";
+import { Scale } from "./scale.js";
 import { Sight } from "./sight.js";
 import { Tiles } from "./tiles.js";
 import { labelled, Times } from "./times.js";
 import { drawValues, FONT, LEFT, TOP, Values } from "./values.js";
+import { isDerived } from "../data/derived.js";
 
-const RIGHT = 12, BOTTOM = 22;
-const SHRINKS = 0.6; // a scale of which the values need less is fitted again
+const RIGHT = 12, BOTTOM = 22; // CSS pixels; the right one without an axis
+const TRACK = 34, TRACK_ALONE = 72; // height of a track at most, CSS pixels: below lines, and without any
+const NAMED = 14; // height of a track from which it has its name
+const TRACKS = 0.5; // how much of a plot with lines the tracks take at most
+const AXES = [["left", "left axis"], ["right", "right axis"], ["own", "own scale"], ["track", "track"]];
+export const isAxis = (name) => AXES.some(([each]) => each === name);
 
 export class Pane {
   constructor(scope) {
     this.scope = scope;
-    this.traces = []; // {name, number}: the number gives the colour
-    this.scale = null; // {low, high}, or null: as the values need
-    this.shown = { low: -1, high: 1 };
+    // {name, number, axis, own}: the number gives the colour; `axis` is one of AXES, or undefined, and
+    // then a track for booleans and the left one for others; `own` is the scale of an own axis.
+    this.traces = [];
+    this.left = new Scale();
+    this.right = new Scale();
+    this.weight = 1; // its part of the height
+    this.drawn = []; // {name, number, sight, track}, of the traces, as they were drawn last
     this.content = ""; // another one when the traces are
     this.size = { width: 0, height: 0 }; // of the plot
     this.box = element("div", "pane");
     this.face = element("div", "face"); // where the mouse is heard
     this.face.setAttribute("role", "img");
     this.plot = element("div", "plot");
-    this.values = new Values();
+    this.values = new Values("left");
+    this.rightValues = new Values("right");
     this.tiles = new Tiles(this.plot);
     this.marks = new Marks(this.tiles.strip);
     this.cursors = new Marks(this.tiles.strip);
     this.levels = element("div", "levels");
-    this.plot.append(this.levels);
+    this.names = element("div", "names"); // of the tracks
+    this.plot.append(this.levels, this.names);
     const below = element("div", "times");
-    this.times = new Times(below);
-    this.face.append(this.values.canvas, this.plot, below);
+    this.times = new Times(below, () => scope.nextRuler());
+    this.face.append(this.values.canvas, this.plot, this.rightValues.canvas, below);
+    this.readout = new Readout(this, scope);
     this.legend = element("div", "legend");
-    this.box.append(this.face, this.legend);
+    this.bar = element("div", "bar y"); // sizes it, and the pane above
+    this.box.append(this.bar, this.face, this.legend);
     new ResizeObserver(([{ contentRect: { width, height } }]) => {
       this.size = { width, height };
       scope.dirty = true;
     }).observe(this.plot);
   }
 
-  add(name) {
-    const used = new Set(this.scope.traces().map((each) => each.number));
-    let number = 0;
-    while (used.has(number)) number++;
-    this.traces.push({ name, number });
+  // The left scale, as it was set, and as it is.
+  get scale() { return this.left.set; }
+  set scale(range) { this.left.set = range; }
+  get shown() { return this.left.shown; }
+
+  // Its part of the height, beside those of the other panes.
+  weigh(weight) {
+    this.weight = weight;
+    this.box.style.flexGrow = weight;
+  }
+
+  add(name, axis) {
+    const numbers = this.scope.traces().map((each) => [each.name, each.number]);
+    // A signal has one colour in all panes.
+    let number = new Map(numbers).get(name);
+    if (number === undefined) {
+      const used = new Set(numbers.map(([, each]) => each));
+      for (number = 0; used.has(number);) number++;
+    }
+    this.traces.push({ name, number, axis, own: new Scale() });
     this.describe();
+    return this.traces.at(-1);
   }
 
   remove(name) {
     this.traces = this.traces.filter((each) => each.name !== name);
-    if (!this.traces.length) this.scale = null;
+    if (!this.traces.length) { this.left.set = null; this.right.set = null; }
     this.describe();
   }
 
   has(name) { return this.traces.some((each) => each.name === name); }
 
+  axisOf({ name, axis }) { return axis ?? (this.scope.kinds.get(name) === "bool" ? "track" : "left"); }
+  #on(axis) { return this.traces.filter((each) => this.axisOf(each) === axis); }
+  #scaleOf(trace) { return { left: this.left, right: this.right }[this.axisOf(trace)] ?? trace.own; }
+
   // The legend: made anew when traces change, its values by `tell`.
   describe() {
-    this.content = this.traces.map((each) => `${each.name} ${each.number}`).join("\n");
-    this.legend.replaceChildren(...this.traces.map((trace) => {
-      const chip = element("span", "chip");
-      const name = element("span", "");
-      name.textContent = trace.name;
-      name.title = trace.name;
-      trace.value = element("b", "");
-      trace.room = 0; // characters
-      const close = element("button", "");
-      close.textContent = "×";
-      close.title = `take ${trace.name} away`;
-      close.onclick = () => this.scope.toggle(trace.name, this);
-      chip.append(sample(trace.number), name, trace.value, close);
-      return chip;
-    }));
+    this.content = this.#contents();
+    this.legend.replaceChildren(...this.traces.map((trace) => this.#chip(trace)));
     if (!this.traces.length) {
       const hint = element("span", "hint");
       hint.textContent = "empty pane: choose signals at the left (they go to the pane with the bar)";
       this.legend.append(hint);
     }
     this.face.setAttribute("aria-label", `traces ${this.traces.map((each) => each.name).join(", ")}`);
+    this.scope.arrange();
+    this.tell();
   }
 
-  // The values at cursor A, at the hit of a trigger, or the newest ones.
+  #contents() { return this.traces.map((each) => `${each.name} ${each.number} ${this.axisOf(each)}`).join("\n"); }
+
+  #chip(trace) {
+    const chip = element("span", "chip");
+    const name = element("span", "");
+    name.textContent = trace.name;
+    name.title = trace.name;
+    trace.value = element("b", "");
+    trace.room = 0; // characters
+    trace.badge = element("small", "badge");
+    const close = element("button", "");
+    close.textContent = "×";
+    close.title = `take ${trace.name} away`;
+    close.onclick = () => this.scope.toggle(trace.name, this);
+    chip.append(this.#look(trace), name, trace.badge, trace.value, close);
+    return chip;
+  }
+
+  // The sample of a trace's line; a press on it offers the axes.
+  #look(trace) {
+    const look = element("span", "look"), select = element("select", "");
+    select.setAttribute("aria-label", `axis of ${trace.name}`);
+    select.title = `${trace.name}: left or right axis, own scale, or track`;
+    select.append(...AXES.map(([axis, text]) => new Option(text, axis)));
+    select.value = this.axisOf(trace);
+    select.onchange = () => {
+      trace.axis = select.value;
+      this.describe();
+      this.scope.changed();
+    };
+    look.append(sample(trace.number), select);
+    return look;
+  }
+
+  // The values at cursor A, at the hit of a trigger, or the newest ones; and the scales that have no axis.
   tell() {
     const { scope } = this, { a } = scope.cursors;
     const store = scope.sources()[0];
     const at = a === null ? scope.readAt : store.nearest(a);
     for (const trace of this.traces) {
+      const axis = this.axisOf(trace), { low, high } = trace.own.shown;
+      say(trace.badge, axis === "right" ? "right" : axis === "own" ? `${figure(low)} … ${figure(high)}` : "");
       const column = store.column(trace.name), isThere = column && at >= store.begin;
       const text = isThere && column.isOdd(at) && Number.isNaN(column.get(at)) ? "NaN"
-        : figure(isThere ? column.get(at) : NaN, scope.unit(trace.name));
+        : !store.hasAll && isDerived(trace.name) ? "zoom in" // minima and maxima are no cycles to compute with
+          : figure(isThere ? column.get(at) : NaN, scope.unit(trace.name));
       if (trace.value.textContent === text) continue;
       trace.value.textContent = text;
       // Room that is taken once is kept: a legend whose lines break anew moves the plot.
@@ -106,69 +167,116 @@ export class Pane {
     return view.begin + (x - LEFT) / this.area.width * view.span;
   }
 
-  valueAt(y) { return this.shown.high - (y - TOP) / this.area.height * (this.shown.high - this.shown.low); }
-
-  // What the values in sight need, rounded to ticks; it stays as it is while it is about right.
+  // Fits the scales to the values in sight.
   #fit() {
-    if (this.scale) return this.scale;
     const { view } = this.scope;
-    let low = Infinity, high = -Infinity;
+    const needs = new Map([[this.left, [Infinity, -Infinity]], [this.right, [Infinity, -Infinity]]]);
     for (const store of this.scope.sources()) {
       if (store.empty) continue;
       const begin = store.find(view.begin), end = Math.min(store.find(view.end) + 1, store.end);
-      for (const { name } of this.traces) {
-        const column = store.column(name);
-        if (!column) continue;
+      for (const trace of this.traces) {
+        const column = store.column(trace.name), scale = this.#scaleOf(trace);
+        if (!column || scale.set) continue;
         column.scan(begin, end);
-        low = Math.min(low, column.low);
-        high = Math.max(high, column.high);
+        const [low, high] = needs.get(scale) ?? [Infinity, -Infinity];
+        needs.set(scale, [Math.min(low, column.low), Math.max(high, column.high)]);
       }
     }
-    if (low > high) return this.shown;
-    if (high - low < 1e-12 * Math.max(1, Math.abs(high))) { low -= 0.5 || 1; high += 0.5; }
-    const { step } = ticks(low, high, 4), pad = (high - low) * 0.04, { shown } = this;
-    const fitted = { low: Math.floor((low - pad) / step * 2) * step / 2, high: Math.ceil((high + pad) / step * 2) * step / 2 };
-    const isRoomy = low >= shown.low && high <= shown.high && fitted.high - fitted.low >= SHRINKS * (shown.high - shown.low);
-    return isRoomy && this.fittedTo === this.content ? shown : (this.fittedTo = this.content, fitted);
+    for (const [scale, [low, high]] of needs) scale.fit(low, high, this.content);
   }
 
-  // The scale is fitted anew, closely.
-  refit() { this.scale = null; this.fittedTo = null; }
+  // All scales are fitted anew, closely.
+  refit() { for (const scale of this.#scales()) scale.refit(); }
+
+  #scales() { return [this.left, this.right, ...this.traces.map((each) => each.own)]; }
+
+  // The values are others than before: no scale of theirs is right.
+  forget() { for (const scale of this.#scales()) { const { set } = scale; scale.reset(); scale.set = set; } }
+
+  // The scales at a place of the face, each with the sight that shows it.
+  scalesAt(x) {
+    const isOn = (axis) => (trace) => this.axisOf(trace) === axis;
+    const side = x < LEFT ? "left" : x > LEFT + this.area.width ? "right" : "";
+    const found = new Map();
+    const wanted = this.traces.filter((each) => !isOn("track")(each));
+    const those = wanted.filter((each) => !side || isOn(side)(each));
+    // Beside the plot, without an axis there, it is all of them.
+    for (const trace of those.length ? those : wanted) found.set(this.#scaleOf(trace), this.drawn.find(({ name }) => name === trace.name)?.sight);
+    if (!this.traces.length) found.set(this.left, this.sight);
+    return [...found].filter(([, sight]) => sight).map(([scale, sight]) => ({ scale, sight }));
+  }
+
+  // What is where in a plot of a size: the sight, that of the right axis, and those of the traces.
+  #arrange(width, height, ratio) {
+    const { scope } = this;
+    const tracks = this.#on("track"), hasLines = tracks.length < this.traces.length;
+    const each = tracks.length && (hasLines ? Math.min(TRACK, height * TRACKS / tracks.length) : Math.min(TRACK_ALONE, height / tracks.length));
+    const tall = !tracks.length ? height : hasLines ? height - each * tracks.length : 0;
+    const sight = new Sight(scope.view, this.left.shown, width, height, ratio, { ruler: scope.rulerOf(width), tall });
+    const right = this.#on("right").length ? sight.within(this.right.shown) : null;
+    const hasLeft = !this.traces.length || this.#on("left").length > 0;
+    if (!hasLeft) sight.rowsOfGrid = right ? [...right.grid] : [];
+    let number = 0;
+    const drawn = this.traces.map((trace) => {
+      const { name, number: colours } = trace, axis = this.axisOf(trace);
+      if (axis !== "track") return { name, number: colours, track: null, sight: axis === "left" ? sight : axis === "right" ? right : sight.within(trace.own.shown) };
+      const [first, last] = [number, ++number].map((count) => Math.round((tall + count * each) * ratio));
+      const inset = Math.min(5 * ratio, (last - first) * 0.15);
+      const scale = scope.kinds.get(name) === "bool" ? { low: 0, high: 1 } : trace.own.shown;
+      if (first > 0) sight.grid.push(first);
+      return { name, number: colours, track: { first, last }, sight: sight.within(scale, first + inset, last - inset) };
+    });
+    return { sight, right, drawn, left: hasLeft && tall > 0 ? sight : null };
+  }
 
   draw() {
-    const { scope, traces } = this, { width, height } = this.size;
+    const { scope } = this, { width, height } = this.size;
     if (!(width > 0 && height > 0)) return;
+    if (this.#contents() !== this.content) this.describe(); // kinds of signals are known
     const sources = scope.sources();
-    this.shown = this.#fit();
-    const sight = this.sight = new Sight(scope.view, this.shown, width, height, window.devicePixelRatio || 1);
-    const key = [sight.seconds, sight.height, sight.ratio, sight.low, sight.high, document.documentElement.dataset.theme,
-      ...sources.map((each) => each.serial), this.content].join(" ");
-    this.tiles.show(sight, key, newsOf(sight, sources, traces), (raster, base, from, to) => drawColumns(raster, sight, base, from, to, sources, traces));
+    this.#fit();
+    const { sight, right, left, drawn } = this.#arrange(width, height, window.devicePixelRatio || 1);
+    this.sight = sight;
+    this.drawn = drawn;
+    const key = [sight.seconds, sight.height, sight.ratio, sight.low, sight.high, sight.ruler.state, document.documentElement.dataset.theme,
+      ...sources.map((each) => each.serial), this.content,
+      ...drawn.map((each) => `${each.sight.low} ${each.sight.high} ${each.sight.top} ${each.sight.bottom}`)].join(" ");
+    this.tiles.show(sight, key, newsOf(sight, sources, drawn), (raster, base, from, to) => drawColumns(raster, sight, base, from, to, sources, drawn));
     this.times.show(sight);
-    this.values.show(sight, this.#units());
+    this.values.show(left, sight, this.#units("left"));
+    this.rightValues.show(right, sight, this.#units("right"), this.#rightInk());
     const { a, b } = scope.cursors;
     this.marks.show(sight, scope.marks(), scope.marksNumber, scope.panes[0] === this);
     this.cursors.show(sight, cursorMarks(a, b), `${a} ${b}`, true);
-    this.#levels(sight);
+    this.#levels();
+    this.#names(sight);
+    this.readout.show();
   }
 
-  #units() { return [...new Set(this.traces.map(({ name }) => this.scope.unit(name)).filter(Boolean))].join(", "); }
+  #units(axis) { return [...new Set(this.#on(axis).map(({ name }) => this.scope.unit(name)).filter(Boolean))].join(", "); }
 
-  // The values that the trigger compares with, where its signal is.
-  #thresholds() {
+  // One trace at the right gives its axis the colour.
+  #rightInk() {
+    const traces = this.#on("right");
+    return traces.length === 1 ? colour(traces[0].number) : ink("soft");
+  }
+
+  // The values that the trigger compares with, and where they are, if its signal is here.
+  #thresholds(drawn) {
     const { trigger: { told }, mode } = this.scope;
-    if (mode !== "trigger" || !this.has(told.signal) || !["edge", "level", "window"].includes(told.kind)) return [];
-    return told.kind === "window" ? [told.low, told.high] : [told.low];
+    const sight = drawn.find(({ name }) => name === told.signal)?.sight;
+    if (mode !== "trigger" || !sight || !["edge", "level", "window"].includes(told.kind)) return [];
+    return (told.kind === "window" ? [told.low, told.high] : [told.low]).filter((level) => level >= sight.low && level <= sight.high)
+      .map((level) => ({ level, y: Math.round(sight.y(level)) }));
   }
 
-  #levels(sight) {
-    const thresholds = this.#thresholds();
+  #levels() {
+    const thresholds = this.#thresholds(this.drawn);
     if (!thresholds.length && !this.levels.firstChild) return;
-    const lines = thresholds.map((level) => ({ level, y: Math.round(sight.y(level)) })).filter(({ y }) => y >= 0 && y <= this.size.height);
-    const state = JSON.stringify(lines);
+    const state = JSON.stringify(thresholds);
     if (state === this.levelsState) return;
     this.levelsState = state;
-    this.levels.replaceChildren(...lines.map(({ level, y }) => {
+    this.levels.replaceChildren(...thresholds.map(({ level, y }) => {
       const line = element("div", "level");
       line.style.top = `${y}px`;
       const text = element("span", "");
@@ -178,18 +286,48 @@ export class Pane {
     }));
   }
 
+  // The names of the tracks; those of numbers have their range.
+  #names({ ratio }) {
+    const tracks = this.#tracks(this.drawn, ratio);
+    if (!tracks.length && !this.names.firstChild) return;
+    const state = JSON.stringify([tracks, document.documentElement.dataset.theme]);
+    if (state === this.namesState) return;
+    this.namesState = state;
+    this.names.replaceChildren(...tracks.map(({ text, y, number }) => {
+      const name = element("span", "");
+      name.textContent = text;
+      name.style.top = `${y}px`;
+      name.style.color = colour(number);
+      return name;
+    }));
+  }
+
+  #tracks(drawn, ratio) {
+    return drawn.filter(({ track }) => track && (track.last - track.first) / ratio >= NAMED).map(({ name, number, track, sight: { low, high } }) => ({
+      number, y: Math.round(track.first / ratio) + 2,
+      text: this.scope.kinds.get(name) === "bool" ? name : `${name}  ${figure(low)} … ${figure(high)}`,
+    }));
+  }
+
   // The same as a picture to keep, `ratio` pixels in one of CSS.
   paint(g, width, height, ratio) {
-    const { scope } = this, area = { left: LEFT, top: TOP, width: width - LEFT - RIGHT, height: height - TOP - BOTTOM };
-    const sight = new Sight(scope.view, this.shown, area.width, area.height, ratio);
+    const { scope } = this, besides = scope.hasRight ? LEFT : RIGHT;
+    const area = { left: LEFT, top: TOP, width: width - LEFT - besides, height: height - TOP - BOTTOM };
+    const { sight, right, left, drawn } = this.#arrange(area.width, area.height, ratio);
     const raster = new Raster(sight.width, sight.height), canvas = element("canvas", "");
     canvas.width = sight.width;
     canvas.height = sight.height;
-    drawColumns(raster, sight, sight.first, 0, sight.width, scope.sources(), this.traces);
+    drawColumns(raster, sight, sight.first, 0, sight.width, scope.sources(), drawn);
     canvas.getContext("2d").putImageData(raster.image, 0, 0);
     g.fillStyle = ink("paper");
     g.fillRect(0, 0, width, height);
-    drawValues(g, sight, this.#units());
+    if (left) drawValues(g, left, this.#units("left"));
+    if (right) {
+      g.save();
+      g.translate(area.left + area.width, 0);
+      drawValues(g, right, this.#units("right"), "right", this.#rightInk());
+      g.restore();
+    }
     g.drawImage(canvas, area.left, area.top, area.width, area.height);
     g.strokeStyle = ink("axis");
     g.lineWidth = 1;
@@ -197,21 +335,26 @@ export class Pane {
     g.font = FONT;
     g.fillStyle = ink("soft");
     g.textAlign = "center";
-    for (const n of labelled(sight)) g.fillText(tickText(n * sight.step, sight.step), area.left + sight.x(n * sight.step), area.top + area.height + 15);
+    for (const tick of labelled(sight)) g.fillText(sight.ruler.text(tick), area.left + sight.x(tick.time), area.top + area.height + 15);
     g.textAlign = "right";
-    g.fillText("s", area.left + area.width, area.top + area.height + 15);
+    g.fillText(sight.ruler.unit, area.left + area.width, area.top + area.height + 15);
     g.textAlign = "left";
+    for (const { text, y, number } of this.#tracks(drawn, ratio)) {
+      g.fillStyle = colour(number);
+      g.fillText(text, area.left + 4, area.top + y + 10);
+    }
     const { a, b } = scope.cursors, paper = ink("paper");
     for (const mark of scope.marks()) drawMark(g, area, sight.x(mark.time), ink(mark.ink), paper, scope.panes[0] === this ? mark.label : "");
     for (const mark of cursorMarks(a, b)) drawMark(g, area, sight.x(mark.time), ink(mark.ink), paper, mark.label);
     g.fillStyle = ink("hit");
-    for (const level of this.#thresholds()) {
-      if (level < sight.low || level > sight.high) continue;
-      g.fillRect(area.left, area.top + Math.round(sight.y(level)), area.width, 1);
-      g.fillText(`level ${figure(level)}`, area.left + 4, area.top + Math.round(sight.y(level)) - 3);
+    for (const { level, y } of this.#thresholds(drawn)) {
+      g.fillRect(area.left, area.top + y, area.width, 1);
+      g.fillText(`level ${figure(level)}`, area.left + 4, area.top + y - 3);
     }
   }
 }
+
+function say(element, text) { if (element.textContent !== text) element.textContent = text; }
 
 function cursorMarks(a, b) {
   return [{ time: a, label: "A" }, { time: b, label: "B" }].filter(({ time }) => time !== null)

@@ -7,26 +7,31 @@ const GAP = 0.28; // how much of the ground's colour missing cycles take
 const SHIFT = 53; // pixels between the symbols of one trace and the next
 
 // Columns from `from` to before `to` of a raster whose first one is column `base` of the sight.
+// `traces`: {name, number, sight, track}, where `track` has the first and the last row, or is null.
 export function drawColumns(raster, sight, base, from, to, sources, traces) {
   const paper = pixel(ink("paper")), grid = pixel(ink("grid")), bad = pixel(ink("bad"));
   raster.clear(from, to, paper);
-  for (const value of sight.rows.at) raster.row(Math.round(sight.row(value)), from, to, grid);
-  for (const n of sight.ticks(base + from - 1, base + to)) {
-    const x = Math.round(sight.column(n * sight.step)) - base;
+  raster.clip(0, raster.height);
+  for (const row of sight.grid) raster.row(row, from, to, grid);
+  for (const { time } of sight.ticks(base + from - 1, base + to)) {
+    const x = Math.round(sight.column(time)) - base;
     if (x >= from && x < to) raster.bar(x, 0, raster.height, grid);
   }
   sources.forEach((store, second) => {
     if (store.empty) return;
+    raster.clip(0, raster.height);
     for (const gap of store.gaps) {
-      const begin = Math.floor(sight.column(gap.from)) - base, end = Math.max(Math.ceil(sight.column(gap.to)) - base, begin + 1);
+      const begin = Math.floor(sight.column(gap.from + store.shift)) - base;
+      const end = Math.max(Math.ceil(sight.column(gap.to + store.shift)) - base, begin + 1);
       for (let x = Math.max(begin, from); x < Math.min(end, to); x++) raster.bar(x, 0, raster.height, bad, GAP);
     }
     const slices = new Slices(store, sight.seconds, base, from, to, reachOf(sight, traces));
-    traces.forEach(({ name, number }, order) => {
-      const column = store.column(name);
-      if (column)
-        drawTrace(raster, slices, column, sight, { colour: pixel(colour(number)), paper, symbol: symbol(number),
-          shift: Math.round(number * SHIFT * sight.ratio), order, second: second > 0 });
+    traces.forEach((trace, order) => {
+      const { name, number, track } = trace, column = store.column(name);
+      if (!column) return;
+      raster.clip(track ? track.first : 0, track ? track.last : sight.bottom);
+      drawTrace(raster, slices, column, trace.sight, { colour: pixel(colour(number)), paper, symbol: symbol(number),
+        shift: Math.round(number * SHIFT * sight.ratio), order: track ? 0 : order, second: second > 0, isTrack: track !== null });
     });
   });
 }

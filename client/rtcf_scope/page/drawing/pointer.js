@@ -1,4 +1,7 @@
-// The mouse on a pane: wheel zooms, dragging pans, a click sets a cursor.
+// The mouse on a pane: wheel zooms, dragging pans, a click sets a cursor, and where it is the values
+// are shown.
+import { LEFT, TOP } from "./values.js";
+
 const DRAG = 4; // pixels that make a click a drag
 
 export function minded(pane, scope) {
@@ -8,38 +11,47 @@ export function minded(pane, scope) {
     const { left, top } = face.getBoundingClientRect();
     return { x: clientX - left, y: clientY - top };
   };
+  const isBeside = (x) => x < pane.area.left || x > pane.area.left + pane.area.width;
   face.addEventListener("wheel", (event) => {
     event.preventDefault();
     const { x, y } = place(event);
     const factor = Math.exp(Math.sign(event.deltaY) * Math.min(Math.abs(event.deltaY), 200) / 400);
-    if (event.shiftKey || x < pane.area.left) {
-      const at = pane.valueAt(y), { low, high } = pane.shown;
-      pane.scale = { low: at - (at - low) * factor, high: at + (high - at) * factor };
+    if (event.shiftKey || isBeside(x)) {
+      for (const { scale, sight } of pane.scalesAt(x)) {
+        const at = sight.value(y - TOP), { low, high } = scale.shown;
+        scale.set = { low: at - (at - low) * factor, high: at + (high - at) * factor };
+      }
     } else scope.view.zoom(factor, pane.timeAt(x));
     scope.changed();
   }, { passive: false });
   face.addEventListener("pointerdown", (event) => {
-    if (event.button !== 0) return;
+    if (event.button !== 0 || event.target.closest("button")) return;
     face.setPointerCapture(event.pointerId);
     scope.activate(pane);
     const { x, y } = place(event);
     const near = (time) => time !== null && Math.abs(pane.timeAt(x) - time) < scope.view.span / pane.area.width * 6;
     const { a, b } = scope.cursors;
-    held = { x, y, end: scope.view.end, shown: { ...pane.shown },
-      scale: pane.scale, cursor: near(a) ? "a" : near(b) ? "b" : "", moved: false };
+    held = { x, y, end: scope.view.end, cursor: near(a) ? "a" : near(b) ? "b" : "", moved: false,
+      second: event.altKey ? scope.recordings[1] : undefined, shift: scope.recordings[1]?.shift ?? 0,
+      scales: pane.scalesAt(x).filter(({ scale }) => scale.set).map((each) => ({ ...each, set: each.scale.set })) };
   });
   face.addEventListener("pointermove", (event) => {
+    const { x, y } = place(event);
+    if (event.pointerType === "mouse") {
+      if (isBeside(x)) scope.pointAt(null); else scope.pointAt(pane, x - LEFT, y - TOP);
+    }
     if (!held) return;
-    const { x, y } = place(event), dx = x - held.x, dy = y - held.y;
+    const dx = x - held.x, dy = y - held.y, seconds = dx / pane.area.width * scope.view.span;
     held.moved ||= Math.hypot(dx, dy) > DRAG;
     if (!held.moved) return;
-    if (held.cursor) scope.cursors[held.cursor] = pane.timeAt(x);
+    if (held.second) scope.shiftSecond(held.shift + seconds);
+    else if (held.cursor) scope.cursors[held.cursor] = pane.timeAt(x);
     else {
       scope.freeze();
-      scope.view.end = held.end - dx / pane.area.width * scope.view.span;
-      if (held.scale) {
-        const by = dy / pane.area.height * (held.shown.high - held.shown.low);
-        pane.scale = { low: held.shown.low + by, high: held.shown.high + by };
+      scope.view.end = held.end - seconds;
+      for (const { scale, sight, set } of held.scales) {
+        const by = dy * sight.ratio / (sight.bottom - sight.top) * (set.high - set.low);
+        scale.set = { low: set.low + by, high: set.high + by };
       }
     }
     scope.changed();
@@ -49,5 +61,10 @@ export function minded(pane, scope) {
     held = null;
   });
   face.addEventListener("pointercancel", () => { held = null; });
-  face.addEventListener("dblclick", () => { pane.refit(); scope.clearCursors(); });
+  face.addEventListener("pointerleave", () => scope.pointAt(null));
+  face.addEventListener("dblclick", (event) => {
+    if (event.target.closest("button")) return;
+    pane.refit();
+    scope.clearCursors();
+  });
 }

@@ -10,6 +10,13 @@ export class Raster {
     this.cover = new Float32Array(height);
     this.top = height;
     this.bottom = 0;
+    this.clip(0, height);
+  }
+
+  // Rows that bars and what covers pixels are drawn into: from `begin` to before `end`.
+  clip(begin, end) {
+    this.begin = Math.max(begin, 0);
+    this.end = Math.min(end, this.height);
   }
 
   // Columns from `from` to before `to`, all rows or one.
@@ -25,8 +32,8 @@ export class Raster {
 
   // A part of a column, between rows that need not be whole.
   bar(x, top, bottom, colour, alpha = 1) {
-    top = Math.max(top, 0);
-    bottom = Math.min(bottom, this.height);
+    top = Math.max(top, this.begin);
+    bottom = Math.min(bottom, this.end);
     if (!(bottom > top)) return;
     const { pixels, width } = this;
     let first = Math.floor(top);

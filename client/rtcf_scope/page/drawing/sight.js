@@ -1,33 +1,49 @@
 // What a plot shows in which pixels. Columns are pixels of the screen, numbered from time 0 on, so
 // that a value stays in its column while the view moves.
-import { tickStep, ticks } from "./axes.js";
+import { ticks } from "./axes.js";
+import { rulerOf } from "./ruler.js";
 
-const EVERY_X = 110, EVERY_Y = 45; // pixels from tick to tick, about
+const EVERY_Y = 45; // CSS pixels from tick to tick, about
 
 export class Sight {
-  constructor(view, scale, width, height, ratio) { // size in CSS pixels; ratio: pixels in one
+  // Size in CSS pixels; ratio: pixels of the screen in one. The scale takes `tall` of the height.
+  constructor(view, scale, width, height, ratio, { ruler, tall = height } = {}) {
     this.ratio = ratio;
     this.width = Math.max(1, Math.round(width * ratio));
     this.height = Math.max(1, Math.round(height * ratio));
     this.seconds = view.span / this.width; // of a column
     this.first = Math.round(view.begin / this.seconds); // column at the left
+    this.ruler = ruler ?? rulerOf("seconds", { span: view.span, width });
+    this.top = 0; // rows of the scale
+    this.bottom = tall === height ? this.height : Math.round(tall * ratio);
     this.low = scale.low;
     this.high = scale.high;
-    this.rows = ticks(scale.low, scale.high, Math.max(2, height / EVERY_Y));
-    this.step = tickStep(view.span, Math.max(2, width / EVERY_X)); // seconds from tick to tick
+    this.ticksOfRows = this.rowsOfGrid = null;
   }
 
-  // Numbers of the ticks of time between two columns; each stands at `step` times its number.
-  ticks(from, to) {
-    const found = [];
-    for (let n = Math.ceil(from * this.seconds / this.step); n * this.step <= to * this.seconds; n++) found.push(n);
-    return found;
+  // The same with another scale, between two rows.
+  within(scale, top = this.top, bottom = this.bottom) {
+    return Object.assign(Object.create(Sight.prototype), this, { low: scale.low, high: scale.high, top, bottom, ticksOfRows: null, rowsOfGrid: null });
   }
+
+  get rows() {
+    this.ticksOfRows ??= this.bottom > this.top ? ticks(this.low, this.high, Math.max(2, (this.bottom - this.top) / this.ratio / EVERY_Y)) : { step: 1, at: [] };
+    return this.ticksOfRows;
+  }
+
+  // Rows of pixels that have a line of the grid.
+  get grid() {
+    this.rowsOfGrid ??= this.rows.at.map((value) => Math.round(this.row(value)));
+    return this.rowsOfGrid;
+  }
+
+  // The ticks of time between two columns.
+  ticks(from, to) { return this.ruler.ticks(from * this.seconds, to * this.seconds); }
 
   column(time) { return time / this.seconds; }
   // A row of pixels from the top, not rounded; far away is as good as farther.
   row(value) {
-    const row = (this.high - value) / (this.high - this.low) * this.height;
+    const row = this.top + (this.high - value) / (this.high - this.low) * (this.bottom - this.top);
     return Math.min(Math.max(row, -1e9), 1e9);
   }
 
@@ -35,5 +51,5 @@ export class Sight {
   x(time) { return (time / this.seconds - this.first) / this.ratio; }
   y(value) { return this.row(value) / this.ratio; }
   time(x) { return (x * this.ratio + this.first) * this.seconds; }
-  value(y) { return this.high - y * this.ratio / this.height * (this.high - this.low); }
+  value(y) { return this.high - (y * this.ratio - this.top) / (this.bottom - this.top) * (this.high - this.low); }
 }

@@ -1,37 +1,39 @@
-// The numbers below a plot, which move with time.
-import { tickText } from "./axes.js";
+// The numbers below a plot, which move with time, and their unit: a button for another kind of them.
 import { Strip } from "./strip.js";
 
-const LEFT = 14, RIGHT = 40; // CSS pixels at the ends without a number: one has the unit
+const LEFT = 14; // CSS pixels at the left end without a number
 
 export class Times {
-  constructor(box) {
+  constructor(box, change) { // change(): others are wanted
     this.strip = new Strip("numbers");
-    const unit = document.createElement("span");
-    unit.className = "unit";
-    unit.textContent = "s";
-    box.append(this.strip.box, unit);
-    this.shown = new Map(); // number of the tick: its element
+    this.unit = document.createElement("button");
+    this.unit.className = "unit";
+    this.unit.title = "seconds, time of day or cycle number (X)";
+    this.unit.onclick = change;
+    box.append(this.strip.box, this.unit);
+    this.shown = new Map(); // key of the tick: its element
     this.state = "";
   }
 
   show(sight) {
     this.strip.move(sight);
-    const numbers = labelled(sight);
-    const state = `${this.strip.number} ${sight.step} ${numbers[0]} ${numbers.length}`;
+    const { ruler } = sight;
+    if (this.unit.textContent !== ruler.unit) this.unit.textContent = ruler.unit;
+    const ticks = labelled(sight);
+    const kind = `${this.strip.number} ${ruler.state} `, state = `${kind}${ticks[0]?.key} ${ticks.at(-1)?.key} ${ticks.length}`;
     if (state === this.state) return;
-    if (!this.state.startsWith(`${this.strip.number} ${sight.step} `)) this.#clear();
+    if (!this.state.startsWith(kind)) this.#clear();
     this.state = state;
-    const wanted = new Set(numbers);
-    for (const [number, element] of this.shown)
-      if (!wanted.has(number)) { element.remove(); this.shown.delete(number); }
-    for (const number of numbers) {
-      if (this.shown.has(number)) continue;
+    const wanted = new Set(ticks.map(({ key }) => key));
+    for (const [key, element] of this.shown)
+      if (!wanted.has(key)) { element.remove(); this.shown.delete(key); }
+    for (const tick of ticks) {
+      if (this.shown.has(tick.key)) continue;
       const element = document.createElement("span");
-      element.textContent = tickText(number * sight.step, sight.step);
-      element.style.left = this.strip.left(Math.round(sight.column(number * sight.step)));
+      element.textContent = ruler.text(tick);
+      element.style.left = this.strip.left(Math.round(sight.column(tick.time)));
       this.strip.box.append(element);
-      this.shown.set(number, element);
+      this.shown.set(tick.key, element);
     }
   }
 
@@ -41,7 +43,7 @@ export class Times {
   }
 }
 
-// The numbers of the ticks that have room for a text.
+// The ticks that have room for a text.
 export function labelled(sight) {
-  return sight.ticks(sight.first + LEFT * sight.ratio, sight.first + sight.width - RIGHT * sight.ratio);
+  return sight.ticks(sight.first + LEFT * sight.ratio, sight.first + sight.width - sight.ruler.room * sight.ratio);
 }

@@ -7,6 +7,7 @@ const WIDTH = 1.5, THIN = 1.1; // CSS pixels
 const DOT = 2.2, APART = 6; // radius of a cycle's dot, and the room from which there are dots
 const SYMBOL = 4, SYMBOLS_APART = 170; // half the size of a symbol
 const DASH = 7, DASHES_APART = 12, FAINT = 0.4;
+const GROUND = 0.2; // below the line of a track
 const BAND = 4; // height of the mark of values that are no numbers
 
 // How many columns away something may be that is seen in a column: a dot, or a symbol.
@@ -14,7 +15,8 @@ export const reach = (ratio, hasSymbols) => Math.ceil((hasSymbols ? SYMBOL + 1 :
 
 let lows = new Float64Array(0), highs = new Float64Array(0), odds = new Uint8Array(0);
 
-// `style`: {colour, paper (pixels), symbol, shift, order, second}; `sight` has the rows.
+// `style`: {colour, paper (pixels), symbol, shift, order, second, isTrack}; `sight` has the rows. The
+// line of a track holds each value until the next cycle, and has a faint ground below it.
 export function drawTrace(raster, slices, column, sight, style) {
   new Stroke(raster, slices, column, sight, style).draw();
 }
@@ -36,12 +38,13 @@ class Stroke {
     const spread = Math.round((this.width - 1) / 2);
     for (let x = slices.from; x < slices.to; x++) {
       const count = slices.start(x + 1) - slices.start(x);
-      if (count > FEW) {
+      if (count > FEW || style.isTrack) {
         let low = lows[x + this.offset], high = highs[x + this.offset];
         for (let by = 1; by <= spread; by++) {
           low = Math.min(low, lows[x + this.offset - by], lows[x + this.offset + by]);
           high = Math.max(high, highs[x + this.offset - by], highs[x + this.offset + by]);
         }
+        if (low <= high && style.isTrack) raster.bar(x, this.sight.row(high), this.sight.bottom, style.colour, GROUND * this.#alpha(x));
         if (low <= high)
           raster.bar(x, this.sight.row(high) - this.width / 2, this.sight.row(low) + this.width / 2, style.colour, this.#alpha(x));
       } else {
@@ -97,6 +100,7 @@ class Stroke {
     const after = slices.start(x), before = after - 1;
     if (before < store.begin || after >= store.end) return NaN;
     const from = column.get(before), to = column.get(after);
+    if (this.style.isTrack) return from - from === 0 ? from : NaN;
     if (from - from !== 0 || to - to !== 0) return NaN;
     const begin = store.time(before), time = slices.time(x);
     return from + (to - from) * ((time - begin) / (store.time(after) - begin));
@@ -149,8 +153,8 @@ class Stroke {
     top -= width / 2;
     bottom += width / 2;
     const upper = from + slope * (left - begin) - high / 2, lower = from + slope * (right - begin) - high / 2;
-    const first = Math.max(0, Math.floor(Math.max(top, Math.min(upper, lower))));
-    const last = Math.min(raster.height, Math.ceil(Math.min(bottom, Math.max(upper, lower) + high)));
+    const first = Math.max(raster.begin, Math.floor(Math.max(top, Math.min(upper, lower))));
+    const last = Math.min(raster.end, Math.ceil(Math.min(bottom, Math.max(upper, lower) + high)));
     let above = area(first, upper, lower, high);
     for (let y = first; y < last; y++) {
       const below = area(y + 1, upper, lower, high);
@@ -163,8 +167,8 @@ class Stroke {
   #disc(x, place, row, radius) {
     const dx = x + 0.5 - place;
     if (Math.abs(dx) > radius + 1) return;
-    const last = Math.min(this.raster.height, Math.ceil(row + radius + 1));
-    for (let y = Math.max(0, Math.floor(row - radius - 1)); y < last; y++) {
+    const last = Math.min(this.raster.end, Math.ceil(row + radius + 1));
+    for (let y = Math.max(this.raster.begin, Math.floor(row - radius - 1)); y < last; y++) {
       const share = radius + 0.5 - Math.hypot(dx, y + 0.5 - row);
       if (share > 0) this.raster.add(y, Math.min(share, 1));
     }
@@ -174,8 +178,8 @@ class Stroke {
   #strange(x) {
     const { slices, sight, raster, style } = this;
     const high = Math.round(BAND * sight.ratio), hatch = 2 * Math.round(sight.ratio);
-    const bottom = raster.height - 1 - style.order % 6 * (high + 1);
-    for (let y = Math.max(bottom - high, 0); y < bottom; y++)
+    const bottom = raster.end - 1 - style.order % 6 * (high + 1);
+    for (let y = Math.max(bottom - high, raster.begin); y < bottom; y++)
       if (modulo(slices.base + x + y, 2 * hatch) < hatch) raster.mix(y * raster.width + x, style.colour, 1);
   }
 
@@ -188,8 +192,8 @@ class Stroke {
     const low = lows[x - away + this.offset], high = highs[x - away + this.offset];
     if (low > high) return;
     const middle = (sight.row(low) + sight.row(high)) / 2;
-    const last = Math.min(raster.height, Math.ceil(middle + half + ratio));
-    for (let y = Math.max(0, Math.floor(middle - half - ratio)); y < last; y++) {
+    const last = Math.min(raster.end, Math.ceil(middle + half + ratio));
+    for (let y = Math.max(raster.begin, Math.floor(middle - half - ratio)); y < last; y++) {
       const dy = y + 0.5 - middle;
       if (isInSymbol(style.symbol, away / half, dy / half)) raster.mix(y * raster.width + x, style.colour, 1);
       else if (isInSymbol(style.symbol, away / (half + ratio), dy / (half + ratio))) raster.mix(y * raster.width + x, style.paper, 1);

@@ -1,5 +1,6 @@
 // Recordings: one opens in place of the stream, a second one over it.
 import { ask, recorded } from "../server.js";
+import { sources } from "../data/derived.js";
 import { Store } from "../data/store.js";
 
 export class Recordings {
@@ -7,7 +8,13 @@ export class Recordings {
     this.scope = scope;
     this.box = box;
     this.trouble = trouble;
-    this.open = []; // {name, signals}
+    this.open = []; // {name, signals, beginNs, shift}
+    this.shift = null; // the field for it, where there are two
+    scope.onShift = (seconds) => {
+      const [, second] = this.open;
+      if (second) second.shift = seconds;
+      this.#tellShift();
+    };
   }
 
   async show() {
@@ -25,14 +32,50 @@ export class Recordings {
     hint.className = "hint";
     hint.textContent = names.length ? "Choose one; a second one is drawn dashed over it, from the same beginning."
       : "None: rtcfctl scope FILE… opens recordings, made by rtcfctl record -o FILE.";
-    this.box.replaceChildren(list, hint);
+    this.shift = null;
+    this.box.replaceChildren(list, hint, ...(this.open.length === 2 ? this.#shifting() : []));
+    this.#tellShift();
+  }
+
+  // How the second one is shifted against the first.
+  #shifting() {
+    const { scope } = this, [first, second] = this.open;
+    const label = element("label", "shift"), bar = element("div", "group");
+    this.shift = Object.assign(element("input", ""), { type: "number", step: "any" });
+    this.shift.setAttribute("aria-label", `shift of ${second.name}, seconds`);
+    this.shift.onchange = () => scope.shiftSecond(Number(this.shift.value));
+    label.append(Object.assign(element("span", ""), { textContent: `shift of ${second.name}` }), this.shift, " s");
+    const button = (text, title, does) => {
+      const made = Object.assign(element("button", ""), { textContent: text, title, onclick: does });
+      bar.append(made);
+      return made;
+    };
+    button("Beginning", "the same beginning: no shift", () => scope.shiftSecond(0));
+    button("Clock", "the same clock: as they were recorded", () => scope.shiftSecond(Number(second.beginNs - first.beginNs) / 1e9));
+    button("A → B", "moves what is at cursor A to cursor B", () => {
+      const { a, b } = scope.cursors;
+      if (a === null || b === null) { this.trouble("set cursor A (click) on the second recording and cursor B (Shift and click) on the first"); return; }
+      this.trouble("");
+      scope.shiftSecond(scope.recordings[1].shift + b - a);
+    });
+    const hint = element("p", "hint");
+    hint.textContent = "Dragging with Alt shifts it, too.";
+    return [label, bar, hint];
+  }
+
+  #tellShift() {
+    if (this.shift && this.shift !== document.activeElement) this.shift.value = Number((this.open[1]?.shift ?? 0).toFixed(9));
   }
 
   async toggle(name) {
     try {
       const there = this.open.findIndex((each) => each.name === name);
       if (there >= 0) this.open.splice(there, 1);
-      else this.open = [...this.open.slice(-1), await ask(`/api/recordings/${encodeURIComponent(name)}`)];
+      else {
+        const found = await ask(`/api/recordings/${encodeURIComponent(name)}`);
+        this.open = [...this.open.slice(-1), { ...found, beginNs: BigInt(found.begin_ns) }];
+      }
+      for (const each of this.open) each.shift = 0;
       await this.load();
       await this.show();
     } catch (error) { this.trouble(error.message); }
@@ -40,9 +83,10 @@ export class Recordings {
 
   // Reads the traces of the panes.
   async load() {
-    const wanted = this.scope.traces().map((each) => each.name).filter((name) => !name.startsWith("~"));
-    for (const { signals } of this.open) for (const { name, unit } of signals) this.scope.units.set(name, unit);
-    this.scope.showRecordings(await Promise.all(this.open.map((each) => Opened.of(each.name, wanted, this.scope.view))));
+    const { scope } = this;
+    const wanted = sources(scope.traces().map((each) => each.name)).filter((name) => !name.startsWith("~"));
+    for (const { signals } of this.open) scope.know(signals);
+    scope.showRecordings(await Promise.all(this.open.map((each) => Opened.of(each, wanted, scope.view))));
   }
 
   // Reads each cycle in sight where all of a recording is too much; called a few times a second.
@@ -62,21 +106,35 @@ export class Recordings {
 
 // One that is shown: all of it, and the part in sight more closely.
 class Opened {
-  static async of(name, wanted, view) {
-    const opened = new Opened();
-    Object.assign(opened, { name, wanted, view, all: await part(name, wanted), close: null, asks: false });
+  static async of(description, wanted, view) {
+    const { name, beginNs } = description, opened = new Opened();
+    Object.assign(opened, { name, beginNs, wanted, view, all: await part(name, wanted), close: null, asks: false });
+    // It may have been shifted meanwhile.
+    opened.shift = description.shift;
     return opened;
   }
 
-  get store() { return this.close && covers(this.close, this.view) ? this.close.store : this.all.store; }
+  get store() { return this.close && this.#covers() ? this.close.store : this.all.store; }
+
+  get shift() { return this.all.store.shift; }
+  set shift(seconds) {
+    this.all.store.move(seconds);
+    this.close?.store.move(seconds);
+  }
+
+  #covers() {
+    const { close: { begin, end }, view, shift } = this;
+    return begin <= view.begin - shift && end >= view.end - shift;
+  }
 
   async look() {
-    const { view, all, close } = this;
+    const { view, all, close, shift } = this;
     const fine = all.each === 1 || view.span > all.store.lastTime - all.store.firstTime;
-    if (fine || this.asks || (close && covers(close, view) && (close.each === 1 || view.span > (close.end - close.begin) / 8))) return false;
+    if (fine || this.asks || (close && this.#covers() && (close.each === 1 || view.span > (close.end - close.begin) / 8))) return false;
     this.asks = true;
     try {
-      this.close = await part(this.name, this.wanted, view.begin - view.span, view.end + view.span);
+      this.close = await part(this.name, this.wanted, view.begin - shift - view.span, view.end - shift + view.span);
+      this.close.store.move(this.shift);
     } finally { this.asks = false; }
     return true;
   }
@@ -87,4 +145,8 @@ async function part(name, wanted, begin = -Infinity, end = Infinity) {
   return { begin, end, each: message.hit, store: Store.of(message, wanted) };
 }
 
-const covers = ({ begin, end }, view) => begin <= view.begin && end >= view.end;
+function element(name, kind) {
+  const made = document.createElement(name);
+  if (kind) made.className = kind;
+  return made;
+}

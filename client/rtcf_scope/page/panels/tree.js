@@ -1,35 +1,42 @@
 // The signals as a tree, by component and port, with a search over it.
+import { isDerived } from "../data/derived.js";
 import { DURATION, LATENCY } from "../data/store.js";
 import { colour } from "../drawing/palette.js";
 
 const MANY = 60; // signals, from which components begin closed
+const TITLES = new Map([["cycles", "cycles of the loop"], ["derived", "derived signals"]]);
+const KINDS = { bool: "bool", integer: "int" };
 
 export class Tree {
   constructor(scope, box, search) {
     this.scope = scope;
     this.box = box;
     this.search = search;
+    this.derived = new Set(); // derived signals that have been shown in this page
     search.oninput = () => this.show();
     search.addEventListener("keydown", ({ key }) => { if (key === "Escape") { search.value = ""; this.show(); } });
   }
 
   show() {
     const words = this.search.value.toLowerCase().split(/\s+/).filter(Boolean);
-    const signals = this.scope.catalog.filter(({ name }) => words.every((word) => name.toLowerCase().includes(word)));
+    for (const { name } of this.scope.traces()) if (isDerived(name)) this.derived.add(name);
+    const derived = [...this.derived].map((name) => ({ name, unit: "", kind: "number" }));
+    const signals = [...this.scope.catalog, ...derived].filter(({ name }) => words.every((word) => name.toLowerCase().includes(word)));
     const components = new Map([["cycles", []]]);
     for (const signal of signals) {
-      const component = signal.name.startsWith("~") ? "cycles" : signal.name.slice(0, signal.name.indexOf("."));
+      const component = signal.name.startsWith("~") ? "cycles" : isDerived(signal.name) ? "derived" : signal.name.slice(0, signal.name.indexOf("."));
       if (!components.has(component)) components.set(component, []);
       components.get(component).push(signal);
     }
     const closed = new Set([...this.box.querySelectorAll("details:not([open])")].map((each) => each.dataset.name));
+    const isOpen = (name, count) => (first ? count < MANY || TITLES.has(name) : !closed.has(name));
     const first = !this.box.querySelector("details");
     this.box.replaceChildren(...[...components].filter(([, all]) => all.length).map(([component, all]) => {
       const details = document.createElement("details");
       details.dataset.name = component;
-      details.open = words.length > 0 || (first ? signals.length < MANY || component === "cycles" : !closed.has(component));
+      details.open = words.length > 0 || isOpen(component, signals.length);
       const summary = document.createElement("summary");
-      summary.textContent = component === "cycles" ? "cycles of the loop" : component;
+      summary.textContent = TITLES.get(component) ?? component;
       details.append(summary, ...all.map((signal) => this.#leaf(signal, component)));
       return details;
     }));
@@ -44,16 +51,16 @@ export class Tree {
 
   #leaf({ name, unit, kind }, component) {
     const button = document.createElement("button");
-    const trace = this.scope.traces().find((each) => each.name === name);
+    const trace = this.scope.traces().find((each) => each.name === name), isHere = this.scope.active.has(name);
     button.className = "leaf";
-    button.setAttribute("aria-pressed", String(Boolean(trace)));
+    button.setAttribute("aria-pressed", String(isHere));
     const dot = document.createElement("i");
     dot.style.background = trace ? colour(trace.number) : "transparent";
     const text = document.createElement("span");
     text.textContent = name === LATENCY ? "wake-up latency" : name === DURATION ? "calculation"
-      : name.slice(component.length + 1);
+      : isDerived(name) ? name : name.slice(component.length + 1);
     const right = document.createElement("small");
-    right.textContent = unit || (kind === "bool" ? "bool" : "");
+    right.textContent = trace && !isHere ? "in another pane" : unit || (KINDS[kind] ?? "");
     button.title = name;
     button.append(dot, text, right);
     button.onclick = () => this.scope.toggle(name);

@@ -1,4 +1,5 @@
 // The trigger's settings; the server looks at every cycle.
+import { isDerived } from "../data/derived.js";
 import { figure } from "../drawing/axes.js";
 
 const SLOPES = { edge: ["rising", "falling", "either"], level: ["above", "below"], window: ["leaves", "enters"], nan: [], condition: [] };
@@ -41,10 +42,12 @@ export class TriggerPanel {
   #signals() {
     const { told } = this.scope.trigger;
     const there = this.scope.catalog.map((each) => each.name);
-    if (!told.signal) told.signal = this.scope.traces()[0]?.name ?? there.find((name) => !name.startsWith("~")) ?? there[0] ?? "";
+    // The server, which looks at the cycles, derives nothing.
+    const shown = this.scope.traces().map((each) => each.name).filter((name) => !isDerived(name));
+    if (!told.signal) told.signal = shown[0] ?? there.find((name) => !name.startsWith("~")) ?? there[0] ?? "";
     const known = new Set(there);
     const are = there.some((name) => !name.startsWith("~")); // the graph is known
-    const names = [...new Set([told.signal, ...this.scope.traces().map((each) => each.name), ...there])].filter(Boolean);
+    const names = [...new Set([told.signal, ...shown, ...there])].filter(Boolean);
     const options = names.map((name) => [name, are && !known.has(name) ? `${name} (not there)` : name]);
     const select = this.part("signal");
     // A list that is open stays.
