@@ -148,7 +148,7 @@ def test_two_compilers_can_compile_a_message_at_once(cache: Cache) -> None:
         ("Float32._type = 'std_msgs/Absent'", r"std_msgs/Absent: has no C\+\+ header: sudo apt "),
         (
             "Float32._md5sum = 32 * '0'",
-            r"std_msgs/Float32: the C\+\+ header has another ",
+            r"std_msgs/Float32: the C\+\+ header and the Python class have different definitions",
         ),
     ],
 )

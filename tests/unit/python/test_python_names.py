@@ -226,5 +226,5 @@ def test_a_file_name_that_is_not_utf_8_is_rejected_in_one_line(tmp_path: Path) -
     file.write_text(DECLARING.format(name="Plain", declared="u: Input[float]"))
     done = compile_to(tmp_path / "lib.so", file)
     assert done.returncode == 1
-    assert done.stderr.endswith("sse.py: its path is not UTF-8: rename it\n")
+    assert done.stderr.endswith("sse.py: its path is not UTF-8: rename the file\n")
     assert done.stderr.count("\n") == 1

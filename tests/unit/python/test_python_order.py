@@ -117,7 +117,7 @@ def test_the_comparison_evaluates_in_pythons_order(both: tuple[Any, Any]) -> Non
     ("text", "way_out"),
     [
         ("self.counts[0] = self.head + (now := self.advance(1)) + now", "a statement before"),
-        ("self.counts[:] = np.array([self.next] * 4)", "give their values names before"),
+        ("self.counts[:] = np.array([self.next] * 4)", "set variables to their results before"),
     ],
 )
 def test_statements_needing_another_order_are_rejected(
