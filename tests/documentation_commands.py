@@ -1,8 +1,14 @@
 """The commands of the pages that run in a build tree, and the reasons why others do not."""
 
+from pathlib import Path
+
 from pages import TREE, shell_lines
 
-PAGES = [TREE / "README.md", *sorted((TREE / "docs").glob("*.md"))]
+PAGES = [
+    TREE / "README.md",
+    *sorted((TREE / "docs").glob("*.md")),
+    *sorted((TREE / "docs").glob("control/*.md")),
+]
 
 _APT = "installs packages"
 _BOOTED = "runs in a booted Debian: tests/system/test_pages.py"
@@ -66,13 +72,18 @@ ELSEWHERE: dict[str, dict[str, str]] = {
 }
 
 
+def page_name(page: Path) -> str:
+    """Return the name of a page, with its folder below docs/: "control/pid.md"."""
+    return page.relative_to(TREE / "docs" if page.parent != TREE else TREE).as_posix()
+
+
 def typed(name: str) -> list[str]:
     """Return the commands of a page that run in a build tree."""
-    (page,) = (each for each in PAGES if each.name == name)
+    (page,) = (each for each in PAGES if page_name(each) == name)
     elsewhere = tuple(ELSEWHERE.get(name, {}))
     return [line for line in shell_lines(page.read_text()) if not line.startswith(elsewhere)]
 
 
 def pages_typed() -> list[str]:
     """Return the names of the pages with commands that run in a build tree."""
-    return [page.name for page in PAGES if typed(page.name)]
+    return [name for name in map(page_name, PAGES) if typed(name)]

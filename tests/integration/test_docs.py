@@ -52,6 +52,8 @@ def _loop_with_a_bag(daemon: Daemon, client: rtcf.Client) -> None:
 # Setup that a page assumes.
 PREPARE: dict[str, Callable[[Daemon, rtcf.Client], None]] = {
     "boot.md": _nothing,
+    "control/index.md": _nothing,
+    "control/pid.md": _nothing,
     "first-ten-minutes.md": _nothing,
     "from-hal.md": _nothing,
     "from-ros-control.md": _nothing,

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from documentation_commands import ELSEWHERE, PAGES
+from documentation_commands import ELSEWHERE, PAGES, page_name
 from pages import TREE, shell_lines
 from rtcfctl.main import parser
 
-NAMES = [page.name for page in PAGES]
+NAMES = [page_name(page) for page in PAGES]
 CONTROL = (TREE / "debian" / "control").read_text()
 OURS = set(re.findall(r"^Package: (\S+)", CONTROL, re.MULTILINE))
 
@@ -73,7 +73,7 @@ def test_the_values_of_an_option_are_in_the_manual_page(setting: str) -> None:
 
 def test_each_page_is_linked_from_the_index() -> None:
     index = (TREE / "docs" / "index.md").read_text()
-    pages = [page.name for page in PAGES[1:] if page.name != "index.md"]
+    pages = [name for name in NAMES if name not in ("README.md", "index.md")]
     assert [name for name in pages if f"]({name})" not in index] == []
 
 
@@ -120,7 +120,7 @@ def test_our_packages_in_pages_exist(page: Path) -> None:
 
 @pytest.mark.parametrize(("page", "begin"), [(p, b) for p in ELSEWHERE for b in ELSEWHERE[p]])
 def test_commands_tested_elsewhere_are_in_their_page(page: str, begin: str) -> None:
-    (file,) = (each for each in PAGES if each.name == page)
+    (file,) = (each for each in PAGES if page_name(each) == page)
     assert any(line.startswith(begin) for line in shell_lines(file.read_text()))
     for test in re.findall(r"tests/\S+\.py", ELSEWHERE[page][begin]):
         assert (TREE / test).exists(), test

@@ -1,0 +1,56 @@
+#include <cmath>
+
+#include <rtcf/component.hpp>
+
+namespace rtcf_control {
+namespace {
+
+class Derivative final : public rtcf::Component {
+    rtcf::Input<double> in{this, "in"};
+    rtcf::Output<double> out{this, "out", "", rtcf::Finite()};
+
+    rtcf::Parameter<double> gain{this, "gain", 1.0, rtcf::Unit("s"),
+                                 rtcf::Doc("factor of the rate of change")};
+    rtcf::Parameter<double> filter_time{
+        this,           "filter_time",   0.0,
+        rtcf::Min(0.0), rtcf::Unit("s"), rtcf::Doc("time constant of the filter; 0 = no filter")};
+
+    rtcf::State<double> rate_{this, "rate", 0.0, rtcf::Unit("1/s"), rtcf::Doc("filtered rate")};
+    rtcf::State<double> last_{this, "last", 0.0, rtcf::Doc("the last input")};
+    rtcf::State<double> gap_{this, "gap", 0.0, rtcf::Unit("s"),
+                             rtcf::Doc("time without a finite input, since the last input")};
+    rtcf::State<bool> begun_{this, "begun", false, rtcf::Doc("the first value has come")};
+
+    bool start() override {
+        rate_ = 0.0;
+        gap_ = 0.0;
+        begun_ = false;
+        return true;
+    }
+
+    void update() override {
+        if (in.read() == rtcf::DataStatus::None) return;
+        const double value = in.value();
+        if (!std::isfinite(value)) {
+            gap_ += dt();
+            out.write(value);  // rejected by the check: readers keep the last output
+            return;
+        }
+        if (begun_) rate_ = (filter_time * rate_ + value - last_) / (filter_time + gap_ + dt());
+        last_ = value;
+        gap_ = 0.0;
+        begun_ = true;
+        out.write(gain * rate_);
+    }
+
+    // In the last cycle as in any other: passes on the safe command of a component in front.
+    void safe() noexcept override { update(); }
+};
+
+}  // namespace
+}  // namespace rtcf_control
+
+RTCF_COMPONENT_NAMED(rtcf_control::Derivative, "Derivative",
+                     "Rate of change with a first-order filter, by backward differences (Åström & "
+                     "Hägglund, Advanced PID Control, 2006, chapter 13)",
+                     Derivative)
