@@ -117,7 +117,7 @@ class Stepped:
         for name, value in inputs.items():
             self.client.write(f"/stepped/block.{name}", value)
 
-    def step(self, cycles: int = 1, **inputs: Any) -> Values:
+    def step(self, cycles: int = 1, /, **inputs: Any) -> Values:
         """Run cycles; return the state."""
         self.write(**inputs)
         self.client.step(cycles)

@@ -20,7 +20,6 @@ from block_bench import PATH, Blocks, Stepped
 from hypothesis import given, seed, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
-from rtcf import refusals
 from rtcf.testing import Bench
 from rtcf.v1 import runner_pb2
 from scipy import signal
@@ -307,7 +306,7 @@ def test_nothing_is_written_before_both_inputs_have_a_value(blocks: Blocks) -> N
 def test_parameters_that_do_not_fit_are_rejected_with_one_line(
     blocks: Blocks, parameters: dict[str, Any], said: str
 ) -> None:
-    with pytest.raises(refusals.RefusedError) as error:
+    with pytest.raises(rtcf.RtcfError) as error:
         blocks.set("Pid", **parameters)
     assert said in str(error.value)
     assert "\n" not in str(error.value)
