@@ -509,7 +509,7 @@ def test_arrays_of_ints_are_divided_as_by_numpy(tmp_path: Path) -> None:
     # The smallest int by -1, too: the machine's instruction ends the process.
     steps = []
     lines = QUOTIENTS.splitlines()
-    kinds = [np.int8, np.int16, np.int32, np.int64, np.uint8]
+    kinds: list[Any] = [np.int8, np.int16, np.int32, np.int64, np.uint8]
     for kind in kinds:
         limits = np.iinfo(kind)
         few = [
