@@ -30,7 +30,7 @@ class Comparator final : public rtcf::Component {
         const bool referenced = reference.read() != rtcf::DataStatus::None;
         if (in.read() == rtcf::DataStatus::None) return;
         const double difference = in.value() - (referenced ? reference.value() : threshold);
-        switch (relation) {
+        switch (relation.value()) {
             case Relation::Above:
                 out.write(difference > 0.0);
                 break;

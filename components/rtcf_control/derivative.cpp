@@ -37,10 +37,11 @@ class Derivative final : public rtcf::Component {
             return;
         }
         if (begun_) rate_ = (filter_time * rate_ + value - last_) / (filter_time + gap_ + dt());
+        out.write(gain * rate_);
         last_ = value;
         gap_ = 0.0;
-        begun_ = true;
-        out.write(gain * rate_);
+        begun_ = std::isfinite(rate_.value());
+        if (!begun_) rate_ = 0.0;  // overflow, which the filter would keep
     }
 
     // In the last cycle as in any other: passes on the safe command of a component in front.

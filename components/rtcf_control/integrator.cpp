@@ -50,15 +50,14 @@ class Integrator final : public rtcf::Component {
         const bool has_value = in.read() != rtcf::DataStatus::None;
         const bool is_reset = reset.read() != rtcf::DataStatus::None && reset.value();
         const double rate = gain * in.value();
-        if (is_reset) {
-            sum_ = initial.value();
-        } else if (has_value && !std::isfinite(rate)) {
+        if (has_value && !is_reset && !std::isfinite(rate)) {
             out.write(rate);  // rejected by the check: readers keep the last output
             return;
-        } else if (!begun_) {
+        }
+        if (is_reset || !begun_) {
             sum_ = initial.value();
         } else {
-            sum_ += dt() * (method == Method::Euler ? rate : (last_ + rate) / 2.0);
+            sum_ += dt() * (method == Method::Euler ? rate : last_ / 2.0 + rate / 2.0);
         }
         sum_ = std::clamp(sum_.value(), lower.value(), upper.value());
         // The first value, and the first one after a reset, begin an interval.

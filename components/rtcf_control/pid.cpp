@@ -159,7 +159,7 @@ class Pid final : public rtcf::Component {
     void takeOver(const rtcf::Predecessor& previous) noexcept override {
         if (previous.state<Gains>("gains") != nullptr) return;  // a Pid, whose state is complete
         begun_ = false;
-        const double* last = previous.output<double>("effort");
+        const auto* last = previous.output<double>("effort");
         if (last == nullptr || !std::isfinite(*last)) return;
         effort_ = *last;
         resume_ = true;
@@ -190,6 +190,13 @@ class Pid final : public rtcf::Component {
         follow(r, y, by_hand && setpoint_tracking);
         adoptGains(schedule);
         const double rest = terms(gains_) + forward;
+        if (!std::isfinite(rest)) {
+            // Overflow, which the slopes would keep: begin anew from the last effort.
+            effort.write(rest);  // rejected, as above
+            begun_ = false;
+            resume_ = true;
+            return;
+        }
         if (resume_ && ki != 0.0) integral_ = effort_ - rest;
         resume_ = false;
 
@@ -287,7 +294,7 @@ class Pid final : public rtcf::Component {
     // that the actuator has not applied.
     void integrate(double slope, double excess, double lost) {
         const double step = dt();
-        switch (anti_windup) {
+        switch (anti_windup.value()) {
             case AntiWindup::BackCalculation: {
                 if (ki == 0.0) return;
                 const double time = tracking_time > 0.0 ? tracking_time.value() : std::abs(kp / ki);

@@ -147,7 +147,7 @@ class SignalGenerator final : public rtcf::Component {
     // Value of the signal in this cycle, between -1 and 1.
     double unit() const {
         const std::int64_t since = time_ - nanoseconds(delay);
-        switch (shape) {
+        switch (shape.value()) {
             case Shape::Step:
                 return since >= 0 ? 1.0 : 0.0;
             case Shape::Ramp:

@@ -336,6 +336,17 @@ def test_derivative_of_a_ramp_is_its_slope_also_after_a_gap(blocks: Blocks) -> N
     assert np.allclose(out[1:], 3.0, rtol=0, atol=1e-9)
 
 
+@pytest.mark.parametrize("filter_time", [0.0, 0.01])
+def test_derivative_continues_after_a_value_that_overflows(
+    blocks: Blocks, filter_time: float
+) -> None:
+    ramp = 3.0 * DT * np.arange(200)
+    ramp[50] = 1e307
+    out = blocks.out("Derivative", {"in": ramp}, filter_time=filter_time)
+    assert out[50] == out[49]
+    assert out[-1] == pytest.approx(3.0, abs=1e-4)
+
+
 @seed(29)
 @settings(max_examples=15)
 @given(walk=arrays.arrays(float, 60, elements=numbers), length=st.integers(1, 70))
@@ -542,15 +553,14 @@ def test_a_gain_of_an_integrator_changes_without_a_jump(stepped: Bench) -> None:
 def test_a_window_changes_its_length_without_a_jump(stepped: Bench, length: int) -> None:
     block = Stepped(stepped, "MovingAverage", length=10)
     try:
-        for value in range(25):
+        for value in range(12):
             state = block.step(**{"in": float(value)})
         mean = state["sum"] / state["count"]
-        assert mean == pytest.approx(19.5, abs=ROUNDING)
+        assert mean == pytest.approx(6.5, abs=ROUNDING)
         block.set(length=length)
         state = block.step(**{"in": mean})
         assert state["sum"] / state["count"] == pytest.approx(mean, abs=ROUNDING)
-        for _ in range(length):
-            state = block.step(**{"in": 7.0})
+        state = block.step(length, **{"in": 7.0})
         assert state["count"] == length
         assert state["sum"] / state["count"] == pytest.approx(7.0, abs=ROUNDING)
     finally:

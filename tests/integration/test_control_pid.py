@@ -285,6 +285,20 @@ def test_a_value_that_is_not_finite_holds_effort_and_state(blocks: Blocks) -> No
         assert (held[30:] == held[29]).all(), "the value stays until another one comes"
 
 
+def test_effort_continues_after_a_value_that_overflows(blocks: Blocks) -> None:
+    p = Settings(kp=2.0, ki=5.0, kd=0.1, filter_time=0.01)
+    measured = np.full(60, 0.5)
+    measured[20] = 1.5e308
+    found = effort_of(blocks, p, np.ones(60), measured)
+    assert found[20] == found[19]
+    assert found[21] == pytest.approx(found[19], abs=ROUNDING)
+    assert np.allclose(np.diff(found[21:]), 5.0 * 0.5 * DT, rtol=0, atol=ROUNDING)
+    # Also where only the slope overflows, which this controller does not use.
+    measured[20] = 1e306
+    found = effort_of(blocks, Settings(kp=2.0), np.ones(60), measured)
+    assert found[21:].tolist() == [1.0] * 39
+
+
 def test_nothing_is_written_before_both_inputs_have_a_value(blocks: Blocks) -> None:
     late = MASKED.array([0.0, 0.0, 1.0], mask=[True, True, False])
     found = effort_of(blocks, Settings(), np.ones(3) * 3.0, late)
