@@ -412,7 +412,7 @@ def test_over_ssh_the_tunnel_command_is_printed(
         (["--port", "99999"], "rtcfctl: --port 99999: must be from 0 to 65535"),
         (["/nowhere.mcap"], "rtcfctl: /nowhere.mcap: no such file"),
         (["--address", "192.0.2.1"], "choose another --port"),
-        (["--token-file", "/dev/null"], "rtcfctl: /dev/null: a token has 16 letters"),
+        (["--token-file", "/dev/null"], "rtcfctl: /dev/null: a token needs at least 16 letters"),
     ],
 )
 def test_a_wrong_command_line_is_rejected(looping: Daemon, arguments: list[str], said: str) -> None:

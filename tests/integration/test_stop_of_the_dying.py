@@ -70,7 +70,7 @@ def test_a_frozen_executor_is_named_with_the_command_to_end_it(
         assert (done.returncode, done.stdout) == (1, ""), done.stderr
         (line,) = done.stderr.splitlines()
         assert f"(pid {executor}) is frozen" in line
-        assert "`rtcfctl runner restart rt_runner` ends it" in line
+        assert "end it with `rtcfctl runner restart rt_runner`" in line
         assert "is frozen" in state(client).status
         restart = daemon.ctl("runner", "restart", "rt_runner")
         assert restart.returncode == 0, restart.stderr
