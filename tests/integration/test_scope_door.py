@@ -148,7 +148,7 @@ def test_a_page_of_a_restarted_server_explains_how_to_continue(
         page.wait("scope.live.end > 10")
     page.wait("document.getElementById('trouble').textContent.includes('no connection')")
     with ScopeProcess(looping, *kept, "--port", str(before.port)) as after:
-        page.wait("document.getElementById('trouble').textContent.includes('access requires the token')")
+        page.wait("document.getElementById('trouble').textContent.includes('requires the token')")
         chromium.page(after.address).wait("scope.rate")
         page.wait("document.getElementById('trouble').hidden")
 

@@ -149,7 +149,7 @@ def test_spans_of_components_continue_over_changes_and_end_with_the_loop(
 
 
 def test_windows_have_no_times_of_components(running: Daemon, client: rtcf.Client) -> None:
-    with pytest.raises(rtcf.RtcfError, match="component_times are available per cycle, not per window"):
+    with pytest.raises(rtcf.RtcfError, match="available per cycle, not per window"):
         client.watch_ports((), every=10, min_max=True, component_times=True)
 
 
