@@ -262,8 +262,8 @@ class Pid final : public rtcf::Component {
         gap_ = 0.0;
     }
 
-    // New gains change the integral by what they change the other terms, so that effort does not
-    // jump. Without integral action nothing would remove this part again, so effort jumps.
+    // The integral absorbs the jump of the other terms after a change of gains, so that effort does
+    // not jump. Without integral action nothing would remove this part again, so effort jumps.
     void adoptGains(double schedule) {
         const Gains now{kp, kd, setpoint_weight, derivative_weight, dead_band, schedule};
         if (begun_ && ki != 0.0 && now != gains_.value()) integral_ += terms(gains_) - terms(now);
@@ -274,7 +274,7 @@ class Pid final : public rtcf::Component {
     // The proportional and the derivative term.
     double terms(const Gains& g) const {
         const double e = setpoint_ - measured_;
-        // What the band takes from the error, it also takes from the weighted error.
+        // The dead band reduces the weighted error by the same amount as the error.
         const double weighted =
             g.setpoint_weight * setpoint_ - measured_ - e + withoutBand(e, g.dead_band);
         return g.schedule *

@@ -1,10 +1,11 @@
-"""Fixtures: a daemon, a client and a ROS master."""
+"""Fixtures: a daemon, a client, a ROS master and a browser."""
 
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 import rtcf
+from browser import Browser
 from daemon_process import NO_ROS, Daemon
 from launch_processes import Launching
 from ros_processes import Master
@@ -59,3 +60,10 @@ def launching(tmp_path: Path, master: Master) -> Iterator[Launching]:
     launching.forget()
     yield launching
     launching.end()
+
+
+@pytest.fixture(scope="module")
+def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """Yield a headless browser, shared by the tests of a module."""
+    with Browser(tmp_path_factory.mktemp("browser")) as browser:
+        yield browser

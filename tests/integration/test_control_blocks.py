@@ -202,7 +202,7 @@ def test_backlash_is_the_play_operator(blocks: Blocks, walk: Any, width: float) 
     expected = [walk[0]]
     for drive in walk[1:]:
         gap = drive - expected[-1]
-        moved = max(abs(gap) - width / 2.0, 0.0)  # what the flank pushes
+        moved = max(abs(gap) - width / 2.0, 0.0)  # the part that the flank pushes
         expected.append(expected[-1] + np.sign(gap) * moved)
     assert np.allclose(out, expected, rtol=0, atol=1e3 * ROUNDING)
 

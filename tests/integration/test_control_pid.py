@@ -64,7 +64,7 @@ class Settings:
     safe_effort: float = 0.0
 
     def given(self) -> dict[str, Any]:
-        """Return what can be set: infinity is a default only."""
+        """Return the parameters to set, without infinity, which is only valid as a default."""
         return {name: value for name, value in vars(self).items() if value not in
                 (math.inf, -math.inf)}  # fmt: skip
 

@@ -72,7 +72,7 @@ def test_a_frozen_daemon_blocks_no_stop_and_learns_of_it_later(
     with stopped(daemon.pid):
         said = stop_by_command(daemon)
         assert "at its executor, because rtcfd does not answer within 0.5 s" in said
-        # The stop is on disk, whatever happens to rtcfd now.
+        # The stop is on disk, even if rtcfd ends now.
         assert not mark(daemon).exists()
     assert not runs(client)
     wait_for(lambda: "loop stopped at its executor by " in daemon.log(), "the log")

@@ -1,4 +1,4 @@
-"""The values of the last second outlive the executor, whatever the cause of its death."""
+"""The values of the last second outlive the executor after any cause of death."""
 
 import os
 import random

@@ -36,18 +36,12 @@ def scope(loop: Daemon) -> Iterator[ScopeProcess]:
         yield scope
 
 
-@pytest.fixture(scope="module")
-def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    with Browser(tmp_path_factory.mktemp("browser")) as browser:
-        yield browser
-
-
 Opener = Callable[..., Page]
 
 
 @pytest.fixture
 def visit(chromium: Browser, scope: ScopeProcess) -> Iterator[Opener]:
-    """Give what opens a page with a layout; it is closed afterwards."""
+    """Yield a function that opens a page with a layout, and close the pages afterwards."""
     pages = []
 
     def visit(layout: str = "") -> Page:
@@ -111,7 +105,7 @@ def test_a_derivative_and_a_difference_of_a_loop_are_right(visit: Opener) -> Non
     page.wait(
         "[...document.querySelectorAll('.chip b')].every((each) => /[0-9]/.test(each.textContent))"
     )
-    # A bookmark has it; what it is of is not shown itself.
+    # A bookmark contains the derived signal, but not its source.
     page.ask("scope.toggle('/w0.wave')")
     page.wait('decodeURIComponent(location.hash).includes(\'"traces":["= d(/w0.phase)"\')')
     assert page.errors == []

@@ -37,12 +37,6 @@ def scope(loop: Daemon) -> Iterator[ScopeProcess]:
         yield scope
 
 
-@pytest.fixture(scope="module")
-def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    with Browser(tmp_path_factory.mktemp("browser")) as browser:
-        yield browser
-
-
 Opener = Callable[..., Page]
 
 

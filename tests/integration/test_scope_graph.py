@@ -29,12 +29,6 @@ def scope(shared: Daemon) -> Iterator[ScopeProcess]:
         yield scope
 
 
-@pytest.fixture(scope="module")
-def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    with Browser(tmp_path_factory.mktemp("browser")) as browser:
-        yield browser
-
-
 @pytest.fixture
 def size() -> tuple[int, int]:
     """Return the size of the page; some tests use several."""

@@ -44,7 +44,7 @@ def loop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
 
 @pytest.fixture(scope="module")
 def recordings(loop: Daemon, tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
-    """Give two recordings of the loop."""
+    """Return two recordings of the loop."""
     files = [tmp_path_factory.mktemp("recordings") / f"{name}.mcap" for name in ("one", "two")]
     for file in files:
         done = loop.ctl("record", "-o", str(file), "w0", "--duration", "1.5s")
@@ -58,18 +58,12 @@ def scope(loop: Daemon, recordings: list[Path]) -> Iterator[ScopeProcess]:
         yield scope
 
 
-@pytest.fixture(scope="module")
-def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    with Browser(tmp_path_factory.mktemp("browser")) as browser:
-        yield browser
-
-
 Opener = Callable[..., Page]
 
 
 @pytest.fixture
 def visit(chromium: Browser, scope: ScopeProcess) -> Iterator[Opener]:
-    """Give what opens a page with a layout; `drawing` has the helpers in it."""
+    """Yield a function that opens a page with a layout, with the helpers of `drawing`."""
     pages = []
 
     def visit(layout: Any = None) -> Page:
@@ -537,7 +531,7 @@ def test_the_second_recording_is_shifted_against_the_first(visit: Opener) -> Non
     page.ask("scope.toggle('/w0.phase')")
     page.wait("scope.recordings.every((each) => each.store.column('/w0.phase'))")
     assert page.ask(first) == [0, 0.25]
-    # What is at A comes to B.
+    # The value at A moves to B.
     page.ask("scope.setCursor('a', 0.5); scope.setCursor('b', 0.9)")
     a, b = page.ask("[scope.cursors.a, scope.cursors.b]")
     _press(page, "A → B")

@@ -294,7 +294,7 @@ class _State:
     def _is_below(self, priority: int) -> bool:
         """Return whether a priority is below the loop's real-time priority.
 
-        False if the loop is not real-time: fair threads share the CPU whatever their nice value.
+        False if the loop is not real-time: fair threads share the CPU at any nice value.
         """
         own = self.own_priority
         return own is not None and own < _FIRST_FAIR_PRIORITY and priority > own

@@ -1,4 +1,4 @@
-// Files of what is in sight: a picture, a table, or the recording of it.
+// Exports the visible part: as a picture, a table, or a recording.
 import { colour, ink } from "./drawing/palette.js";
 import { query, request } from "./server.js";
 

@@ -1,4 +1,4 @@
-// What is shown and how, as a small object: in the address, and saved on the server.
+// The layout of the page as a small object: in the address, and saved on the server.
 import { errorOf, isDerived } from "./data/derived.js";
 import { isAxis } from "./drawing/pane.js";
 import { ask } from "./server.js";
@@ -13,7 +13,7 @@ export function taken(scope, runner, drawer, xy) {
   };
 }
 
-// Only what is not as it is without a layout.
+// Only the settings that differ from the default.
 function paneTaken(pane) {
   const traces = pane.traces.map(({ name, axis, own }) => (axis || own.set ? { name, ...(axis && { axis }), ...(own.set && { scale: own.set }) } : name));
   const weight = Number(pane.weight.toPrecision(3));
@@ -44,7 +44,7 @@ function rangeOf(range) {
   return Number.isFinite(low) && Number.isFinite(high) && low < high ? { low, high } : null;
 }
 
-// Shows a layout; returns what of it is left out, in a line.
+// Shows a layout; returns one line with the omitted parts, or an empty text.
 export function given(scope, layout) {
   const wrong = [];
   if (Array.isArray(layout.panes) && layout.panes.length) {

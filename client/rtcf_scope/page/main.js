@@ -1,4 +1,4 @@
-// Puts the page together: the scope, its panels, the stream, and what the buttons do.
+// Assembles the page: the scope, its panels, the stream and the buttons.
 import { scaled } from "./drawing/axes.js";
 import * as exporting from "./export.js";
 import { KEYS, mind } from "./keys.js";
@@ -41,7 +41,7 @@ const figures = { frames: 0, perSecond: 0, since: performance.now(), state: {} }
 new Derive(scope, $("derive"));
 let stream = null, drawer = "measurements", generation = -1, liveCatalog = [];
 const troubles = new Map();
-window.scope = scope; // for who looks at the page with the browser's tools
+window.scope = scope; // for tests and the browser's tools
 window.figures = figures;
 
 function trouble(source, text) {
@@ -96,7 +96,7 @@ function connect(runner) {
       trouble("connection", why);
       if (is) {
         for (const source of ["rtcfd", "missing"]) trouble(source, "");
-        generation = -1; // what has changed meanwhile is asked for
+        generation = -1; // request the changes since then
       }
       // One that waits is armed again with the connection.
       else if (scope.trigger.state !== "armed") stream.wanted.trigger = null;
@@ -120,7 +120,7 @@ function hear(message) {
   else if (message.kind === "state") state(message);
   else if (message.kind === "event" || message.kind === "record") {
     scope.events.push(message);
-    // What was told for information goes first.
+    // Informational events are removed first.
     if (scope.events.length > 1000) scope.events.splice(Math.max(0, scope.events.findIndex(isForInformation)), 1);
     if (message.what === "parameters") renew(false);
     if (drawer === "events") events.show();
@@ -158,7 +158,7 @@ async function runners() {
   return about;
 }
 
-// Asks again what the graph is (all of it, or values of parameters alone).
+// Requests the graph again: all of it, or only values of parameters.
 async function renew(all) {
   const runner = told.runner();
   try {
@@ -202,7 +202,7 @@ function open(name) {
   scope.changed();
 }
 
-// What is dear: a few times a second, and only what is in sight.
+// Expensive updates: a few times a second, and only of visible parts.
 async function slow() {
   const now = performance.now();
   if (now - figures.since > 1000) {
@@ -287,7 +287,7 @@ function buttons() {
   $("theme").onclick = other;
   $("help").onclick = () => $("keys").showModal();
   $("runner").onchange = () => connect(told.runner());
-  $("runner").onfocus = () => runners().catch(() => {}); // the stream says what is wrong
+  $("runner").onfocus = () => runners().catch(() => {}); // the stream reports the error
   $("trigger").onsubmit = (event) => event.preventDefault();
   $("layouts").onchange = ({ target }) => { const choice = target.value; target.value = ""; trying(() => chooseLayout(choice)); };
   $("export").onchange = ({ target }) => {
@@ -327,7 +327,7 @@ async function begin() {
   told.right = about.right;
   connect(told.runner());
   if (asked) apply(asked);
-  // Not before: the address has what is asked for until then.
+  // Not earlier: until then the address has the requested layout.
   scope.onLayout = () => layout.toAddress(() => layout.taken(scope, told.runner(), drawer, xy));
   await Promise.all([layouts(), recordings.show()]);
   new ResizeObserver(() => scope.changed()).observe($("panes"));

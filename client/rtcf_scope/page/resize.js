@@ -3,7 +3,7 @@
 const STEP = 16; // pixels of a key
 const LEAST_PANE = 60; // pixels
 
-// `axis` is "x" or "y"; `sign` is 1 if dragging right or down makes larger what `size` and `set` tell.
+// `axis` is "x" or "y"; `sign` is 1 if dragging right or down increases the size, else -1.
 function dragged(bar, { axis, sign, size, set, reset }) {
   bar.tabIndex = 0;
   bar.setAttribute("role", "separator");

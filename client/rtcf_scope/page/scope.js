@@ -1,5 +1,5 @@
-// What is shown, and how: the panes, the view, what is at hand to draw. Panels change it by its
-// methods; `changed` has all drawn anew in the next frame.
+// The state of the page: panes, view, and the stores to draw. Panels change it by its methods;
+// `changed` redraws everything in the next frame.
 import { Pane } from "./drawing/pane.js";
 import { Pace, View } from "./drawing/view.js";
 import { minded } from "./drawing/pointer.js";
@@ -28,32 +28,32 @@ export class Scope {
     this.shotNumber = -1;
     this.recordings = []; // {name, store, shift, beginNs}: one, or two over each other
     this.events = []; // newest last
-    // `told`: as it is set; `armed`: the signals that the server looks at; `missing`: those of them
-    // that the graph does not have.
+    // `told`: the settings; `armed`: the signals that the server watches; `missing`: those of them that
+    // the graph does not have.
     this.trigger = { told: { kind: "edge", signal: "", slope: "rising", low: 0, high: 1 }, state: "off", armed: [], missing: [] };
     this.baseNs = 0n;
     this.onTraces = () => {}; // others are watched
     this.onActive = () => {}; // another pane is the active one
     this.onShift = () => {}; // the second recording has moved
-    this.onLayout = () => {}; // something that a layout holds is another
+    this.onLayout = () => {}; // a part of the layout has changed
     this.dirty = true;
     this.drawn = { end: NaN, time: NaN }; // of the live cycles, in the frame before
     this.found = null; // the marks, until something changes
-    this.marksNumber = 0; // another one when they are others
+    this.marksNumber = 0; // changes with them
     this.addPane();
   }
 
   get shot() { return this.shots[this.shotNumber]; }
   get store() { return this.sources()[0]; }
 
-  // What is drawn over each other, the one that counts first.
+  // The stores that are drawn over each other, the main one first.
   sources() {
     if (this.mode === "recording") return this.recordings.map((each) => each.store);
     if (this.mode === "trigger") return this.shot ? [this.shot.store] : [EMPTY];
     return [this.live];
   }
 
-  // The place whose values the legends tell where no cursor is: the hit, or the newest.
+  // The place of the legend's values without a cursor: the hit, or the newest cycle.
   get readAt() { return this.mode === "trigger" ? this.store.nearest(0) : this.store.end - 1; }
 
   // Takes notice of signals: {name, unit, kind}.
@@ -254,12 +254,12 @@ export class Scope {
     return found.sort((one, other) => one.time - other.time);
   }
 
-  // Draws what has changed; called for each frame with its time, ms.
+  // Draws the changes. Called for each frame with its time, ms.
   frame(now = performance.now()) {
     const { live, view } = this;
     if (this.mode === "roll" && !live.empty) {
       const end = view.follows ? this.pace.step(now, live.lastTime) : view.end;
-      // Cycles behind what is in sight change nothing.
+      // Cycles after the visible part change nothing.
       if (end !== view.end || (live.end !== this.drawn.end && !(end < this.drawn.time))) this.dirty = true;
       view.end = end;
     }

@@ -55,8 +55,8 @@ class Usage:
 
     @contextmanager
     def calling(self, method: str, peer: Peer, level: Level) -> Iterator[None]:
-        """Count a running call; raises ResourceExhausted above the limits of users who are not
-        trusted."""
+        """Count a running call; raises ResourceExhausted above the limits of
+        untrusted users."""
         watches = method.startswith("Watch")
         if level < TRUSTED:
             for number, most, kind in (

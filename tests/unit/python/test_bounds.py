@@ -84,7 +84,7 @@ def test_an_observer_has_limited_calls_and_streams() -> None:
     ):
         pass
     with usage.calling("WatchStatistics", ann, Level.OPERATE):
-        pass  # users who may stop loops are not limited
+        pass  # users with the right operate are not limited
     for each in watches:
         each.__exit__(None, None, None)
     with usage.calling("WatchStatistics", ann, Level.OBSERVE):

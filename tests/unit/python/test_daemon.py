@@ -117,7 +117,7 @@ def test_two_rtcfds_share_no_state(
         f"{daemon.process.pid}): end that, or choose another --state-dir\n"
     )
     assert daemon.saved()["settings"]["frequency_hz"] == 123.0
-    # Nor does an rtcfd that has ended, in whatever way, block the state.
+    # A killed rtcfd does not block the state either.
     daemon.end(signal.SIGKILL)
     second.start()
     assert "ready;" in second.log()

@@ -291,7 +291,7 @@ def test_save_replaces_no_pipe_and_no_link(daemon: DaemonUnderTest, tmp_path: Pa
     assert link.is_symlink()
     assert file.read_text() == text
     assert stat.S_IMODE(file.stat().st_mode) == 0o664
-    # A name of the kernel's, whatever its target.
+    # The kernel's own link, with any target.
     log = tmp_path / "log"
     log.write_text("before\n")
     with log.open("a") as out:

@@ -131,7 +131,7 @@ def test_a_too_long_socket_path_is_reported_in_one_line() -> None:
 def test_no_permission_is_exit_code_3_and_names_the_group(
     stopped_daemon: DaemonUnderTest, mode: int, group: str, advice: str
 ) -> None:
-    # A user who can enter all folders, including those above the build tree and the socket.
+    # A user with access to all folders, including those above the build tree and the socket.
     nobody = ["--reuid=65534", "--regid=65534", "--clear-groups"]
     looks = ["--inh-caps=+dac_read_search", "--ambient-caps=+dac_read_search"]
     with socket.socket(socket.AF_UNIX) as listening:

@@ -1,4 +1,4 @@
-"""`stop --all` asks rtcfd, whatever is at the path of the executors' sockets."""
+"""`stop --all` asks rtcfd, even if the executors' sockets have been replaced."""
 
 from pathlib import Path
 

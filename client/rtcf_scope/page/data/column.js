@@ -31,7 +31,7 @@ export class Column {
     for (const level of this.levels) fill(level, at, values);
   }
 
-  // No cycle is at this place, or none that told this value.
+  // Marks a place without a cycle, or whose cycle lacks this value.
   blank(at) {
     const place = at % this.values.length;
     this.values[place] = NaN;

@@ -28,7 +28,7 @@ export function peak({ amplitudes, step }, at) {
   return { frequency: (at + by) * step, amplitude: Math.exp(top - (before - after) * by / 4) };
 }
 
-// The point of the highest peak; what is left of the mean is none.
+// The point of the highest peak. The remainder of the mean does not count.
 export function highest({ amplitudes, step, resolution }) {
   let found = Math.min(Math.ceil(resolution / step), amplitudes.length - 1);
   for (let i = found + 1; i < amplitudes.length; i++) if (amplitudes[i] > amplitudes[found]) found = i;

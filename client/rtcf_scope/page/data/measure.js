@@ -31,7 +31,7 @@ export function measured(store, column, begin, end) {
     frequency: frequency(times, found, min, max), ...step(times, found) };
 }
 
-// Of what crosses the middle of its range upwards, with a band that noise does not cross twice.
+// Frequency of upward crossings of the middle of the range. The hysteresis band rejects noise.
 export function frequency(times, found, min, max) {
   const middle = (min + max) / 2, band = (max - min) * 0.1;
   if (!(band > 0)) return NaN;
@@ -51,8 +51,8 @@ export function frequency(times, found, min, max) {
   return count > 1 ? (count - 1) / (last - first) : NaN;
 }
 
-// Rise from 10 to 90 %, overshoot in %, settling into 2 %: of a step from where it begins to where
-// it ends. What does not end where it stays, and what comes back to where it began, is no step.
+// Rise time from 10 to 90 %, overshoot in % and settling time to 2 % of a step from its first to its
+// last level. A signal that does not settle, or returns to its first level, is not a step.
 export function step(times, found) {
   const none = { rise: NaN, overshoot: NaN, settling: NaN };
   const count = found.length, edge = Math.max(1, Math.floor(count / 20)), tail = count - 2 * edge;

@@ -1,4 +1,4 @@
-// The cycles that are at hand: times, numbers, and a column for each trace.
+// The stored cycles: times, numbers, and a column for each trace.
 import { BLOCK, Column } from "./column.js";
 import { Derivation } from "./derivation.js";
 import { derived, isDerived, sources } from "./derived.js";
@@ -95,7 +95,7 @@ export class Store {
     for (const derivation of this.derivations.values()) derivation.run(at, at + 1);
   }
 
-  // Columns that nobody looks at any more.
+  // Removes the columns that no trace needs.
   keep(names) {
     const kept = new Set([LATENCY, DURATION, ...names, ...sources(names)]);
     for (const name of this.columns.keys())

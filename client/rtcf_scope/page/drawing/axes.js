@@ -14,7 +14,7 @@ export function tickStep(range, wanted) {
 export function ticks(low, high, wanted) {
   const step = tickStep(high - low, wanted), at = [];
   if (!step) return { step: 1, at };
-  // A range that is narrower than the numbers around it tell apart has no ticks.
+  // A range below the precision of its numbers has no ticks.
   if (low + step === low || high - step === high) return { step, at };
   for (let n = Math.ceil(low / step - 1e-9); n * step <= high + step * 1e-9; n++) at.push(n * step);
   return { step, at };
@@ -29,7 +29,7 @@ export function tickText(value, step) {
   return value.toFixed(Math.min(digitsOf(step), 12)).replace("-", "−");
 }
 
-// Texts of ticks, which differ, in few characters: `note` tells what is to be multiplied or added.
+// Short, distinct texts of ticks. `note` is their common factor or offset.
 export function tickTexts(at, step) {
   const most = at.reduce((found, value) => Math.max(found, Math.abs(value)), 0);
   const digits = digitsOf(step);

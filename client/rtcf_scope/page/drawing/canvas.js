@@ -1,4 +1,4 @@
-// A canvas to draw on anew, whatever its size and the pixels of the screen.
+// Clears a canvas, and fits it to its size and to the pixels of the screen.
 import { ink } from "./palette.js";
 
 export function blank(canvas) {

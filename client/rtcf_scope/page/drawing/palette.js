@@ -1,5 +1,5 @@
-// Okabe and Ito's colours, which colour-blind people tell apart, made to stand out from either
-// ground. Beyond eight, symbols on the line tell what colours cannot.
+// The colour-blind safe colours of Okabe and Ito, adapted to a dark and a light background. From the
+// ninth trace on, symbols on the line distinguish traces of one colour.
 const DARK = ["#56b4e9", "#e69f00", "#2fd0a0", "#f0e442", "#e58cc0", "#ff7f45", "#8fa8ff", "#d9d9d9"];
 const LIGHT = ["#0072b2", "#c05000", "#00805c", "#8a7400", "#b0478a", "#9c2f00", "#3d4fc4", "#404040"];
 const SYMBOLS = ["", "square", "diamond", "triangle"];

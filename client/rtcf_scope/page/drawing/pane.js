@@ -92,7 +92,7 @@ export class Pane {
   #on(axis) { return this.traces.filter((each) => this.axisOf(each) === axis); }
   #scaleOf(trace) { return { left: this.left, right: this.right }[this.axisOf(trace)] ?? trace.own; }
 
-  // The legend: made anew when traces change, its values by `tell`.
+  // Rebuilds the legend after a change of traces. `tell` updates its values.
   describe() {
     this.content = this.#contents();
     this.legend.replaceChildren(...this.traces.map((trace) => this.#chip(trace)));
@@ -190,7 +190,7 @@ export class Pane {
 
   #scales() { return [this.left, this.right, ...this.traces.map((each) => each.own)]; }
 
-  // The values are others than before: no scale of theirs is right.
+  // Other values are shown: the fitted scales are invalid.
   forget() { for (const scale of this.#scales()) { const { set } = scale; scale.reset(); scale.set = set; } }
 
   // The scales at a place of the face, each with the sight that shows it.
@@ -206,7 +206,7 @@ export class Pane {
     return [...found].filter(([, sight]) => sight).map(([scale, sight]) => ({ scale, sight }));
   }
 
-  // What is where in a plot of a size: the sight, that of the right axis, and those of the traces.
+  // The arrangement of a plot of this size: the sights of the left axis, the right axis and the traces.
   #arrange(width, height, ratio) {
     const { scope } = this;
     const tracks = this.#on("track"), hasLines = tracks.length < this.traces.length;

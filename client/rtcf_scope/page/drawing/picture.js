@@ -36,16 +36,16 @@ export function drawColumns(raster, sight, base, from, to, sources, traces) {
   });
 }
 
-// What is new in the columns of a sight, as cycles come and the oldest ones go: those from `final` on
-// may still become others, from `drawn` on there is nothing yet; before `gone` there is nothing any
-// more, and between `gone` and `held` cycles are going.
+// The state of the columns of a sight, while cycles arrive and the oldest ones leave. Columns from
+// `final` on may still change, from `drawn` on they are empty; before `gone` they are empty again, and
+// between `gone` and `held` cycles are leaving.
 export function newsOf(sight, sources, traces) {
   const near = reachOf(sight, traces) + 1;
   const news = { stamp: 0, final: Infinity, drawn: -Infinity, held: -Infinity, gone: -Infinity };
   for (const store of sources) {
     news.stamp += store.end;
     if (store.end - store.begin < 2) { news.final = -Infinity; news.drawn = Infinity; continue; }
-    // What the line to the last cycle looks like depends on the next one.
+    // The shape of the line to the last cycle depends on the next one.
     news.final = Math.min(news.final, Math.floor(sight.column(store.time(store.end - 2))) - near);
     news.drawn = Math.max(news.drawn, Math.ceil(sight.column(store.lastTime)) + near);
     if (store.begin === 0) continue;

@@ -1,19 +1,19 @@
-// Pixels of a stretch of a plot. All that is drawn into it is drawn column by column, and no column
-// depends on what another one has: a picture that grows has the pixels of one that is made at once.
+// Pixels of a stretch of a plot, drawn column by column. No column depends on another one, so that a
+// growing picture has the same pixels as one drawn at once.
 export class Raster {
   constructor(width, height) { // pixels of the screen
     this.width = width;
     this.height = height;
     this.image = new ImageData(width, height);
     this.pixels = new Uint32Array(this.image.data.buffer);
-    // How much of each pixel of the column at hand is covered by what is drawn, until `settle`.
+    // Coverage of each pixel of the present column, until `settle`.
     this.cover = new Float32Array(height);
     this.top = height;
     this.bottom = 0;
     this.clip(0, height);
   }
 
-  // Rows that bars and what covers pixels are drawn into: from `begin` to before `end`.
+  // Limits bars and coverage to the rows from `begin` to before `end`.
   clip(begin, end) {
     this.begin = Math.max(begin, 0);
     this.end = Math.min(end, this.height);
@@ -45,14 +45,14 @@ export class Raster {
     if (bottom > last) this.mix(last * width + x, colour, (bottom - last) * alpha);
   }
 
-  // Covers a part of the column at hand: between rows, `share` of its width.
+  // Covers a part of a pixel of the present column: `share` of its area.
   add(y, share) {
     this.cover[y] += share;
     if (y < this.top) this.top = y;
     if (y >= this.bottom) this.bottom = y + 1;
   }
 
-  // Colours what has been covered of a column.
+  // Colours the covered pixels of a column.
   settle(x, colour, alpha) {
     const { cover, width } = this;
     for (let y = this.top; y < this.bottom; y++) {

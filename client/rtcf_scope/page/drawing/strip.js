@@ -1,5 +1,5 @@
-// What moves with time: an element that is shifted as a whole, by whole pixels of the screen, so
-// that what is in it is drawn once.
+// An element that moves with time: it is shifted as a whole, by whole pixels of the screen, so that its
+// content is drawn once.
 const FAR = 1 << 20; // pixels that it may be shifted
 
 export class Strip {
@@ -8,7 +8,7 @@ export class Strip {
     this.box.className = `strip ${name}`;
     this.origin = NaN; // column at its left
     this.seconds = NaN;
-    this.number = 0; // another one when the places of what is in it are
+    this.number = 0; // changes when the content must be placed again
     this.shift = null;
   }
 

@@ -14,8 +14,8 @@ export class Tiles {
     this.raster = null;
   }
 
-  // All is drawn anew when `key` is another one. `news` is as picture.js tells it; another `stamp` says
-  // that there are more cycles.
+  // Draws all tiles again if `key` has changed. `news` comes from newsOf() in picture.js; its `stamp`
+  // changes with new cycles.
   show(sight, key, news, draw) {
     this.strip.move(sight);
     if (key !== this.key) this.#begin(sight, key);

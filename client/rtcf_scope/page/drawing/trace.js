@@ -56,7 +56,7 @@ class Stroke {
     }
   }
 
-  // The second of two recordings is dashed; what is between the dashes is faint, not hidden.
+  // The second of two recordings is dashed; the gaps between the dashes are faint, not hidden.
   #alpha(x) {
     if (!this.style.second) return 1;
     const { ratio } = this.sight;
@@ -120,7 +120,7 @@ class Stroke {
     const until = x + 1 + Math.max(near, dot);
     let place = at >= store.begin ? slices.place(at) : -Infinity;
     for (; at < store.end; at++) {
-      // From the cycle at hand to the next.
+      // From this cycle to the next one.
       const isThere = this.#isThere(at);
       if (isThere) {
         if (place - (at > store.begin ? slices.place(at - 1) : -Infinity) >= apart) this.#disc(x, place, sight.row(this.column.get(at)), dot);

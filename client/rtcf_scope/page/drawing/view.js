@@ -28,10 +28,10 @@ export class View {
 }
 
 const OFTEN_S = 1, LONGEST_LAG_S = 0.3;
-const PAUSE_MS = 250; // without a frame: nobody looked
+const PAUSE_MS = 250; // without a frame: the page was hidden
 
-// Moves the end of what is followed evenly, though cycles come some dozens at a time: it stays about
-// as far behind the newest one as they come in one go.
+// Moves the end of the view evenly, although cycles arrive in batches: it stays behind the newest cycle
+// by about the length of a batch.
 export class Pace {
   constructor() { this.end = NaN; }
 

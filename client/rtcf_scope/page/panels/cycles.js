@@ -1,5 +1,5 @@
-// The timeline of cycles: wake-up and calculation of each against the period, and what the
-// components take of it.
+// The timeline of cycles: wake-up latency and calculation duration of each cycle against the period,
+// and the durations of the components.
 import { DURATION, LATENCY } from "../data/store.js";
 import { scaled, tickText, ticks } from "../drawing/axes.js";
 import { blank } from "../drawing/canvas.js";

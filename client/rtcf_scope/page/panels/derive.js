@@ -1,4 +1,4 @@
-// The field for a new derived signal, with suggestions of what is shown.
+// The field for a new derived signal, with suggestions from the shown traces.
 import { errorOf, isDerived } from "../data/derived.js";
 
 export class Derive {

@@ -1,5 +1,5 @@
-// What has happened: faults, changes, overruns, each a mark in the panes, too; and what components
-// log, warnings and errors as marks.
+// The list of events: faults, changes and overruns, which are also marks in the panes, and log records
+// of components, of which warnings and errors are marks.
 import { isBad, isForInformation } from "../scope.js";
 
 const MOST = 200; // in the list
@@ -43,7 +43,7 @@ export class Events {
   show() {
     const { events } = this.scope;
     const words = this.search.value.toLowerCase().split(/\s+/).filter(Boolean);
-    // Made anew only where it is another list: somebody may be about to press in it.
+    // Rebuilt only after a change: the user may be about to click in it.
     const made = JSON.stringify([events.length, events.at(-1), events[0], words, [...this.hidden]]);
     if (made === this.made) return;
     this.made = made;
@@ -55,7 +55,7 @@ export class Events {
       button.setAttribute("aria-pressed", String(!this.hidden.has(kind)));
     }
     const found = events.filter((event) => !this.hidden.has(kindOf(event)) && words.every((word) => textOf(event).toLowerCase().includes(word)));
-    // What is told for information takes no room from the rest.
+    // Informational events take no room from the others.
     const shown = new Set([...found.filter((each) => !isForInformation(each)).slice(-MOST * 3 / 4), ...found.filter(isForInformation).slice(-MOST / 4)]);
     this.list.replaceChildren(...found.filter((each) => shown.has(each)).reverse().map((event) => this.#item(event)));
     const left = found.length - shown.size;

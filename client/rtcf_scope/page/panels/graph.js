@@ -1,5 +1,5 @@
-// The graph as a picture: components as values go, in rows that turn where the panel ends, coloured by
-// what they cost; a value stands at what is pointed at.
+// The drawing of the graph: components from writers to readers, in rows that turn where the panel ends,
+// coloured by their durations. Pointing at a port shows its value.
 import { scaled } from "../drawing/axes.js";
 import { left, place, route, top } from "./graph_layout.js";
 
@@ -9,7 +9,7 @@ const FEWEST_COLUMNS = 3;
 const NS = "http://www.w3.org/2000/svg";
 
 export class Graph {
-  constructor(box, values) { // values(component): a promise of what its ports hold
+  constructor(box, values) { // values(component): a promise of the values of its ports
     this.box = box;
     this.values = values;
     this.told = { components: [], connections: [] };
@@ -63,7 +63,7 @@ export class Graph {
       })));
   }
 
-  // Colours by what each component takes of a cycle.
+  // Colours each component by its share of a cycle.
   tell(figures) {
     this.figures = figures;
     const most = Math.max(...Object.values(figures.components).map((each) => each.mean), 1e-9);

@@ -21,7 +21,7 @@ export class Measurements {
     this.body = table.createTBody();
     box.append(table);
     this.next = 0; // row
-    this.shown = ""; // what the rows are of
+    this.shown = ""; // names of the rows
   }
 
   show() {

@@ -8,7 +8,7 @@ export class Parameters {
     this.box = box;
     this.told = told;
     this.fields = new Map(); // "component.parameter" -> function(value)
-    this.values = new Map(); // "component.parameter" -> the value that rtcfd told
+    this.values = new Map(); // "component.parameter" -> the value from rtcfd
     this.done = []; // {component, name, before}, of this page, newest last
     this.undoing = document.createElement("button");
     this.undoing.onclick = () => this.undo();
@@ -69,7 +69,7 @@ export class Parameters {
     if (!with_.length) this.box.textContent = "No component has parameters.";
   }
 
-  // Values that somebody has changed, without making the fields anew.
+  // Shows changed values, without rebuilding the fields.
   tell(components) {
     for (const component of components)
       for (const { name, value } of component.parameters) {

@@ -96,7 +96,7 @@ export class Recordings {
     } catch (error) { this.trouble(error.message); }
   }
 
-  // The signals of what is open, by name.
+  // The signals of the open recordings, by name.
   catalog() {
     const found = new Map();
     for (const { signals } of this.open) for (const signal of signals) found.set(signal.name, signal);

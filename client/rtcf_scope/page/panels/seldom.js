@@ -1,4 +1,4 @@
-// Does what takes long the more seldom, so that it takes no more than a tenth of the time.
+// Runs an expensive function less often the longer it takes: at most a tenth of the time.
 const SHARE = 0.1;
 
 export class Seldom {

@@ -1,4 +1,4 @@
-// The spectrum of each trace, of what is in sight or between the cursors.
+// The spectrum of each trace, of the visible values or those between the cursors.
 import { figure, scaled, tickText, ticks } from "../drawing/axes.js";
 import { blank } from "../drawing/canvas.js";
 import { highest, peak, spectrum } from "../data/fft.js";
@@ -123,7 +123,7 @@ export class Spectrum {
     g.strokeRect(AREA.left + 0.5, AREA.top + 0.5, w, h);
   }
 
-  // The highest peak of each, or what the mouse points at.
+  // The highest peak of each, or the point below the mouse.
   #point(g, { w, x, y, hertz }) {
     g.textAlign = "left";
     this.found.slice(0, 8).forEach(({ name, number, of }, row) => {

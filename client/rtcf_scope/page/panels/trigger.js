@@ -16,14 +16,14 @@ export class TriggerPanel {
     this.part("later").onclick = () => this.scope.showShot(this.scope.shotNumber + 1);
   }
 
-  // Fills in the signals there are, and what is set.
+  // Fills in the available signals and the settings.
   show() {
     const { told } = this.scope.trigger;
     if (!(told.kind in SLOPES)) told.kind = "edge";
     this.#signals();
     for (const name of ["kind", "low", "high", "single", "window", "position", "holdoff", "condition"]) {
       const input = this.part(name);
-      // What somebody is typing is theirs.
+      // Leave the field in which the user types.
       if (told[name] === undefined || input === document.activeElement) continue;
       if (input.type === "checkbox") input.checked = told[name]; else input.value = told[name];
     }
