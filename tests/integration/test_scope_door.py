@@ -242,7 +242,10 @@ def test_another_user_sees_no_token_when_a_browser_is_opened(
     run = tmp_path / "run"
     run.mkdir(mode=0o700)
     script, said = tmp_path / "browser.sh", tmp_path / "said"
-    script.write_text(f'#!/bin/sh\necho "$$ $@" > {said}.new; mv {said}.new {said}; sleep 600\n')
+    os.mkfifo(tmp_path / "wait")
+    script.write_text(
+        f'#!/bin/sh\necho "$$ $@" > {said}.new; mv {said}.new {said}; read line < {tmp_path}/wait\n'
+    )
     script.chmod(0o755)
     display = {"DISPLAY": ":99", "BROWSER": str(script), "XDG_RUNTIME_DIR": str(run)}
     with ScopeProcess(looping, display=display) as scope:
