@@ -212,7 +212,10 @@ UPDATE: dict[str, tuple[str, str]] = {
     "polynomial of float32": ("self.f = np.polyval(self.g, self.f)", "np.polyval"),
     "sum of float32": ("self.f = sum(self.g)", "np.sum"),
     "sine of small ints": ("a = np.sin(self.h)", "np.sin"),
-    "element of float32, or a float": ("a = self.g[0] if self.on else self.f", "float32"),
+    "element of float32, or a float": (
+        "a = self.g[0] if self.on else self.f  # here\nself.n += 1",
+        "float32",
+    ),
     "inverted float": ("self.f = ~self.f", "~"),
     "range of a float": ("for i in range(self.kp):  # here\n    self.n += i", "range"),
     "loop over a number": ("for i in self.n:  # here\n    self.n += 1", "int"),

@@ -239,7 +239,7 @@ def test_numbers_of_other_types_match_numpy(begin: int, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("text", REFUSED)
 def test_expressions_on_which_numpy_releases_differ_are_rejected(text: str, tmp_path: Path) -> None:
-    cls = _component(tmp_path, [f"value = {text}"])
+    cls = _component(tmp_path, [f"value = {text}\nself.counts[0] += 1"])
     with pytest.raises(Mistake, match=REFUSED[text]) as raised:
         lowering.compile_component(cls)
     assert raised.value.text in (f"value = {text}", text)

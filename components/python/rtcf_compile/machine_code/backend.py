@@ -15,6 +15,7 @@ import numba
 from numba import types
 from numba.core import cgutils, codegen, cpu
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.typing import npydecl
 
 # Options for functions that need no wrappers for calls from Python or C.
 NO_WRAPPERS = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
@@ -31,6 +32,20 @@ if POINTERS_HAVE_TYPES:
     llvm.initialize()
 llvm.initialize_native_target()
 llvm.initialize_native_asmprinter()
+
+
+_types_in_place = npydecl.NumpyRulesInplaceArrayOperator.generic
+
+
+def _in_place(template: Any, args: Any, kws: Any) -> Any:
+    """Return the signature of an in-place operator, or None.
+
+    For types without one, numba 0.61 raises AttributeError, which hides its own error message.
+    """
+    try:
+        return _types_in_place(template, args, kws)
+    except AttributeError:
+        return None
 
 
 @contextmanager
@@ -53,6 +68,7 @@ def not_to_run() -> Iterator[None]:
         mock.patch.object(cpu.CPUContext, "get_executable", executable),
         mock.patch.object(codegen.JITCPUCodegen, "_add_module", lambda self, module: None),
         mock.patch.object(codegen.JITCodeLibrary, "_finalize_specific", lambda self: None),
+        mock.patch.object(npydecl.NumpyRulesInplaceArrayOperator, "generic", _in_place),
     ):
         yield
 

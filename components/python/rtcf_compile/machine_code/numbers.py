@@ -371,7 +371,7 @@ class Numbers:
             constant = self.constant(variable)
             if not number.is_narrow and narrow.dtype == np.float32 and constant is not None:
                 with np.errstate(all="ignore"):
-                    return bool(np.float32(constant) == constant)
+                    return float(np.float32(constant)) == float(constant)
         return False
 
     # Properties of variables.
