@@ -1,0 +1,101 @@
+/// @file
+/// The motion of one axis at one time, its limits, and phases of constant jerk. Positions have any
+/// unit (m, rad), written "unit" in comments; times are in s.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#include <rtcf/realtime.hpp>
+
+namespace rtcf_control {
+
+/// Position, velocity and acceleration of one axis.
+struct Motion {
+    double position = 0.0;      ///< unit
+    double velocity = 0.0;      ///< unit/s
+    double acceleration = 0.0;  ///< unit/s²
+
+    /// The motion after some time of constant jerk. Real-time safe.
+    /// @param duration s
+    /// @param jerk     unit/s³
+    [[nodiscard]] Motion after(double duration, double jerk) const noexcept RTCF_NONBLOCKING {
+        const double t = duration;
+        return {position + t * (velocity + t * (acceleration / 2.0 + t * jerk / 6.0)),
+                velocity + t * (acceleration + t * jerk / 2.0), acceleration + t * jerk};
+    }
+
+    /// The same motion in the opposite direction. Real-time safe.
+    [[nodiscard]] Motion mirrored() const noexcept RTCF_NONBLOCKING {
+        return {-position, -velocity, -acceleration};
+    }
+
+    /// The velocity after the acceleration was brought to zero as fast as possible, unit/s.
+    /// Real-time safe.
+    /// @param jerk largest jerk, unit/s³
+    [[nodiscard]] double easedVelocity(double jerk) const noexcept RTCF_NONBLOCKING {
+        const double magnitude = acceleration < 0.0 ? -acceleration : acceleration;
+        return velocity + acceleration * magnitude / (2.0 * jerk);
+    }
+};
+
+/// Position and velocity at which a motion ends. Its acceleration there is zero.
+struct MotionTarget {
+    double position = 0.0;  ///< unit
+    double velocity = 0.0;  ///< unit/s
+};
+
+/// Largest magnitudes of one axis, in both directions. All are above zero.
+struct MotionLimits {
+    double velocity = 1.0;      ///< unit/s
+    double acceleration = 1.0;  ///< unit/s²
+    double jerk = 1.0;          ///< unit/s³
+};
+
+/// A time of constant jerk.
+struct Phase {
+    double duration = 0.0;  ///< s
+    double jerk = 0.0;      ///< unit/s³
+};
+
+/// A list of phases, without memory of its own.
+/// @tparam kMost largest number of phases
+template <std::size_t kMost>
+class PhaseList {
+   public:
+    /// Appends a phase. Phases that do not last are left out. Real-time safe.
+    void add(double duration, double jerk) noexcept RTCF_NONBLOCKING {
+        if (duration > 0.0 && count_ < kMost) phases_[count_++] = {duration, jerk};
+    }
+    /// Appends all phases of a list. Real-time safe.
+    template <std::size_t kOther>
+    void add(const PhaseList<kOther>& list) noexcept RTCF_NONBLOCKING {
+        for (const Phase& phase : list) add(phase.duration, phase.jerk);
+    }
+    /// Turns the motion into the opposite direction. Real-time safe.
+    void mirror() noexcept RTCF_NONBLOCKING {
+        for (std::size_t i = 0; i < count_; ++i) phases_[i].jerk = -phases_[i].jerk;
+    }
+    /// The motion after all phases. Real-time safe.
+    [[nodiscard]] Motion motionAfter(Motion motion) const noexcept RTCF_NONBLOCKING {
+        for (const Phase& phase : *this) motion = motion.after(phase.duration, phase.jerk);
+        return motion;
+    }
+    /// Sum of the durations, s. Real-time safe.
+    [[nodiscard]] double duration() const noexcept RTCF_NONBLOCKING {
+        double sum = 0.0;
+        for (const Phase& phase : *this) sum += phase.duration;
+        return sum;
+    }
+    [[nodiscard]] std::size_t size() const noexcept RTCF_NONBLOCKING { return count_; }
+    [[nodiscard]] const Phase* begin() const noexcept RTCF_NONBLOCKING { return phases_.data(); }
+    [[nodiscard]] const Phase* end() const noexcept RTCF_NONBLOCKING {
+        return phases_.data() + count_;
+    }
+
+   private:
+    std::array<Phase, kMost> phases_{};
+    std::size_t count_ = 0;
+};
+
+}  // namespace rtcf_control

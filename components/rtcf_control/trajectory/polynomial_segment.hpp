@@ -1,0 +1,53 @@
+/// @file
+/// The motion of one axis between two points of a trajectory that gives times.
+#pragma once
+
+#include <array>
+
+#include "trajectory/motion.hpp"
+
+namespace rtcf_control {
+
+/// What a point of a trajectory gives besides the position. A trajectory_msgs/JointTrajectoryPoint
+/// without velocities or accelerations has empty lists of them.
+enum class PointKind { Position, PositionVelocity, PositionVelocityAcceleration };
+
+/// A polynomial of the time between two points: a quintic one if both give accelerations, a cubic
+/// one if both give velocities, and otherwise a straight line, whose velocity jumps at the points.
+/// It obeys no limits: the points and the times between them determine it.
+///
+/// Source: Hermite interpolation; e.g. Biagiotti and Melchiorri, Trajectory Planning for Automatic
+/// Machines and Robots, 2008, chapter 2. All functions are real-time safe.
+class PolynomialSegment {
+   public:
+    /// At rest at position 0.
+    PolynomialSegment() = default;
+    /// @param begin    values that `kind` does not name are ignored
+    /// @param end      values that `kind` does not name are ignored
+    /// @param kind     what both points give
+    /// @param duration s; the segment is a step if it is not above zero
+    PolynomialSegment(const Motion& begin, const Motion& end, PointKind kind,
+                      double duration) noexcept RTCF_NONBLOCKING;
+
+    /// s
+    [[nodiscard]] double duration() const noexcept RTCF_NONBLOCKING { return duration_; }
+    /// The motion at some time after the begin, s. Before the begin and after the end, the motion
+    /// at the begin or the end. At the end, its position is exactly that of the point.
+    [[nodiscard]] Motion at(double time) const noexcept RTCF_NONBLOCKING;
+
+   private:
+    [[nodiscard]] Motion evaluate(double x) const noexcept;
+
+    // Of x = time / duration, lowest power first. The position is relative to that at the begin.
+    std::array<double, 6> coefficients_{};
+    double begin_ = 0.0;
+    double end_ = 0.0;
+    double duration_ = 0.0;
+};
+
+/// What two points both give. Real-time safe.
+[[nodiscard]] constexpr PointKind common(PointKind one, PointKind other) noexcept {
+    return one < other ? one : other;
+}
+
+}  // namespace rtcf_control
