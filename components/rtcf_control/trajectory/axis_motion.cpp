@@ -34,20 +34,20 @@ PhaseList<2> returnFromAbove(Motion& motion, const MotionLimits& limits) noexcep
     const double largest = limits.acceleration;
     const double a = motion.acceleration;
     PhaseList<2> phases;
-    const auto add = [&](double duration, double value) {
-        if (!(duration > 0.0)) return;
-        phases.add(duration, value);
-        motion = motion.after(duration, value);
+    const auto add = [&](const Phase& phase) {
+        if (!(phase.duration > 0.0)) return;
+        phases.add(phase);
+        motion = phase.after(motion);
     };
     // While an acceleration of `largest` is eased, the velocity changes by that much.
     const double easing = square(largest) / (2.0 * jerk);
     const double eased = motion.easedVelocity(jerk);
     if (a > 0.0 && eased <= limits.velocity * (1.0 + kLimitTolerance)) {
-        add((a - largest) / jerk, -jerk);
-        motion.acceleration = largest;
+        add({(a - largest) / jerk, -jerk, largest});
         if (motion.velocity < -limits.velocity) {
-            add(std::min(-limits.velocity - motion.velocity,
-                         limits.velocity - easing - motion.velocity) / largest, 0.0);
+            add({std::min(-limits.velocity - motion.velocity,
+                          limits.velocity - easing - motion.velocity) / largest,
+                 0.0, largest});
         }
         return phases;
     }
@@ -58,16 +58,47 @@ PhaseList<2> returnFromAbove(Motion& motion, const MotionLimits& limits) noexcep
     const double at_guard = std::sqrt(
         std::max(square(a) / 2.0 + jerk * (motion.velocity + limits.velocity), 0.0));
     const double deceleration = std::max(std::min({at_limit, at_guard, largest}), -a);
-    add((a + deceleration) / jerk, -jerk);
-    motion.acceleration = -deceleration;
+    add({(a + deceleration) / jerk, -jerk, -deceleration});
     if (at_limit <= deceleration) {
         motion.velocity = limits.velocity;
     } else if (deceleration < at_guard) {
-        add(std::min(motion.velocity - limits.velocity,
-                     motion.velocity - easing + limits.velocity) / largest, 0.0);
+        add({std::min(motion.velocity - limits.velocity,
+                      motion.velocity - easing + limits.velocity) / largest,
+             0.0, -largest});
     }
     return phases;
 }
+
+// A place in a list of phases.
+class PhaseCursor {
+   public:
+    PhaseCursor(const FarthestMotion::Phases& phases, double acceleration) noexcept
+        : next_(phases.begin()), end_(phases.end()), acceleration_(acceleration) {
+        if (!done()) left_ = next_->duration;
+    }
+    [[nodiscard]] bool done() const noexcept { return next_ == end_; }
+    // Time to the end of the phase, s.
+    [[nodiscard]] double left() const noexcept { return left_; }
+    [[nodiscard]] double jerk() const noexcept { return next_->jerk; }
+    [[nodiscard]] double acceleration() const noexcept { return acceleration_; }
+    // Moves on by no more than left().
+    void advance(double time) noexcept {
+        left_ -= time;
+        if (left_ > 0.0) {
+            acceleration_ += time * next_->jerk;
+            return;
+        }
+        acceleration_ = next_->acceleration;
+        ++next_;
+        left_ = done() ? 0.0 : next_->duration;
+    }
+
+   private:
+    const Phase* next_;
+    const Phase* end_;
+    double left_ = 0.0;
+    double acceleration_;
+};
 
 }  // namespace
 
@@ -181,10 +212,11 @@ void AxisMotion::plan(double duration) noexcept RTCF_NONBLOCKING {
     const auto append = [&](const Phase& phase) {
         if (piece_count_ == pieces_.size()) return;
         pieces_[piece_count_++] = {time, phase.jerk, end_};
-        end_ = end_.after(phase.duration, phase.jerk);
+        end_ = phase.after(end_);
         time += phase.duration;
     };
     for (const Phase& phase : return_) append(phase);
+    end_ = returned_;
     for (const Phase& phase :
          phases(std::max(duration - return_duration_, forward_.fastest())))
         append(phase);
@@ -258,7 +290,7 @@ bool AxisMotion::cruise(double duration, Phases& phases) const noexcept {
         found.cruise < -kDurationTolerance * duration)
         return false;
     phases.add(VelocityChange(returned_, velocity, limits_).phases());
-    phases.add(found.cruise, 0.0);
+    phases.add({found.cruise, 0.0, 0.0});
     phases.add(VelocityChange({0.0, velocity, 0.0}, target_.velocity, limits_).phases());
     return true;
 }
@@ -266,23 +298,21 @@ bool AxisMotion::cruise(double duration, Phases& phases) const noexcept {
 AxisMotion::Phases AxisMotion::mean(double duration, double weight) const noexcept {
     const double forward_weight = std::clamp(weight, 0.0, 1.0);
     const double backward_weight = 1.0 - forward_weight;
-    const FarthestMotion::Phases forward = forward_.phases(duration);
-    const FarthestMotion::Phases backward = backward_.phases(duration);
-    const Phase* next_forward = forward.begin();
-    const Phase* next_backward = backward.begin();
-    double left_forward = forward.size() > 0 ? next_forward->duration : 0.0;
-    double left_backward = backward.size() > 0 ? next_backward->duration : 0.0;
+    const FarthestMotion::Phases forward_phases = forward_.phases(duration);
+    const FarthestMotion::Phases backward_phases = backward_.phases(duration);
+    PhaseCursor forward(forward_phases, returned_.acceleration);
+    PhaseCursor backward(backward_phases, -returned_.acceleration);
     Phases phases;
-    while (next_forward != forward.end() && next_backward != backward.end()) {
-        const double step = std::min(left_forward, left_backward);
-        phases.add(step, forward_weight * next_forward->jerk -
-                             backward_weight * next_backward->jerk);
-        left_forward -= step;
-        left_backward -= step;
-        if (left_forward <= 0.0 && ++next_forward != forward.end())
-            left_forward = next_forward->duration;
-        if (left_backward <= 0.0 && ++next_backward != backward.end())
-            left_backward = next_backward->duration;
+    // Each round ends a phase of one list.
+    while (!forward.done() && !backward.done()) {
+        Phase phase;
+        phase.duration = std::min(forward.left(), backward.left());
+        phase.jerk = forward_weight * forward.jerk() - backward_weight * backward.jerk();
+        forward.advance(phase.duration);
+        backward.advance(phase.duration);
+        phase.acceleration =
+            forward_weight * forward.acceleration() - backward_weight * backward.acceleration();
+        phases.add(phase);
     }
     return phases;
 }

@@ -74,16 +74,16 @@ FarthestMotion::Phases FarthestMotion::phases(double duration) const noexcept RT
         const VelocityChange up(begin_, limits_.velocity, limits_);
         const VelocityChange down({0.0, limits_.velocity, 0.0}, end_velocity_, limits_);
         phases.add(up.phases());
-        phases.add(duration - up.duration() - down.duration(), 0.0);
+        phases.add({duration - up.duration() - down.duration(), 0.0, 0.0});
         phases.add(down.phases());
         return phases;
     }
     const Shape found = shape(duration);
-    phases.add((found.rise - begin_.acceleration) / jerk, jerk);
-    phases.add(found.rise_hold, 0.0);
-    phases.add((found.rise + found.fall) / jerk, -jerk);
-    phases.add(found.fall_hold, 0.0);
-    phases.add(found.fall / jerk, jerk);
+    phases.add({(found.rise - begin_.acceleration) / jerk, jerk, found.rise});
+    phases.add({found.rise_hold, 0.0, found.rise});
+    phases.add({(found.rise + found.fall) / jerk, -jerk, -found.fall});
+    phases.add({found.fall_hold, 0.0, -found.fall});
+    phases.add({found.fall / jerk, jerk, 0.0});
     return phases;
 }
 

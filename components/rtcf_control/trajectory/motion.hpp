@@ -56,6 +56,16 @@ struct MotionLimits {
 struct Phase {
     double duration = 0.0;  ///< s
     double jerk = 0.0;      ///< unit/s³
+    /// The acceleration at the end, unit/s². Its rounding error would grow in a long phase of
+    /// constant velocity.
+    double acceleration = 0.0;
+
+    /// The motion after the phase. Real-time safe.
+    [[nodiscard]] Motion after(const Motion& begin) const noexcept RTCF_NONBLOCKING {
+        Motion motion = begin.after(duration, jerk);
+        motion.acceleration = acceleration;
+        return motion;
+    }
 };
 
 /// A list of phases, without memory of its own.
@@ -64,21 +74,24 @@ template <std::size_t kMost>
 class PhaseList {
    public:
     /// Appends a phase. Phases that do not last are left out. Real-time safe.
-    void add(double duration, double jerk) noexcept RTCF_NONBLOCKING {
-        if (duration > 0.0 && count_ < kMost) phases_[count_++] = {duration, jerk};
+    void add(const Phase& phase) noexcept RTCF_NONBLOCKING {
+        if (phase.duration > 0.0 && count_ < kMost) phases_[count_++] = phase;
     }
     /// Appends all phases of a list. Real-time safe.
     template <std::size_t kOther>
     void add(const PhaseList<kOther>& list) noexcept RTCF_NONBLOCKING {
-        for (const Phase& phase : list) add(phase.duration, phase.jerk);
+        for (const Phase& phase : list) add(phase);
     }
     /// Turns the motion into the opposite direction. Real-time safe.
     void mirror() noexcept RTCF_NONBLOCKING {
-        for (std::size_t i = 0; i < count_; ++i) phases_[i].jerk = -phases_[i].jerk;
+        for (std::size_t i = 0; i < count_; ++i) {
+            phases_[i].jerk = -phases_[i].jerk;
+            phases_[i].acceleration = -phases_[i].acceleration;
+        }
     }
     /// The motion after all phases. Real-time safe.
     [[nodiscard]] Motion motionAfter(Motion motion) const noexcept RTCF_NONBLOCKING {
-        for (const Phase& phase : *this) motion = motion.after(phase.duration, phase.jerk);
+        for (const Phase& phase : *this) motion = phase.after(motion);
         return motion;
     }
     /// Sum of the durations, s. Real-time safe.

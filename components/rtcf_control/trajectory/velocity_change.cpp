@@ -32,9 +32,9 @@ VelocityChange::VelocityChange(const Motion& begin, double velocity,
         peak = std::max(limits.acceleration, own);
         hold = (square - peak * peak) / (peak * jerk);
     }
-    phases_.add((peak - own) / jerk, sign * jerk);
-    phases_.add(hold, 0.0);
-    phases_.add(peak / jerk, -sign * jerk);
+    phases_.add({(peak - own) / jerk, sign * jerk, sign * peak});
+    phases_.add({hold, 0.0, sign * peak});
+    phases_.add({peak / jerk, -sign * jerk, 0.0});
     distance_ = phases_.motionAfter({0.0, begin.velocity, begin.acceleration}).position;
 }
 
