@@ -11,8 +11,11 @@ namespace {
 
 // Velocities that exceed the limit by less than this part of it count as rounding errors.
 constexpr double kLimitTolerance = 1e-12;
-// Rounding errors of a distance, relative to the positions and distances it is computed from.
+// Rounding errors of a distance, relative to the positions and the motions it is computed from.
 constexpr double kDistanceTolerance = 4e-15;
+// The same, for a motion that has been planned again many times, relative to the motion that speeds
+// up to the largest velocity.
+constexpr double kArrivalTolerance = 1e-12;
 constexpr double kDurationTolerance = 1e-15;
 constexpr int kMostRounds = 100;
 
@@ -134,11 +137,16 @@ void AxisMotion::prepare(const Motion& begin, const MotionTarget& target,
                                {under, limits.acceleration, limits.jerk});
 
     distance_ = target.position - begin.position - returned_.position;
-    const double travel = (std::abs(returned_.velocity) + std::abs(target.velocity) +
-                           std::abs(returned_.acceleration) * forward_.fastest()) *
-                          forward_.fastest();
+    const double time = forward_.fastest();
+    const double speed = over + under + std::abs(returned_.velocity);
+    const double acceleration = limits.acceleration + std::abs(begin.acceleration);
+    const double travel = (speed + acceleration * time) * time;
     tolerance_ = kDistanceTolerance * (std::abs(begin.position) + std::abs(target.position) +
                                        std::abs(returned_.position) + travel);
+    const double ramp = limits.velocity / limits.acceleration +
+                        std::sqrt(limits.velocity / limits.jerk);
+    arrival_tolerance_ =
+        tolerance_ + kArrivalTolerance * (travel + limits.velocity * ramp);
 
     block(-1.0, forward_.fastest());
     blockShort(forward_, distance_);
@@ -155,7 +163,7 @@ void AxisMotion::blockShort(const FarthestMotion& farthest, double distance) noe
     const FarthestMotion::TurningPoints turning = farthest.turningPoints();
     double from = farthest.fastest();
     double missing = distance - farthest.end(from).distance;
-    if (std::abs(missing) <= tolerance_) missing = 0.0;
+    if (std::abs(missing) <= arrival_tolerance_) missing = 0.0;
     double blocked_from = -return_duration_ - 1.0;
     for (std::size_t i = 0; i <= turning.count; ++i) {
         const double to =

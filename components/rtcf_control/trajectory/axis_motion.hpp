@@ -81,6 +81,9 @@ class AxisMotion {
     double return_duration_ = 0.0;
     double distance_ = 0.0;   // from returned_ to the target
     double tolerance_ = 0.0;  // rounding errors of distances
+    // Distance from the target at which the fastest change to its velocity arrives there, because
+    // the motion before was planned to.
+    double arrival_tolerance_ = 0.0;
     FarthestMotion forward_;
     FarthestMotion backward_;  // mirrored
     std::array<Blocked, 5> blocked_{};

@@ -9,7 +9,7 @@ namespace {
 
 // Rounding errors of a velocity that was sampled from a motion, relative to the largest velocities.
 // A larger change would cost time in proportion to its square root.
-constexpr double kVelocityTolerance = 1e-14;
+constexpr double kVelocityTolerance = 1e-12;
 
 }  // namespace
 
