@@ -19,7 +19,7 @@ constexpr double kArrivalTolerance = 1e-12;
 constexpr double kDurationTolerance = 1e-15;
 constexpr int kMostRounds = 100;
 
-double square(double value) noexcept { return value * value; }
+double squared(double value) noexcept { return value * value; }
 
 // True if the motion is beyond the upper limit of acceleration or velocity, or will unavoidably be.
 bool isAboveLimits(const Motion& motion, const MotionLimits& limits) noexcept {
@@ -43,7 +43,7 @@ PhaseList<2> returnFromAbove(Motion& motion, const MotionLimits& limits) noexcep
         motion = phase.after(motion);
     };
     // While an acceleration of `largest` is eased, the velocity changes by that much.
-    const double easing = square(largest) / (2.0 * jerk);
+    const double easing = squared(largest) / (2.0 * jerk);
     const double eased = motion.easedVelocity(jerk);
     if (a > 0.0 && eased <= limits.velocity * (1.0 + kLimitTolerance)) {
         add({(a - largest) / jerk, -jerk, largest});
@@ -57,9 +57,9 @@ PhaseList<2> returnFromAbove(Motion& motion, const MotionLimits& limits) noexcep
     // The deceleration at which the velocity is back at its limit, and the one at which easing must
     // begin for the lower limit.
     const double at_limit = std::sqrt(
-        std::max(square(a) + 2.0 * jerk * (motion.velocity - limits.velocity), 0.0));
+        std::max(squared(a) + 2.0 * jerk * (motion.velocity - limits.velocity), 0.0));
     const double at_guard = std::sqrt(
-        std::max(square(a) / 2.0 + jerk * (motion.velocity + limits.velocity), 0.0));
+        std::max(squared(a) / 2.0 + jerk * (motion.velocity + limits.velocity), 0.0));
     const double deceleration = std::max(std::min({at_limit, at_guard, largest}), -a);
     add({(a + deceleration) / jerk, -jerk, -deceleration});
     if (at_limit <= deceleration) {

@@ -11,7 +11,7 @@ namespace {
 
 // Near an extreme, the distance depends on the square of the error of the duration.
 constexpr double kTurningPointTolerance = 1e-10;
-constexpr int kMostRounds = 60;
+constexpr int kMostHalvings = 60;
 
 }  // namespace
 
@@ -138,7 +138,7 @@ double FarthestMotion::flattest() const noexcept {
 
 double FarthestMotion::slopeRoot(double low, double high) const noexcept {
     const bool rises = slope(low) < 0.0;
-    for (int round = 0; round < kMostRounds && high - low > kTurningPointTolerance * high; ++round) {
+    for (int round = 0; round < kMostHalvings && high - low > kTurningPointTolerance * high; ++round) {
         const double middle = low + (high - low) / 2.0;
         ((slope(middle) < 0.0) == rises ? low : high) = middle;
     }

@@ -8,9 +8,9 @@ namespace rtcf_control {
 namespace {
 
 // A velocity at the target that exceeds the limit by less than this part of it is a rounding error.
-constexpr double kLimitTolerance = 1e-12;
+constexpr double kTargetTolerance = 1e-12;
 
-PlanError check(const AxisTask& task) noexcept {
+PlanError errorOf(const AxisTask& task) noexcept {
     for (const double value :
          {task.begin.position, task.begin.velocity, task.begin.acceleration, task.target.position,
           task.target.velocity, task.limits.velocity, task.limits.acceleration, task.limits.jerk}) {
@@ -20,7 +20,7 @@ PlanError check(const AxisTask& task) noexcept {
          {task.limits.velocity, task.limits.acceleration, task.limits.jerk}) {
         if (!(value > 0.0)) return PlanError::Limits;
     }
-    if (std::abs(task.target.velocity) > task.limits.velocity * (1.0 + kLimitTolerance))
+    if (std::abs(task.target.velocity) > task.limits.velocity * (1.0 + kTargetTolerance))
         return PlanError::TargetVelocity;
     return PlanError::None;
 }
@@ -32,7 +32,7 @@ PlanError SynchronizedMotion::plan(const AxisTask* tasks, std::size_t count,
     if (count == 0 || count > kMostAxes) return PlanError::AxisCount;
     if (!std::isfinite(least_duration)) return PlanError::NotFinite;
     for (std::size_t i = 0; i < count; ++i) {
-        if (const PlanError error = check(tasks[i]); error != PlanError::None) return error;
+        if (const PlanError error = errorOf(tasks[i]); error != PlanError::None) return error;
     }
     std::array<AxisMotion, kMostAxes> axes;
     for (std::size_t i = 0; i < count; ++i)

@@ -29,9 +29,8 @@ enum class PlanError {
 
 /// Jerk-limited motions of up to 16 axes from any states to targets, which all begin and end at the
 /// same times, as early as possible. To plan again while moving, begin at the states that at()
-/// gives for the present time. If a target's velocity is not zero, plan again only if a target or a
-/// limit changes: after a rounding error, an axis that is about to pass its target in time may
-/// have to return for it.
+/// gives for the present time, not at measured ones: an axis that is to pass its target at a
+/// velocity, and that a measurement shows slightly late or early, may have to return for it.
 ///
 /// All functions are real-time safe, with a bounded number of steps. The object has no pointers
 /// and may be copied as bytes.
