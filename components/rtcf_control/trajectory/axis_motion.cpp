@@ -49,24 +49,26 @@ PhaseList<2> returnFromAbove(Motion& motion, const MotionLimits& limits) noexcep
         add({(a - largest) / jerk, -jerk, largest});
         if (motion.velocity < -limits.velocity) {
             add({std::min(-limits.velocity - motion.velocity,
-                          limits.velocity - easing - motion.velocity) / largest,
+                          limits.velocity - easing - motion.velocity) /
+                     largest,
                  0.0, largest});
         }
         return phases;
     }
     // The deceleration at which the velocity is back at its limit, and the one at which easing must
     // begin for the lower limit.
-    const double at_limit = std::sqrt(
-        std::max(squared(a) + 2.0 * jerk * (motion.velocity - limits.velocity), 0.0));
-    const double at_guard = std::sqrt(
-        std::max(squared(a) / 2.0 + jerk * (motion.velocity + limits.velocity), 0.0));
+    const double at_limit =
+        std::sqrt(std::max(squared(a) + 2.0 * jerk * (motion.velocity - limits.velocity), 0.0));
+    const double at_guard =
+        std::sqrt(std::max(squared(a) / 2.0 + jerk * (motion.velocity + limits.velocity), 0.0));
     const double deceleration = std::max(std::min({at_limit, at_guard, largest}), -a);
     add({(a + deceleration) / jerk, -jerk, -deceleration});
     if (at_limit <= deceleration) {
         motion.velocity = limits.velocity;
     } else if (deceleration < at_guard) {
         add({std::min(motion.velocity - limits.velocity,
-                      motion.velocity - easing + limits.velocity) / largest,
+                      motion.velocity - easing + limits.velocity) /
+                 largest,
              0.0, -largest});
     }
     return phases;
@@ -131,8 +133,7 @@ void AxisMotion::prepare(const Motion& begin, const MotionTarget& target,
     const double eased = returned_.easedVelocity(limits.jerk);
     const double over = std::max({limits.velocity, eased, target.velocity});
     const double under = std::max({limits.velocity, -eased, -target.velocity});
-    forward_ = FarthestMotion(returned_, target.velocity,
-                              {over, limits.acceleration, limits.jerk});
+    forward_ = FarthestMotion(returned_, target.velocity, {over, limits.acceleration, limits.jerk});
     backward_ = FarthestMotion(returned_.mirrored(), -target.velocity,
                                {under, limits.acceleration, limits.jerk});
 
@@ -143,15 +144,13 @@ void AxisMotion::prepare(const Motion& begin, const MotionTarget& target,
     const double travel = (speed + acceleration * time) * time;
     tolerance_ = kDistanceTolerance * (std::abs(begin.position) + std::abs(target.position) +
                                        std::abs(returned_.position) + travel);
-    const double ramp = limits.velocity / limits.acceleration +
-                        std::sqrt(limits.velocity / limits.jerk);
-    arrival_tolerance_ =
-        tolerance_ + kArrivalTolerance * (travel + limits.velocity * ramp);
+    const double ramp =
+        limits.velocity / limits.acceleration + std::sqrt(limits.velocity / limits.jerk);
+    arrival_tolerance_ = tolerance_ + kArrivalTolerance * (travel + limits.velocity * ramp);
 
     block(-1.0, forward_.fastest());
     blockShort(forward_, distance_);
     blockShort(backward_, -distance_);
-    plan(feasible(0.0));
 }
 
 void AxisMotion::block(double above, double below) noexcept {
@@ -166,8 +165,7 @@ void AxisMotion::blockShort(const FarthestMotion& farthest, double distance) noe
     if (std::abs(missing) <= arrival_tolerance_) missing = 0.0;
     double blocked_from = -return_duration_ - 1.0;
     for (std::size_t i = 0; i <= turning.count; ++i) {
-        const double to =
-            i < turning.count ? turning.durations[i] : farthest.linearFrom();
+        const double to = i < turning.count ? turning.durations[i] : farthest.linearFrom();
         const double missing_then = distance - farthest.end(to).distance;
         if (missing > 0.0 && missing_then <= 0.0) {
             block(blocked_from, solve(farthest, distance, from, to));
@@ -225,8 +223,7 @@ void AxisMotion::plan(double duration) noexcept RTCF_NONBLOCKING {
     };
     for (const Phase& phase : return_) append(phase);
     end_ = returned_;
-    for (const Phase& phase :
-         phases(std::max(duration - return_duration_, forward_.fastest())))
+    for (const Phase& phase : phases(std::max(duration - return_duration_, forward_.fastest())))
         append(phase);
 }
 

@@ -29,7 +29,7 @@ namespace rtcf_control {
 /// and may be copied as bytes.
 class AxisMotion {
    public:
-    /// Prepares a motion of the shortest duration.
+    /// Finds the feasible durations. plan() has to follow.
     /// @param begin  finite
     /// @param target finite; its velocity is within the limits
     /// @param limits finite, above zero
@@ -37,7 +37,7 @@ class AxisMotion {
                  const MotionLimits& limits) noexcept RTCF_NONBLOCKING;
     /// The least feasible duration that is not below a given one, s.
     [[nodiscard]] double feasible(double duration) const noexcept RTCF_NONBLOCKING;
-    /// Plans the motion of a feasible duration, s.
+    /// Plans the motion of a feasible duration, s. After prepare().
     void plan(double duration) noexcept RTCF_NONBLOCKING;
 
     /// Duration of the planned motion, s.

@@ -94,8 +94,7 @@ FarthestMotion::End FarthestMotion::end(double duration) const noexcept RTCF_NON
 double FarthestMotion::slope(double duration) const noexcept {
     if (duration >= linear_from_) return limits_.velocity;
     const Shape found = shape(duration);
-    return velocityAfterRise(found) +
-           found.rise * (found.rise + found.fall) / (2.0 * limits_.jerk);
+    return velocityAfterRise(found) + found.rise * (found.rise + found.fall) / (2.0 * limits_.jerk);
 }
 
 double FarthestMotion::peakVelocity(double duration) const noexcept RTCF_NONBLOCKING {
@@ -138,7 +137,8 @@ double FarthestMotion::flattest() const noexcept {
 
 double FarthestMotion::slopeRoot(double low, double high) const noexcept {
     const bool rises = slope(low) < 0.0;
-    for (int round = 0; round < kMostHalvings && high - low > kTurningPointTolerance * high; ++round) {
+    for (int round = 0; round < kMostHalvings && high - low > kTurningPointTolerance * high;
+         ++round) {
         const double middle = low + (high - low) / 2.0;
         ((slope(middle) < 0.0) == rises ? low : high) = middle;
     }

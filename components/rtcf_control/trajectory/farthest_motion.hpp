@@ -48,8 +48,8 @@ class FarthestMotion {
     /// @param begin velocity and acceleration at the begin, from which the axis can stay within its
     ///              limits; the position does not matter
     /// @param end_velocity unit/s
-    FarthestMotion(const Motion& begin, double end_velocity,
-                   const MotionLimits& limits) noexcept RTCF_NONBLOCKING;
+    FarthestMotion(const Motion& begin, double end_velocity, const MotionLimits& limits) noexcept
+        RTCF_NONBLOCKING;
 
     /// Shortest duration of a motion to the velocity at the end, s.
     [[nodiscard]] double fastest() const noexcept RTCF_NONBLOCKING { return fastest_; }

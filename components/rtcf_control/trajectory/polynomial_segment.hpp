@@ -46,7 +46,7 @@ class PolynomialSegment {
 };
 
 /// What two points both give. Real-time safe.
-[[nodiscard]] constexpr PointKind common(PointKind one, PointKind other) noexcept {
+[[nodiscard]] constexpr PointKind commonKind(PointKind one, PointKind other) noexcept {
     return one < other ? one : other;
 }
 

@@ -16,8 +16,7 @@ PlanError errorOf(const AxisTask& task) noexcept {
           task.target.velocity, task.limits.velocity, task.limits.acceleration, task.limits.jerk}) {
         if (!std::isfinite(value)) return PlanError::NotFinite;
     }
-    for (const double value :
-         {task.limits.velocity, task.limits.acceleration, task.limits.jerk}) {
+    for (const double value : {task.limits.velocity, task.limits.acceleration, task.limits.jerk}) {
         if (!(value > 0.0)) return PlanError::Limits;
     }
     if (std::abs(task.target.velocity) > task.limits.velocity * (1.0 + kTargetTolerance))
@@ -54,7 +53,7 @@ PlanError SynchronizedMotion::plan(const AxisTask* tasks, std::size_t count,
         axes[i].plan(duration);
         if (!std::isfinite(axes[i].roundingError().position)) return PlanError::Range;
     }
-    axes_ = axes;
+    std::copy_n(axes.begin(), count, axes_.begin());
     count_ = count;
     duration_ = duration;
     return PlanError::None;

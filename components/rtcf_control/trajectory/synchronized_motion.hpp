@@ -41,8 +41,8 @@ class SynchronizedMotion {
     /// Plans the motions. They stay as they are after an error.
     /// @param tasks one per axis
     /// @param least_duration the motions last at least as long, s
-    PlanError plan(const AxisTask* tasks, std::size_t count,
-                   double least_duration = 0.0) noexcept RTCF_NONBLOCKING;
+    PlanError plan(const AxisTask* tasks, std::size_t count, double least_duration = 0.0) noexcept
+        RTCF_NONBLOCKING;
 
     [[nodiscard]] std::size_t size() const noexcept RTCF_NONBLOCKING { return count_; }
     /// Duration of all motions, s.

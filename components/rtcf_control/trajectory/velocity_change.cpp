@@ -22,8 +22,8 @@ VelocityChange::VelocityChange(const Motion& begin, double velocity,
         std::max({limits.velocity, std::abs(begin.velocity), std::abs(velocity), std::abs(eased)});
     if (std::abs(change_) <= kVelocityTolerance * scale) change_ = 0.0;
 
-    const double sign = change_ == 0.0 ? std::copysign(1.0, begin.acceleration)
-                                       : std::copysign(1.0, change_);
+    const double sign =
+        change_ == 0.0 ? std::copysign(1.0, begin.acceleration) : std::copysign(1.0, change_);
     const double own = sign * begin.acceleration;
     const double square = jerk * std::abs(change_) + (own > 0.0 ? own * own : 0.0);
     double peak = std::sqrt(square);

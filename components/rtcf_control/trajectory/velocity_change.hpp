@@ -14,8 +14,8 @@ class VelocityChange {
     /// @param begin  motion at the begin; its acceleration is within the limits
     /// @param velocity velocity at the end, unit/s. Differences that rounding explains count as
     ///                 none.
-    VelocityChange(const Motion& begin, double velocity,
-                   const MotionLimits& limits) noexcept RTCF_NONBLOCKING;
+    VelocityChange(const Motion& begin, double velocity, const MotionLimits& limits) noexcept
+        RTCF_NONBLOCKING;
 
     [[nodiscard]] const PhaseList<3>& phases() const noexcept RTCF_NONBLOCKING { return phases_; }
     /// s

@@ -34,8 +34,8 @@ struct Findings {
     double rounding = 0.0;
 
     void add(double& worst, double value) const {
-        worst = std::isfinite(value) ? std::max(worst, value)
-                                     : std::numeric_limits<double>::infinity();
+        worst =
+            std::isfinite(value) ? std::max(worst, value) : std::numeric_limits<double>::infinity();
     }
 };
 
@@ -59,18 +59,19 @@ void sample(const SynchronizedMotion& motion, std::size_t axis, const AxisTask& 
     const double speed = std::max(up, down);
     Motion last = motion.at(axis, 0.0);
     for (int i = 0; i <= kSamples; ++i) {
-        const Motion now = i == kSamples ? motion.at(axis, motion.duration()) : motion.at(axis, i * h);
+        const Motion now =
+            i == kSamples ? motion.at(axis, motion.duration()) : motion.at(axis, i * h);
         findings.add(findings.excess, (now.velocity - up) / limits.velocity);
         findings.add(findings.excess, (-now.velocity - down) / limits.velocity);
         findings.add(findings.excess,
                      (std::abs(now.acceleration) - acceleration) / limits.acceleration);
         if (i > 0) {
             const double v = now.velocity - last.velocity - h * last.acceleration;
-            const double p = now.position - last.position -
-                             h * (last.velocity + h * last.acceleration / 2.0);
-            findings.add(findings.gap,
-                         (std::abs(now.acceleration - last.acceleration) - limits.jerk * h) /
-                             acceleration);
+            const double p =
+                now.position - last.position - h * (last.velocity + h * last.acceleration / 2.0);
+            findings.add(
+                findings.gap,
+                (std::abs(now.acceleration - last.acceleration) - limits.jerk * h) / acceleration);
             findings.add(findings.gap, (std::abs(v) - limits.jerk * h * h / 2.0) / speed);
             findings.add(findings.gap, (std::abs(p) - limits.jerk * h * h * h / 6.0) / size);
         }

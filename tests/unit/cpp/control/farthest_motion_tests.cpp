@@ -29,8 +29,10 @@ TEST(FarthestMotion, SlopeIsTheDerivativeOfTheDistance) {
         const FarthestMotion farthest(task.begin, task.target.velocity, task.limits);
         const double step = 1e-6 * farthest.linearFrom();
         const double duration =
-            farthest.fastest() + tasks.between(0.01, 0.99) * (farthest.linearFrom() - farthest.fastest());
-        if (duration - step < farthest.fastest() || duration + step > farthest.linearFrom()) continue;
+            farthest.fastest() +
+            tasks.between(0.01, 0.99) * (farthest.linearFrom() - farthest.fastest());
+        if (duration - step < farthest.fastest() || duration + step > farthest.linearFrom())
+            continue;
         const double slope =
             (farthest.end(duration + step).distance - farthest.end(duration - step).distance) /
             (2.0 * step);
@@ -51,8 +53,8 @@ TEST(FarthestMotion, RisesOrFallsOnlyBetweenTurningPoints) {
         ASSERT_TRUE(std::is_sorted(ends.begin(), ends.end())) << i;
         const double tolerance = 1e-9 * task.limits.velocity * farthest.linearFrom();
         for (std::size_t k = 0; k + 1 < ends.size(); ++k) {
-            const double sign =
-                std::copysign(1.0, farthest.end(ends[k + 1]).distance - farthest.end(ends[k]).distance);
+            const double sign = std::copysign(
+                1.0, farthest.end(ends[k + 1]).distance - farthest.end(ends[k]).distance);
             double last = farthest.end(ends[k]).distance;
             for (int part = 1; part <= 20; ++part) {
                 const double now =
@@ -91,7 +93,8 @@ TEST(FarthestMotion, LastsAsLongAsAsked) {
     for (int i = 0; i < kTasks; ++i) {
         const AxisTask task = tasks.moving();
         const FarthestMotion farthest(task.begin, task.target.velocity, task.limits);
-        const double duration = farthest.fastest() + tasks.between(0.0, 2.0) * farthest.linearFrom();
+        const double duration =
+            farthest.fastest() + tasks.between(0.0, 2.0) * farthest.linearFrom();
         ASSERT_NEAR(farthest.phases(duration).duration(), duration, 1e-12 * duration) << i;
         const Motion end = farthest.phases(duration).motionAfter(task.begin);
         ASSERT_NEAR(end.velocity, task.target.velocity, 1e-10 * task.limits.velocity) << i;

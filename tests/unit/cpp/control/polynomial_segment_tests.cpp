@@ -60,7 +60,8 @@ TEST(PolynomialSegment, TakesTheAnalyticCourseFromRestToRest) {
     const PolynomialSegment cubic({}, {2.0, 0.0, 0.0}, PointKind::PositionVelocity, 4.0);
     EXPECT_DOUBLE_EQ(cubic.at(2.0).position, 1.0);
     EXPECT_DOUBLE_EQ(cubic.at(2.0).velocity, 0.75);
-    const PolynomialSegment quintic({}, {2.0, 0.0, 0.0}, PointKind::PositionVelocityAcceleration, 4.0);
+    const PolynomialSegment quintic({}, {2.0, 0.0, 0.0}, PointKind::PositionVelocityAcceleration,
+                                    4.0);
     EXPECT_DOUBLE_EQ(quintic.at(2.0).position, 1.0);
     EXPECT_DOUBLE_EQ(quintic.at(2.0).velocity, 15.0 / 16.0);
     EXPECT_NEAR(quintic.at(2.0).acceleration, 0.0, 1e-15);
@@ -76,8 +77,9 @@ TEST(PolynomialSegment, StepsIfItHasNoDuration) {
 }
 
 TEST(PolynomialSegment, UsesWhatBothPointsGive) {
-    EXPECT_EQ(common(PointKind::Position, PointKind::PositionVelocityAcceleration), PointKind::Position);
-    EXPECT_EQ(common(PointKind::PositionVelocityAcceleration, PointKind::PositionVelocity),
+    EXPECT_EQ(commonKind(PointKind::Position, PointKind::PositionVelocityAcceleration),
+              PointKind::Position);
+    EXPECT_EQ(commonKind(PointKind::PositionVelocityAcceleration, PointKind::PositionVelocity),
               PointKind::PositionVelocity);
 }
 

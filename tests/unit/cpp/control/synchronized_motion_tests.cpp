@@ -45,7 +45,8 @@ void expectSmooth(const SynchronizedMotion& motion, std::size_t axis, const Axis
         // What the largest jerk allows in the time.
         const double da = now.acceleration - last.acceleration;
         const double dv = now.velocity - last.velocity - h * last.acceleration;
-        const double dp = now.position - last.position - h * (last.velocity + h / 2.0 * last.acceleration);
+        const double dp =
+            now.position - last.position - h * (last.velocity + h / 2.0 * last.acceleration);
         ASSERT_LE(std::abs(da), j * h + 1e-9 * largest_acceleration);
         ASSERT_LE(std::abs(dv), j * h * h / 2.0 + 1e-9 * largest_velocity);
         ASSERT_LE(std::abs(dp), j * h * h * h / 6.0 + 1e-9 * size);
@@ -61,11 +62,12 @@ void expectSmooth(const SynchronizedMotion& motion, std::size_t axis, const Axis
 
 TEST(SynchronizedMotion, TakesTheAnalyticDurationFromRestToRest) {
     // At most the jerk reaches its limit; jerk and acceleration do; all three do.
-    EXPECT_NEAR(durationOf({{0, 0, 0}, {1.0, 0.0}, {100.0, 100.0, 4.0}}), std::cbrt(32.0 / 4.0), 1e-12);
+    EXPECT_NEAR(durationOf({{0, 0, 0}, {1.0, 0.0}, {100.0, 100.0, 4.0}}), std::cbrt(32.0 / 4.0),
+                1e-12);
     EXPECT_NEAR(durationOf({{0, 0, 0}, {10.0, 0.0}, {100.0, 2.0, 8.0}}),
                 2.0 / 8.0 + std::sqrt(2.0 * 2.0 / 64.0 + 4.0 * 10.0 / 2.0), 1e-12);
-    EXPECT_NEAR(durationOf({{0, 0, 0}, {-10.0, 0.0}, {3.0, 2.0, 8.0}}), 10.0 / 3.0 + 3.0 / 2.0 + 2.0 / 8.0,
-                1e-12);
+    EXPECT_NEAR(durationOf({{0, 0, 0}, {-10.0, 0.0}, {3.0, 2.0, 8.0}}),
+                10.0 / 3.0 + 3.0 / 2.0 + 2.0 / 8.0, 1e-12);
 }
 
 TEST(SynchronizedMotion, StopsInTheAnalyticTime) {
@@ -87,7 +89,8 @@ TEST(SynchronizedMotion, ObeysLimitsAndHasNoJumps) {
         for (AxisTask& task : tasks) task = random.moving();
         const SynchronizedMotion motion = planned(tasks);
         for (std::size_t axis = 0; axis < tasks.size(); ++axis) {
-            ASSERT_NO_FATAL_FAILURE(expectSmooth(motion, axis, tasks[axis], tasks[axis].limits.velocity,
+            ASSERT_NO_FATAL_FAILURE(expectSmooth(motion, axis, tasks[axis],
+                                                 tasks[axis].limits.velocity,
                                                  tasks[axis].limits.acceleration))
                 << i << " " << axis;
         }
@@ -117,8 +120,8 @@ TEST(SynchronizedMotion, BringsAStateBeyondTheLimitsBackWithoutExceedingFurther)
             if (velocity_within && eased <= task.limits.velocity) {
                 ASSERT_LE(std::abs(now.velocity), task.limits.velocity * (1.0 + 1e-9)) << i;
             }
-            acceleration_within = acceleration_within ||
-                                  std::abs(now.acceleration) <= task.limits.acceleration;
+            acceleration_within =
+                acceleration_within || std::abs(now.acceleration) <= task.limits.acceleration;
             velocity_within = velocity_within || std::abs(now.velocity) <= task.limits.velocity;
         }
     }
@@ -135,7 +138,8 @@ TEST(SynchronizedMotion, EndsWithAllAxesAtTheSameTime) {
             ASSERT_EQ(motion.axis(axis).duration(), motion.duration());
             longest = std::max(longest, motion.axis(axis).feasible(0.0));
             const Motion error = motion.axis(axis).roundingError();
-            ASSERT_LE(std::abs(error.position), 1e-10 * tasks[axis].limits.velocity * motion.duration());
+            ASSERT_LE(std::abs(error.position),
+                      1e-10 * tasks[axis].limits.velocity * motion.duration());
         }
         ASSERT_GE(motion.duration(), longest);
     }
@@ -189,9 +193,9 @@ TEST(SynchronizedMotion, IsTheSameInOtherUnits) {
         AxisTask task = random.any();
         const double duration = durationOf(task);
         const double scale = std::pow(10.0, random.between(-6.0, 4.0));
-        for (double* value :
-             {&task.begin.position, &task.begin.velocity, &task.begin.acceleration, &task.target.position,
-              &task.target.velocity, &task.limits.velocity, &task.limits.acceleration, &task.limits.jerk})
+        for (double* value : {&task.begin.position, &task.begin.velocity, &task.begin.acceleration,
+                              &task.target.position, &task.target.velocity, &task.limits.velocity,
+                              &task.limits.acceleration, &task.limits.jerk})
             *value *= scale;
         ASSERT_NEAR(durationOf(task), duration, 1e-9 * duration) << i;
     }
@@ -242,7 +246,8 @@ TEST(SynchronizedMotion, KeepsTheMotionAfterAnError) {
         EXPECT_EQ(motion.at(0, duration).position, 1.0);
     };
     expectError(PlanError::AxisCount, {});
-    expectError(PlanError::AxisCount, std::vector<AxisTask>(SynchronizedMotion::kMostAxes + 1, task));
+    expectError(PlanError::AxisCount,
+                std::vector<AxisTask>(SynchronizedMotion::kMostAxes + 1, task));
     AxisTask wrong = task;
     wrong.begin.velocity = std::numeric_limits<double>::quiet_NaN();
     expectError(PlanError::NotFinite, {task, wrong});
