@@ -64,8 +64,24 @@ def draw_target(axis: Axis, draw: random.Random) -> None:
         axis.target_velocity = axis.largest_velocity * draw.uniform(-1, 1)
 
 
+def draw_round_axis(draw: random.Random) -> Axis:
+    """Draws an axis with round numbers: limits that meet, and states at the limits."""
+    limits = [draw.choice([0.5, 1.0, 2.0]) for _ in range(3)]
+    parts = [-1.0, -0.5, 0.0, 0.5, 1.0]
+    return Axis(
+        0.0,
+        limits[0] * draw.choice(parts),
+        limits[1] * draw.choice(parts),
+        draw.choice([-4.0, -1.0, -0.5, -0.25, 0.0, 0.25, 0.5, 1.0, 4.0]),
+        limits[0] * draw.choice(parts),
+        *limits,
+    )
+
+
 def draw_axis(draw: random.Random) -> Axis:
-    """Draws an axis: at rest, moving within its limits, or beyond them."""
+    """Draws an axis: at rest, moving within its limits, beyond them, or with round numbers."""
+    if draw.random() < 0.2:
+        return draw_round_axis(draw)
     limits = [10 ** draw.uniform(-1, 1) for _ in range(3)]
     axis = Axis(draw.uniform(-3, 3), 0.0, 0.0, 0.0, 0.0, *limits)
     kind = draw.random()

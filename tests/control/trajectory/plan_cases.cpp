@@ -54,8 +54,9 @@ void sample(const SynchronizedMotion& motion, std::size_t axis, const AxisTask& 
     const double down = unavoidable(task.begin.mirrored(), task);
     const double acceleration = std::max(limits.acceleration, std::abs(task.begin.acceleration));
     const double h = motion.duration() / kSamples;
-    const double size = std::max({std::abs(task.begin.position), std::abs(task.target.position),
-                                  std::max(up, down) * motion.duration()});
+    const double size =
+        std::max({std::abs(task.begin.position), std::abs(task.target.position),
+                  std::max(up, down) * motion.duration(), std::numeric_limits<double>::min()});
     const double speed = std::max(up, down);
     Motion last = motion.at(axis, 0.0);
     for (int i = 0; i <= kSamples; ++i) {
@@ -78,7 +79,7 @@ void sample(const SynchronizedMotion& motion, std::size_t axis, const AxisTask& 
         last = now;
     }
     const Motion error = motion.axis(axis).roundingError();
-    findings.add(findings.rounding, std::abs(error.position) / std::max(size, 1e-300));
+    findings.add(findings.rounding, std::abs(error.position) / size);
     findings.add(findings.rounding, std::abs(error.velocity) / speed);
     findings.add(findings.rounding, std::abs(error.acceleration) / acceleration);
 }
