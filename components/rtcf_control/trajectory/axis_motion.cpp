@@ -190,8 +190,8 @@ double AxisMotion::solve(const FarthestMotion& farthest, double distance, double
         ((error > 0.0) == rises ? high : low) = guess;
         // Newton's method, or bisection where that one leaves the interval or is slow.
         double next = guess - error / end.slope;
-        if (!(next > low && next < high && std::abs(next - guess) < last_step / 2.0))
-            next = low + (high - low) / 2.0;
+        const bool useful = next > low && next < high && std::abs(next - guess) < last_step / 2.0;
+        if (!useful) next = low + (high - low) / 2.0;
         last_step = std::abs(next - guess);
         if (last_step <= kDurationTolerance * high) return next;
         guess = next;
@@ -276,7 +276,8 @@ bool AxisMotion::cruise(double duration, Phases& phases) const noexcept {
     for (int round = 0; round < kMostRounds; ++round) {
         // The Illinois method: regula falsi, in which an end that stays loses half of its weight.
         velocity = (low * high_weight - high * low_weight) / (high_weight - low_weight);
-        if (!(velocity > low && velocity < high)) velocity = low + (high - low) / 2.0;
+        const bool inside = velocity > low && velocity < high;
+        if (!inside) velocity = low + (high - low) / 2.0;
         found = errorAt(velocity);
         if (std::abs(found.distance) <= tolerance_) break;
         if (found.distance < 0.0) {

@@ -5,7 +5,7 @@ usage: compare_with_ruckig.py PLAN_CASES [--cases N] [--seed N]
 
 PLAN_CASES is the program built from plan_cases.cpp. The second half of the cases begins in the
 middle of the motions of the first half. Requires the PyPI package ruckig 0.19. The exit status is 1
-if a duration differs by more than 1 %, or a limit is exceeded.
+if a duration is longer by more than 1 %, a limit is exceeded, or a motion jumps.
 """
 
 import argparse
@@ -105,11 +105,9 @@ def plan(program: str, cases: list[list[Axis]], scales: list[float], fraction: f
     plans = []
     for line in output.splitlines():
         error, *numbers = line.split()
-        values = [float(number) for number in numbers]
-        rest = values[4:]
-        plans.append(
-            Plan(int(error), *values[:4], [rest[i : i + 4] for i in range(0, len(rest), 4)])
-        )
+        duration, excess, gap, rounding, *rest = (float(number) for number in numbers)
+        axes = [rest[i : i + 4] for i in range(0, len(rest), 4)]
+        plans.append(Plan(int(error), duration, excess, gap, rounding, axes))
     return plans
 
 
@@ -130,10 +128,14 @@ def duration_of_ruckig(case: list[Axis]) -> float | None:
         result = planner.calculate(task, trajectory)
     except (ruckig.RuckigError, ValueError):
         return None
-    return trajectory.duration if result in (ruckig.Result.Working, ruckig.Result.Finished) else None
+    if result not in (ruckig.Result.Working, ruckig.Result.Finished):
+        return None
+    return float(trajectory.duration)
 
 
-def replans(cases: list[list[Axis]], plans: list[Plan], draw: random.Random) -> Iterator[list[Axis]]:
+def replans(
+    cases: list[list[Axis]], plans: list[Plan], draw: random.Random
+) -> Iterator[list[Axis]]:
     """Cases that begin in the middle of motions, with other targets."""
     for case, made in zip(cases, plans, strict=True):
         again = []
@@ -146,12 +148,16 @@ def replans(cases: list[list[Axis]], plans: list[Plan], draw: random.Random) -> 
 
 
 def report(name: str, cases: list[list[Axis]], plans: list[Plan], shown: int) -> bool:
-    """Compares plans and prints the result. Returns True if all is well."""
+    """Compares plans and prints the result. Returns True if all is well.
+
+    A shorter motion that ends at its target within its limits is no error: ruckig does not always
+    find the shortest one if the begin is at a limit.
+    """
     shorter = longer = failed = bad = 0
     worst = 0.0
     for case, made in zip(cases, plans, strict=True):
         reference = duration_of_ruckig(case)
-        problem = ""
+        problem = note = ""
         if made.error != 0:
             problem = f"error {made.error}"
         elif made.excess > LIMIT_TOLERANCE:
@@ -167,14 +173,13 @@ def report(name: str, cases: list[list[Axis]], plans: list[Plan], shown: int) ->
                 problem = f"{made.duration} s, ruckig {reference} s"
             elif difference < -DURATION_TOLERANCE:
                 shorter += 1
-                problem = f"{made.duration} s, ruckig {reference} s (shorter)"
+                note = f"{made.duration} s, ruckig {reference} s (shorter)"
             else:
                 worst = max(worst, abs(difference))
-        if problem and not problem.endswith("(shorter)"):
-            bad += 1
-        if problem and shown > 0:
+        bad += problem != ""
+        if (problem or note) and shown > 0:
             shown -= 1
-            print(f"  {problem}")
+            print(f"  {problem or note}")
             for axis in case:
                 print("   ", dataclasses.astuple(axis))
     print(
@@ -212,9 +217,7 @@ def main() -> int:
     options = parser.parse_args()
     draw = random.Random(options.seed)
     half = max(options.cases // 2, 1)
-    cases = [
-        [draw_axis(draw) for _ in range(draw.choice([1, 1, 1, 2, 3, 7]))] for _ in range(half)
-    ]
+    cases = [[draw_axis(draw) for _ in range(draw.choice([1, 1, 1, 2, 3, 7]))] for _ in range(half)]
     units = [1.0] * half
     plans = plan(options.program, cases, units, draw.uniform(0.1, 0.9))
     good = report("targets", cases, plans, options.show)
