@@ -42,7 +42,7 @@ class AxisMotion {
 
     /// Duration of the planned motion, s.
     [[nodiscard]] double duration() const noexcept RTCF_NONBLOCKING { return duration_; }
-    /// The motion at some time after the begin, s. After the end, the axis moves on at the velocity
+    /// The motion at some time after the start, s. After the end, the axis moves on at the velocity
     /// of the target.
     [[nodiscard]] Motion at(double time) const noexcept RTCF_NONBLOCKING;
     /// The difference between the target and the end of the last phase, due to rounding.
@@ -57,7 +57,7 @@ class AxisMotion {
     struct Piece {
         double begin;  // s
         double jerk;
-        Motion motion;  // at its begin; the position is relative to that of the whole motion
+        Motion motion;  // at its start; the position is relative to that of the whole motion
     };
     using Phases = PhaseList<14>;
 
@@ -81,8 +81,8 @@ class AxisMotion {
     double return_duration_ = 0.0;
     double distance_ = 0.0;   // from returned_ to the target
     double tolerance_ = 0.0;  // rounding errors of distances
-    // Distance from the target at which the fastest change to its velocity arrives there, because
-    // the motion before was planned to.
+    // If the fastest change to the target's velocity ends nearer to the target than this, it ends
+    // at the target: the axis follows an earlier plan, with rounding errors.
     double arrival_tolerance_ = 0.0;
     FarthestMotion forward_;
     FarthestMotion backward_;  // mirrored

@@ -17,7 +17,7 @@ namespace rtcf_control {
 ///
 /// of which some do not last. With a the acceleration at the end of the second phase, -m the one
 /// at the end of the fifth phase, J the largest jerk, A the largest acceleration, and (v0, a0), vf
-/// the velocities at begin and end, a motion that does not reach the largest velocity has
+/// the velocities at start and end, a motion that does not reach the largest velocity has
 ///
 ///     a² - m² = c = a0²/2 + J (vf - v0)            if neither a nor m is as large as A,
 ///
@@ -34,7 +34,7 @@ class FarthestMotion {
    public:
     /// The end of a motion.
     struct End {
-        double distance = 0.0;  ///< from begin to end, unit
+        double distance = 0.0;  ///< from start to end, unit
         double slope = 0.0;     ///< derivative of the distance by the duration, unit/s
     };
     /// Durations between which the distance rises, or falls, only.
@@ -45,7 +45,7 @@ class FarthestMotion {
     using Phases = PhaseList<7>;
 
     FarthestMotion() = default;
-    /// @param begin velocity and acceleration at the begin, from which the axis can stay within its
+    /// @param begin velocity and acceleration at the start, from which the axis can stay within its
     ///              limits; the position does not matter
     /// @param end_velocity unit/s
     FarthestMotion(const Motion& begin, double end_velocity, const MotionLimits& limits) noexcept

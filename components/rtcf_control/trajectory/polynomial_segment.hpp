@@ -31,14 +31,14 @@ class PolynomialSegment {
 
     /// s
     [[nodiscard]] double duration() const noexcept RTCF_NONBLOCKING { return duration_; }
-    /// The motion at some time after the begin, s. Before the begin and after the end, the motion
-    /// at the begin or the end. At the end, its position is exactly that of the point.
+    /// The motion at some time after the start, s. Before the start and after the end, the motion
+    /// at the start or the end. At the end, its position is exactly that of the point.
     [[nodiscard]] Motion at(double time) const noexcept RTCF_NONBLOCKING;
 
    private:
     [[nodiscard]] Motion evaluate(double x) const noexcept;
 
-    // Of x = time / duration, lowest power first. The position is relative to that at the begin.
+    // Of x = time / duration, lowest power first. The position is relative to that at the start.
     std::array<double, 6> coefficients_{};
     double begin_ = 0.0;
     double end_ = 0.0;

@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
 
 namespace rtcf_control {
+
+static_assert(std::is_trivially_copyable_v<SynchronizedMotion>);
 
 namespace {
 

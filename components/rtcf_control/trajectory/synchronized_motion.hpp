@@ -1,5 +1,5 @@
 /// @file
-/// Motions of several axes that begin and end together.
+/// Motions of several axes that start and end together.
 #pragma once
 
 #include <array>
@@ -47,7 +47,7 @@ class SynchronizedMotion {
     [[nodiscard]] std::size_t size() const noexcept RTCF_NONBLOCKING { return count_; }
     /// Duration of all motions, s.
     [[nodiscard]] double duration() const noexcept RTCF_NONBLOCKING { return duration_; }
-    /// The motion of an axis at some time after the begin, s. After the end, the axis moves on at
+    /// The motion of an axis at some time after the start, s. After the end, the axis moves on at
     /// the velocity of its target.
     [[nodiscard]] Motion at(std::size_t axis, double time) const noexcept RTCF_NONBLOCKING {
         return axes_[axis].at(time);

@@ -11,7 +11,7 @@ namespace rtcf_control {
 /// largest one, and a phase of the opposite jerk. All functions are real-time safe.
 class VelocityChange {
    public:
-    /// @param begin  motion at the begin; its acceleration is within the limits
+    /// @param begin  motion at the start; its acceleration is within the limits
     /// @param velocity velocity at the end, unit/s. Differences that rounding explains count as
     ///                 none.
     VelocityChange(const Motion& begin, double velocity, const MotionLimits& limits) noexcept
@@ -20,7 +20,7 @@ class VelocityChange {
     [[nodiscard]] const PhaseList<3>& phases() const noexcept RTCF_NONBLOCKING { return phases_; }
     /// s
     [[nodiscard]] double duration() const noexcept RTCF_NONBLOCKING { return phases_.duration(); }
-    /// Distance from begin to end, unit.
+    /// Distance from start to end, unit.
     [[nodiscard]] double distance() const noexcept RTCF_NONBLOCKING { return distance_; }
     /// True if the velocity has to rise above the one that easing the acceleration leads to.
     [[nodiscard]] bool rises() const noexcept RTCF_NONBLOCKING { return change_ > 0.0; }

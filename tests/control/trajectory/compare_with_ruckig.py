@@ -151,7 +151,7 @@ def report(name: str, cases: list[list[Axis]], plans: list[Plan], shown: int) ->
     """Compares plans and prints the result. Returns True if all is well.
 
     A shorter motion that ends at its target within its limits is no error: ruckig does not always
-    find the shortest one if the begin is at a limit.
+    find the shortest one if the start is at a limit.
     """
     shorter = longer = failed = bad = 0
     worst = 0.0

@@ -3,10 +3,10 @@
 //
 // A line of input is a case:
 //     axes fraction {position velocity acceleration  position velocity  velocity acceleration jerk}
-// with begin, target and limits of each axis. A line of output is
+// with start, target and limits of each axis. A line of output is
 //     error duration excess gap rounding {shortest  position velocity acceleration}
 // with the PlanError, the duration in s, and, relative to limits and sizes of the motion,
-//     excess    by how much velocity or acceleration exceed the limits, or what the begin makes
+//     excess    by how much velocity or acceleration exceed the limits, or what the start makes
 //               unavoidable
 //     gap       by how much position, velocity and acceleration of two samples differ from what the
 //               largest jerk allows
@@ -41,7 +41,7 @@ struct Findings {
 
 constexpr int kSamples = 400;
 
-// The largest velocity in one direction that the begin makes unavoidable: easing the acceleration
+// The largest velocity in one direction that the start makes unavoidable: easing the acceleration
 // leads to it.
 double unavoidable(const Motion& begin, const AxisTask& task) {
     return std::max({task.limits.velocity, begin.velocity, begin.easedVelocity(task.limits.jerk)});

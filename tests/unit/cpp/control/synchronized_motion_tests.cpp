@@ -33,7 +33,7 @@ std::uint64_t bitsOf(double value) {
 double durationOf(const AxisTask& task) { return planned({task}).duration(); }
 
 // Fails if a motion leaves its limits, jumps, or ends elsewhere. `largest` are the limits, or more
-// if the begin makes more unavoidable.
+// if the start makes more unavoidable.
 void expectSmooth(const SynchronizedMotion& motion, std::size_t axis, const AxisTask& task,
                   double largest_velocity, double largest_acceleration) {
     const double duration = motion.duration();
