@@ -148,7 +148,7 @@ void AxisMotion::prepare(const Motion& begin, const MotionTarget& target,
         limits.velocity / limits.acceleration + std::sqrt(limits.velocity / limits.jerk);
     arrival_tolerance_ = tolerance_ + kArrivalTolerance * (travel + limits.velocity * ramp);
 
-    block(-1.0, forward_.fastest());
+    block(-return_duration_ - 1.0, forward_.fastest());
     blockShort(forward_, distance_);
     blockShort(backward_, -distance_);
 }
