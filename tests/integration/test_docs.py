@@ -54,6 +54,7 @@ PREPARE: dict[str, Callable[[Daemon, rtcf.Client], None]] = {
     "boot.md": _nothing,
     "control/index.md": _nothing,
     "control/pid.md": _nothing,
+    "control/trajectory.md": _nothing,
     "first-ten-minutes.md": _nothing,
     "from-hal.md": _nothing,
     "from-ros-control.md": _nothing,

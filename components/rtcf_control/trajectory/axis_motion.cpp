@@ -335,6 +335,17 @@ Motion AxisMotion::at(double time) const noexcept RTCF_NONBLOCKING {
     return motion;
 }
 
+PositionRange AxisMotion::range() const noexcept RTCF_NONBLOCKING {
+    PositionRange range{begin_.position, begin_.position};
+    for (std::size_t i = 0; i < piece_count_; ++i) {
+        Motion begin = pieces_[i].motion;
+        begin.position += begin_.position;
+        const double end = i + 1 < piece_count_ ? pieces_[i + 1].begin : duration_;
+        range.add(begin, end - pieces_[i].begin, pieces_[i].jerk);
+    }
+    return range;
+}
+
 Motion AxisMotion::roundingError() const noexcept RTCF_NONBLOCKING {
     return {target_.position - begin_.position - end_.position, target_.velocity - end_.velocity,
             -end_.acceleration};

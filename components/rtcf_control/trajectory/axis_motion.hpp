@@ -45,6 +45,8 @@ class AxisMotion {
     /// The motion at some time after the start, s. After the end, the axis moves on at the velocity
     /// of the target.
     [[nodiscard]] Motion at(double time) const noexcept RTCF_NONBLOCKING;
+    /// The positions that the planned motion passes up to its end.
+    [[nodiscard]] PositionRange range() const noexcept RTCF_NONBLOCKING;
     /// The difference between the target and the end of the last phase, due to rounding.
     [[nodiscard]] Motion roundingError() const noexcept RTCF_NONBLOCKING;
 

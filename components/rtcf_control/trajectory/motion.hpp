@@ -3,7 +3,9 @@
 /// unit (m, rad), written "unit" in comments; times are in s.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 
 #include <rtcf/realtime.hpp>
@@ -36,6 +38,35 @@ struct Motion {
     [[nodiscard]] double easedVelocity(double jerk) const noexcept RTCF_NONBLOCKING {
         const double magnitude = acceleration < 0.0 ? -acceleration : acceleration;
         return velocity + acceleration * magnitude / (2.0 * jerk);
+    }
+};
+
+/// The positions that a motion passes.
+struct PositionRange {
+    double lower = 0.0;  ///< unit
+    double upper = 0.0;  ///< unit
+
+    /// Adds a position. Real-time safe.
+    void add(double position) noexcept RTCF_NONBLOCKING {
+        lower = std::min(lower, position);
+        upper = std::max(upper, position);
+    }
+    /// Adds the positions of a time of constant jerk: those at both ends, and those at which the
+    /// velocity changes its sign. Real-time safe.
+    /// @param duration s
+    /// @param jerk     unit/s³
+    void add(const Motion& begin, double duration, double jerk) noexcept RTCF_NONBLOCKING {
+        add(begin.position);
+        add(begin.after(duration, jerk).position);
+        const double square = begin.acceleration * begin.acceleration - 2.0 * jerk * begin.velocity;
+        if (!(square >= 0.0)) return;
+        // The roots of velocity + acceleration t + jerk t² / 2, without cancellation.
+        const double sum =
+            -(begin.acceleration + std::copysign(std::sqrt(square), begin.acceleration));
+        for (const double time : {sum / jerk, 2.0 * begin.velocity / sum}) {
+            // Not for NaN, of zero by zero.
+            if (time > 0.0 && time < duration) add(begin.after(time, jerk).position);
+        }
     }
 };
 

@@ -274,5 +274,30 @@ TEST(SynchronizedMotion, KeepsTheMotionAfterAnError) {
     expectError(PlanError::Range, {wrong});
 }
 
+TEST(SynchronizedMotion, KnowsTheRangeOfItsPositions) {
+    RandomTasks tasks(33);
+    for (int n = 0; n < kTasks; ++n) {
+        const AxisTask task = tasks.any();
+        const SynchronizedMotion motion = planned({task});
+        const PositionRange range = motion.axis(0).range();
+        const double h = motion.duration() / kSamples;
+        const double largest =
+            std::max(task.limits.acceleration, std::abs(task.begin.acceleration));
+        const double size =
+            std::abs(task.begin.position) + std::abs(task.target.position) +
+            (std::abs(task.begin.velocity) + task.limits.velocity) * motion.duration();
+        double lowest = task.begin.position;
+        double highest = lowest;
+        for (int i = 0; i <= kSamples; ++i) {
+            lowest = std::min(lowest, motion.at(0, i * h).position);
+            highest = std::max(highest, motion.at(0, i * h).position);
+        }
+        ASSERT_GE(lowest, range.lower - 1e-9 * size);
+        ASSERT_LE(highest, range.upper + 1e-9 * size);
+        ASSERT_NEAR(lowest, range.lower, largest * h * h + 1e-9 * size);
+        ASSERT_NEAR(highest, range.upper, largest * h * h + 1e-9 * size);
+    }
+}
+
 }  // namespace
 }  // namespace rtcf::test
