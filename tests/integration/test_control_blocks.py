@@ -28,7 +28,11 @@ TYPES = (
     "Demux7", "Derivative", "Gain", "Hysteresis", "Integrator", "LookupTable", "LookupTable2D",
     "MovingAverage", "Mux2", "Mux3", "Mux6", "Mux7", "RateLimiter", "Saturation", "Sum", "Switch",
 )  # fmt: skip
-OTHERS = ("Pid", "SignalGenerator", "TrajectoryGenerator")  # tested in modules of their own
+# Tested in modules of their own.
+OTHERS = (
+    "Biquads", "CommandTimeout", "EStop", "Heartbeat", "JointLimiter", "Pid", "SignalGenerator",
+    "TrajectoryGenerator",
+)  # fmt: skip
 STATEFUL = (
     "Backlash", "Delay", "Derivative", "Hysteresis", "Integrator", "MovingAverage", "RateLimiter",
 )  # fmt: skip

@@ -53,7 +53,9 @@ def _loop_with_a_bag(daemon: Daemon, client: rtcf.Client) -> None:
 PREPARE: dict[str, Callable[[Daemon, rtcf.Client], None]] = {
     "boot.md": _nothing,
     "control/index.md": _nothing,
+    "control/biquads.md": _nothing,
     "control/pid.md": _nothing,
+    "control/safety.md": _nothing,
     "control/trajectory.md": _nothing,
     "first-ten-minutes.md": _nothing,
     "from-hal.md": _nothing,

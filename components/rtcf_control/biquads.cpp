@@ -1,0 +1,347 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <cstring>
+#include <sstream>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include <rtcf/component.hpp>
+
+namespace rtcf_control {
+namespace {
+
+constexpr std::size_t kMostSections = 8;
+constexpr double kPi = 3.14159265358979323846;
+// A design keeps the frequencies below this part of the loop's frequency; half of it is the limit
+// of the bilinear transform.
+constexpr double kLargestShare = 0.49;
+
+// A section before its discretisation, with S = s / (2 pi frequency):
+// H = (b[0] + b[1] S + b[2] S^2) / (a[0] + a[1] S + a[2] S^2).
+struct AnalogSection {
+    double frequency = 0.0;  // Hz; the discrete section has the response of H at this frequency
+    std::array<double, 3> b{1.0, 0.0, 0.0};
+    std::array<double, 3> a{1.0, 0.0, 0.0};
+};
+
+struct AnalogChain {
+    std::array<AnalogSection, kMostSections> sections{};
+    std::size_t count = 0;
+    std::uint64_t identity = 0;  // hash of the sections
+};
+
+// y = b[0] x + b[1] x1 + b[2] x2 - a[0] y1 - a[1] y2, with the values of the last two cycles.
+struct Section {
+    std::array<double, 3> b{1.0, 0.0, 0.0};
+    std::array<double, 2> a{0.0, 0.0};
+    template <typename Visit>
+    void fields(Visit&& visit) {
+        visit("b0", b[0]);
+        visit("b1", b[1]);
+        visit("b2", b[2]);
+        visit("a1", a[0]);
+        visit("a2", a[1]);
+    }
+};
+
+// Bilinear transform, S = (1 - z^-1) / (K (1 + z^-1)) with K = tan(pi frequency period). Real-time
+// safe.
+Section discretise(const AnalogSection& analog, double frequency, double period_s) {
+    const double k = std::tan(kPi * frequency * period_s);
+    const auto transform = [k](const std::array<double, 3>& c) {
+        return std::array<double, 3>{c[2] + c[1] * k + c[0] * k * k, 2.0 * (c[0] * k * k - c[2]),
+                                     c[2] - c[1] * k + c[0] * k * k};
+    };
+    const std::array<double, 3> b = transform(analog.b);
+    const std::array<double, 3> a = transform(analog.a);
+    return {{b[0] / a[0], b[1] / a[0], b[2] / a[0]}, {a[1] / a[0], a[2] / a[0]}};
+}
+
+// Reads a chain of sections from a text such as "lowpass 100 0.707; notch 50 5".
+class ChainReader {
+   public:
+    explicit ChainReader(double frequency_hz) : highest_(kLargestShare * frequency_hz) {}
+
+    /// @return empty, or the error
+    std::string read(const std::string& text) {
+        std::istringstream all(text);
+        for (std::string one; std::getline(all, one, ';');) {
+            std::istringstream words(one);
+            std::string kind;
+            if (!(words >> kind)) continue;
+            std::vector<double> numbers;
+            for (std::string word; words >> word;) {
+                char* end = nullptr;
+                numbers.push_back(std::strtod(word.c_str(), &end));
+                if (*end != '\0' || !std::isfinite(numbers.back()))
+                    return fmt::format("{}: {} is not a number", kind, word);
+            }
+            if (std::string error = section(kind, numbers); !error.empty()) return error;
+        }
+        return {};
+    }
+
+    const AnalogChain& chain() const noexcept { return chain_; }
+
+   private:
+    std::string section(const std::string& kind, const std::vector<double>& numbers) {
+        const bool butterworth = kind == "butterworth_lowpass" || kind == "butterworth_highpass";
+        const bool lead_lag = kind == "lead_lag";
+        if (!butterworth && !lead_lag && kind != "lowpass" && kind != "highpass" &&
+            kind != "bandpass" && kind != "notch")
+            return fmt::format(
+                "{} is not a section; use lowpass, highpass, bandpass, notch, lead_lag, "
+                "butterworth_lowpass or butterworth_highpass",
+                kind);
+        const char* const form = butterworth ? "ORDER FREQUENCY"
+                                 : lead_lag  ? "ZERO_FREQUENCY POLE_FREQUENCY"
+                                             : "FREQUENCY Q";
+        if (numbers.size() != 2) return fmt::format("write {} {}", kind, form);
+        if (butterworth) return butterworthSections(kind, numbers[0], numbers[1]);
+        if (lead_lag) return leadLag(numbers[0], numbers[1]);
+        return resonant(kind, numbers[0], numbers[1]);
+    }
+
+    std::string resonant(const std::string& kind, double frequency, double q) {
+        if (q < 1e-6 || q > 1e6) return fmt::format("{}: Q = {} is not in 1e-6 to 1e6", kind, q);
+        AnalogSection made{frequency, {}, {1.0, 1.0 / q, 1.0}};
+        if (kind == "lowpass") made.b = {1.0, 0.0, 0.0};
+        if (kind == "highpass") made.b = {0.0, 0.0, 1.0};
+        if (kind == "bandpass") made.b = {0.0, 1.0 / q, 0.0};
+        if (kind == "notch") made.b = {1.0, 0.0, 1.0};
+        return add(kind, made);
+    }
+
+    // (1 + s / zero) / (1 + s / pole): exact at its largest phase, between the two.
+    std::string leadLag(double zero, double pole) {
+        if (zero <= 0.0 || pole <= 0.0) return "lead_lag: the frequencies must be above 0 Hz";
+        const double ratio = std::sqrt(pole / zero);
+        return add("lead_lag",
+                   {std::sqrt(zero) * std::sqrt(pole), {1.0, ratio, 0.0}, {1.0, 1.0 / ratio, 0.0}});
+    }
+
+    std::string butterworthSections(const std::string& kind, double order, double frequency) {
+        constexpr double kHighest = 2.0 * static_cast<double>(kMostSections);
+        if (order != std::floor(order) || order < 1.0 || order > kHighest)
+            return fmt::format("{}: the order {} is not a whole number from 1 to {}", kind, order,
+                               kHighest);
+        const bool low = kind == "butterworth_lowpass";
+        const int whole = static_cast<int>(order);
+        // The poles are equally spaced on a circle. Sections with little resonance come first, so
+        // that no value between sections is large.
+        if (whole % 2 == 1) {
+            const AnalogSection first{
+                frequency, {low ? 1.0 : 0.0, low ? 0.0 : 1.0, 0.0}, {1.0, 1.0, 0.0}};
+            if (std::string error = add(kind, first); !error.empty()) return error;
+        }
+        for (int i = whole / 2; i >= 1; --i) {
+            const double damping = 2.0 * std::sin(kPi * (2 * i - 1) / (2.0 * order));
+            const AnalogSection pair{
+                frequency, {low ? 1.0 : 0.0, 0.0, low ? 0.0 : 1.0}, {1.0, damping, 1.0}};
+            if (std::string error = add(kind, pair); !error.empty()) return error;
+        }
+        return {};
+    }
+
+    std::string add(std::string_view kind, const AnalogSection& made) {
+        if (made.frequency <= 0.0 || made.frequency >= highest_)
+            return fmt::format(
+                "{}: {} Hz is not between 0 and {} Hz, 49 % of the component's frequency", kind,
+                made.frequency, highest_);
+        if (chain_.count == kMostSections)
+            return fmt::format("at most {} sections; a Butterworth filter has one for two orders",
+                               kMostSections);
+        chain_.sections[chain_.count++] = made;
+        mix(made.frequency);
+        for (const double coefficient : made.b) mix(coefficient);
+        for (const double coefficient : made.a) mix(coefficient);
+        return {};
+    }
+
+    // FNV-1a, 64 bits at a time.
+    void mix(double number) {
+        std::uint64_t bits = 0;
+        std::memcpy(&bits, &number, sizeof bits);
+        chain_.identity = (chain_.identity ^ bits) * 0x100000001b3ULL;
+        chain_.identity ^= chain_.identity >> 32U;
+    }
+
+    double highest_;
+    AnalogChain chain_;
+};
+
+// Direct form I: the state of a section is the last two values of its input and of its output. It
+// does not depend on the coefficients, so that it stays valid when they change. Neighbours share
+// it.
+class Biquads final : public rtcf::Component {
+    using Signals = std::array<double, kMostSections + 1>;
+
+    // Smaller values are set to 0: numbers below 1e-308 would slow down the cycle.
+    static constexpr double kSmallest = 1e-200;
+
+    rtcf::Input<double> in{this, "in"};
+    rtcf::Output<double> out{this, "out", "", rtcf::Finite()};
+
+    rtcf::Parameter<std::string> sections{
+        this, "sections", "",
+        rtcf::Doc("sections separated by ;, frequencies F in Hz: lowpass F Q, highpass F Q, "
+                  "bandpass F Q, notch F Q, lead_lag F_ZERO F_POLE, butterworth_lowpass ORDER F, "
+                  "butterworth_highpass ORDER F")};
+    rtcf::Parameter<double> fade{
+        this,           "fade",          0.1,
+        rtcf::Min(0.0), rtcf::Unit("s"), rtcf::Doc("time of the transition to other sections")};
+    rtcf::Parameter<bool> settled{
+        this, "settled", true,
+        rtcf::Doc("begin as if the first value had always been there; false: as if it had been 0")};
+
+    rtcf::Derived<AnalogChain> analog_{this};
+    rtcf::State<std::array<Section, kMostSections>> design_{
+        this, "design", {}, rtcf::Doc("coefficients of the sections")};
+    rtcf::State<std::uint32_t> count_{this, "count", 0, rtcf::Doc("number of sections")};
+    rtcf::State<std::uint64_t> identity_{this, "design_identity", 0,
+                                         rtcf::Doc("hash of the sections in the parameter")};
+    rtcf::State<std::int64_t> period_{this, "design_period", 0, rtcf::Unit("ns"),
+                                      rtcf::Doc("period for which the sections are designed")};
+    rtcf::State<Signals> last_{
+        this, "last", {}, rtcf::Doc("input and outputs of the sections in the last cycle")};
+    rtcf::State<Signals> before_{
+        this, "before", {}, rtcf::Doc("input and outputs of the sections in the cycle before it")};
+    rtcf::State<double> offset_{this, "offset", 0.0,
+                                rtcf::Doc("what the transition adds to the output")};
+    rtcf::State<double> fading_{this, "fading", 0.0, rtcf::Unit("s"),
+                                rtcf::Doc("time left of the transition")};
+    rtcf::State<double> output_{this, "last_output", 0.0, rtcf::Doc("the last output")};
+    rtcf::State<bool> begun_{this, "begun", false, rtcf::Doc("the first value has come")};
+
+    bool prepare(const rtcf::Values& proposed) override {
+        ChainReader reader(frequency());
+        if (const std::string error = reader.read(proposed[sections]); !error.empty())
+            return RTCF_FAIL(this, "sections: {}", error);
+        analog_.stage(reader.chain());
+        return true;
+    }
+
+    bool start() override {
+        begun_ = false;
+        return true;
+    }
+
+    void update() override {
+        if (in.read() == rtcf::DataStatus::None) return;
+        const double x = in.value();
+        if (!std::isfinite(x)) {
+            out.write(x);  // rejected by the check: readers keep the last output
+            return;
+        }
+        if (!begun_) {
+            begin(x);
+        } else if (identity_ != analog_->identity || period_ != period()) {
+            redesign(x);
+        }
+        Signals now{};
+        const double y = filter(x, now) + offset_;
+        out.write(y);
+        if (!std::isfinite(y)) return;  // too large a number: rejected by the check
+        before_ = last_.value();
+        last_ = now;
+        output_ = y;
+        if (fading_ <= 0.0) return;
+        const double left = fading_ - dt();
+        offset_ = left > 0.0 ? offset_ * (left / fading_) : 0.0;
+        fading_ = std::max(left, 0.0);
+    }
+
+    // In the last cycle as in any other: passes on the safe command of a component in front.
+    void safe() noexcept override { update(); }
+
+    void begin(double x) {
+        design();
+        Signals steady{};
+        if (settled) {
+            steady[0] = x;
+            for (std::size_t i = 0; i < count_; ++i) {
+                const AnalogSection& section = analog_->sections[i];
+                steady[i + 1] = steady[i] * (section.b[0] / section.a[0]);
+            }
+        }
+        last_ = steady;
+        before_ = steady;
+        offset_ = 0.0;
+        fading_ = 0.0;
+        begun_ = true;
+    }
+
+    // Designs the sections again. The output continues from the value that it would have without
+    // the change.
+    void redesign(double x) {
+        Signals now{};
+        const double expected = filter(x, now) + offset_;
+        if (period_ != period()) resample();
+        const std::uint32_t count = count_;
+        design();
+        for (std::size_t i = count; i < count_; ++i) {
+            last_.value()[i + 1] = last_.value()[count];
+            before_.value()[i + 1] = before_.value()[count];
+        }
+        const double offset = expected - filter(x, now);
+        const bool fades = fade > 0.0 && std::isfinite(offset);
+        offset_ = fades ? offset : 0.0;
+        fading_ = fades ? fade.value() : 0.0;
+    }
+
+    // Moves the values of the last two cycles to the times of the new period, along their lines.
+    void resample() {
+        const double ratio = static_cast<double>(period()) / static_cast<double>(period_.value());
+        for (std::size_t i = 0; i <= count_; ++i) {
+            double& last = last_.value()[i];
+            double& before = before_.value()[i];
+            const double slope = last - before;  // per old period
+            last += slope * (1.0 - ratio);
+            before = last - slope * ratio;
+        }
+    }
+
+    void design() {
+        const double period_s = 1e-9 * static_cast<double>(period());
+        const double highest = kLargestShare / period_s;
+        for (std::size_t i = 0; i < analog_->count; ++i) {
+            const AnalogSection& section = analog_->sections[i];
+            // prepare() has checked the frequency at the period of that time.
+            if (section.frequency >= highest)
+                RTCF_WARN_THROTTLE(this, 10.0, "{} Hz is too high for this loop: {} Hz instead",
+                                   section.frequency, highest);
+            design_.value()[i] =
+                discretise(section, std::min(section.frequency, highest), period_s);
+        }
+        count_ = static_cast<std::uint32_t>(analog_->count);
+        identity_ = analog_->identity;
+        period_ = period();
+    }
+
+    double filter(double x, Signals& now) const {
+        const Signals& last = last_.value();
+        const Signals& before = before_.value();
+        now[0] = x;
+        for (std::size_t i = 0; i < count_; ++i) {
+            const Section& c = design_.value()[i];
+            const double y = c.b[0] * now[i] + c.b[1] * last[i] + c.b[2] * before[i] -
+                             c.a[0] * last[i + 1] - c.a[1] * before[i + 1];
+            now[i + 1] = std::abs(y) < kSmallest ? 0.0 : y;
+        }
+        return now[count_];
+    }
+};
+
+}  // namespace
+}  // namespace rtcf_control
+
+RTCF_COMPONENT_NAMED(rtcf_control::Biquads, "Biquads",
+                     "Filter of up to 8 second-order sections, by the bilinear transform "
+                     "(Oppenheim & Schafer, Discrete-Time Signal Processing, 3rd edition, 2010, "
+                     "chapter 7)",
+                     Biquads)

@@ -1,0 +1,130 @@
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+
+#include <rtcf/component.hpp>
+
+#include "latch.hpp"
+
+namespace rtcf_control {
+namespace {
+
+class EStop final : public rtcf::Component {
+    static constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+    rtcf::Input<double> in{this, "in"};
+    rtcf::Input<bool> stop1{this, "stop1"};
+    rtcf::Input<bool> stop2{this, "stop2"};
+    rtcf::Input<bool> stop3{this, "stop3"};
+    rtcf::Input<bool> stop4{this, "stop4"};
+    rtcf::Input<bool> reset{this, "reset"};
+    rtcf::Output<double> out{this, "out", "", rtcf::Finite()};
+    rtcf::Output<bool> stopped{this, "stopped"};
+    rtcf::Output<std::int32_t> state{this, "state"};
+
+    rtcf::Parameter<bool> engaged{this, "engaged", false, rtcf::Doc("stop, as an input would")};
+    rtcf::Parameter<bool> start_stopped{this, "start_stopped", true,
+                                        rtcf::Doc("begin with a stop, which needs a reset")};
+    rtcf::Parameter<std::int32_t> required{
+        this,
+        "required",
+        1,
+        rtcf::Min(0.0),
+        rtcf::Max(4.0),
+        rtcf::Doc(
+            "number of inputs stop1, stop2 … that stop without a value, or if their writer ends")};
+    rtcf::Parameter<double> safe_value{this, "safe_value", 0.0,
+                                       rtcf::Doc("output during a stop and in the last cycle")};
+    rtcf::Parameter<double> stop_rate{
+        this,
+        "stop_rate",
+        kInfinity,
+        rtcf::Min(0.0),
+        rtcf::Unit("1/s"),
+        rtcf::Doc("rate of change to safe_value; infinite = at once (stop category 0)")};
+    rtcf::Parameter<double> resume_rate{this,
+                                        "resume_rate",
+                                        kInfinity,
+                                        rtcf::Min(0.0),
+                                        rtcf::Unit("1/s"),
+                                        rtcf::Doc("rate of change to the command after a reset")};
+
+    rtcf::State<Latch> latch_{this, "latch", {}};
+    rtcf::State<std::array<bool, 4>> wired_{
+        this, "wired", {}, rtcf::Doc("stop1 to stop4 have had a writer")};
+    rtcf::State<double> last_{this, "last", 0.0, rtcf::Doc("the last output")};
+    rtcf::State<bool> resumes_{this, "resumes", false,
+                               rtcf::Doc("the output moves to the command at resume_rate")};
+
+    bool start() override {
+        latch_ = Latch{};
+        if (start_stopped) latch_.value().stop();
+        wired_ = std::array<bool, 4>{};
+        last_ = safe_value.value();
+        resumes_ = true;
+        return true;
+    }
+
+    void safe() noexcept override {
+        latch_.value().stop();
+        last_ = safe_value.value();
+        publish();
+    }
+
+    void update() override {
+        const std::array<rtcf::Input<bool>*, 4> stops{&stop1, &stop2, &stop3, &stop4};
+        bool condition = engaged;
+        for (std::size_t i = 0; i < stops.size(); ++i) {
+            rtcf::Input<bool>& input = *stops[i];
+            const bool has_value = input.read() != rtcf::DataStatus::None;
+            const bool is_required = i < static_cast<std::size_t>(required.value());
+            bool& wired = wired_.value()[i];
+            wired = wired || input.connected();
+            const bool lost = !has_value || (wired && !input.connected());
+            condition = condition || (has_value && input.value()) || (is_required && lost);
+        }
+        const rtcf::DataStatus command = in.read();
+        const bool usable = command != rtcf::DataStatus::None && std::isfinite(in.value());
+        const bool wanted = reset.read() != rtcf::DataStatus::None && reset.value();
+        if (latch_.value().update(condition, usable && command == rtcf::DataStatus::New, wanted))
+            resumes_ = true;
+        if (latch_.value().stopped()) {
+            move(safe_value, stop_rate);
+        } else if (!usable) {
+            if (command != rtcf::DataStatus::None) out.write(in.value());  // rejected by the check
+            publishState();
+            return;
+        } else {
+            move(in.value(), resumes_ ? resume_rate.value() : kInfinity);
+            if (last_ == in.value()) resumes_ = false;
+        }
+        publish();
+    }
+
+    void move(double target, double rate) {
+        const double largest = rate * dt();
+        last_ = std::clamp(target, last_ - largest, last_ + largest);
+    }
+
+    void publish() noexcept {
+        out.write(last_);
+        publishState();
+    }
+
+    void publishState() noexcept {
+        stopped.write(latch_.value().stopped());
+        state.write(latch_.value().state());
+    }
+};
+
+}  // namespace
+}  // namespace rtcf_control
+
+RTCF_COMPONENT_NAMED(
+    rtcf_control::EStop, "EStop",
+    "Latched stop of a command; a reset needs a command newer than the stop (after "
+    "ISO 13850 and the stop categories of IEC 60204-1; not a safety-rated device)",
+    EStop)
