@@ -212,7 +212,7 @@ class Biquads final : public rtcf::Component {
     rtcf::State<Signals> before_{
         this, "before", {}, rtcf::Doc("input and outputs of the sections in the cycle before it")};
     rtcf::State<double> offset_{this, "offset", 0.0,
-                                rtcf::Doc("what the transition adds to the output")};
+                                rtcf::Doc("difference that a transition adds to the output")};
     rtcf::State<double> fading_{this, "fading", 0.0, rtcf::Unit("s"),
                                 rtcf::Doc("time left of the transition")};
     rtcf::State<double> output_{this, "last_output", 0.0, rtcf::Doc("the last output")};
