@@ -141,6 +141,8 @@ class _Line:
             yield from (str(each.name) for each in client.list_incidents())
         elif source == "PKG":
             yield from (str(each.package) for each in client.list_types().types)
+        elif source == "PKG/COMPONENT":
+            yield from (f"{each.package}/{each.type}" for each in client.list_types().types)
         elif source == "COMPONENT" and self._given:
             types = client.list_types(self._given[-1]).types
             yield from (str(each.type) for each in types)

@@ -15,6 +15,7 @@ SESSION = [
     "status",
     "types",
     "types rtcf_examples --long",
+    "info --type rtcf_examples/Mimo",
     "runner add arm --frequency 100 --no-ros",
     "runner set arm --frequency 200",
     "runner list",

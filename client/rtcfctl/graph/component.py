@@ -7,6 +7,7 @@ from typing import Any
 
 import rtcf
 from rtcf.v1 import control_pb2, graph_pb2
+from rtcf_shared.naming import listing, suggestion
 
 from rtcfctl.graph import python_source
 from rtcfctl.terminal import words
@@ -62,8 +63,16 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     listing = verbs.add_parser("list", parents=[common], help="list all components")
     listing.set_defaults(run=show_all)
 
-    info = verbs.add_parser("info", parents=[common], help="show one component, with values")
-    info.add_argument("component", metavar="NAME")
+    info = verbs.add_parser(
+        "info", parents=[common], help="show one component, with values, or a component type"
+    )
+    info.add_argument("component", metavar="NAME", nargs="?", default="")
+    info.add_argument(
+        "--type",
+        default="",
+        metavar="PKG/COMPONENT",
+        help="describe this type, which need not be loaded: ports, parameters, units, state",
+    )
     info.set_defaults(run=show)
 
 
@@ -171,7 +180,12 @@ def show_all(client: rtcf.Client, args: argparse.Namespace, output: Output) -> N
 
 
 def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Print one component."""
+    """Print one component, or one type."""
+    if bool(args.type) == bool(args.component):
+        raise ValueError("info: specify NAME or --type PKG/COMPONENT")
+    if args.type:
+        show_type(client, args.type, output)
+        return
     found = client.get_component(args.component, args.runner)
     if not output.for_people:
         output.data(found)
@@ -194,6 +208,35 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         output.line(f"  fault: {_fault(found)}", "bold red")
     if notes := _notes(found.spec, found.holder):
         output.line(f"  {notes}")
+    if found.ports:
+        print_ports(list(found.ports), output)
+    if found.parameters:
+        print_parameters(list(found.parameters), output)
+    if found.states:
+        print_states(list(found.states), output)
+
+
+def show_type(client: rtcf.Client, name: str, output: Output) -> None:
+    """Print one component type of a package."""
+    package, slash, type_name = name.partition("/")
+    if not (package and type_name) or "/" in type_name:
+        raise ValueError(f"--type {name}: must be PKG/COMPONENT, e.g. rtcf_examples/Mimo")
+    response = client.list_types(package)
+    types = {each.type: each for each in response.types}
+    if type_name not in types:
+        problems = "".join(f"; cannot be loaded: {each}" for each in response.problems)
+        raise rtcf.RtcfError(
+            f'no type "{type_name}" in package "{package}"{suggestion(type_name, types)} '
+            f"(types: {listing(types)}){problems}"
+        )
+    found = types[type_name]
+    if not output.for_people:
+        output.data(found)
+        return
+    output.line(f"{found.package}/{found.type}", "bold")
+    if found.doc:
+        output.line(f"  {found.doc}")
+    output.line(f"  from {found.library}")
     if found.ports:
         print_ports(list(found.ports), output)
     if found.parameters:

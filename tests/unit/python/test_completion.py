@@ -30,6 +30,7 @@ def offered(daemon: DaemonUnderTest) -> DaemonUnderTest:
         ("-o ", ["json", "table", "yaml"]),
         ("status --so", ["--socket"]),
         ("info al", ["alpha"]),
+        ("info --type demo/F", ["demo/Fine"]),
         ("unload /", ["/alpha"]),
         ("load ", ["demo"]),
         ("load demo F", ["Fine"]),

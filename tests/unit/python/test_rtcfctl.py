@@ -67,6 +67,36 @@ def test_every_query_has_json_and_yaml_output(daemon: DaemonUnderTest, command: 
     assert daemon.ctl(*command.split()).stdout
 
 
+def test_a_type_is_described_without_loading_it(daemon: DaemonUnderTest) -> None:
+    heading, *lines = daemon.ctl("info", "--type", "demo/Fine").stdout.splitlines()
+    assert heading == "demo/Fine"
+    assert any(line.split()[:3] == ["in1", "in", "std_msgs/Float64"] for line in lines)
+    assert any(line.split()[:2] == ["kp", "double"] for line in lines)
+    as_json = json.loads(daemon.ctl("info", "--type", "demo/Fine", "-o", "json").stdout)
+    assert (as_json["package"], as_json["type"]) == ("demo", "Fine")
+    assert daemon.ctl("list", "-o", "json").stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "text"),
+    [
+        ((), 2, "info: specify NAME or --type PKG/COMPONENT"),
+        (("a", "--type", "demo/Fine"), 2, "info: specify NAME or --type PKG/COMPONENT"),
+        (("--type", "Fine"), 2, "--type Fine: must be PKG/COMPONENT, e.g. rtcf_examples/Mimo"),
+        (("--type", "demo/"), 2, "--type demo/: must be PKG/COMPONENT, e.g. rtcf_examples/Mimo"),
+        (("--type", "a/b/c"), 2, "--type a/b/c: must be PKG/COMPONENT, e.g. rtcf_examples/Mimo"),
+        (("--type", "demo/Fin"), 1, 'no type "Fin" in package "demo"; did you mean "Fine"?'),
+        (("--type", "dem/Fine"), 1, 'no package "dem" with component libraries in'),
+    ],
+)
+def test_a_type_that_does_not_exist_is_one_line(
+    daemon: DaemonUnderTest, words: tuple[str, ...], code: int, text: str
+) -> None:
+    done = daemon.ctl("info", *words)
+    assert (done.returncode, done.stdout) == (code, "")
+    assert done.stderr.startswith(f"rtcfctl: {text}") and done.stderr.count("\n") == 1
+
+
 def test_an_error_is_one_line_and_exit_code_1(daemon: DaemonUnderTest) -> None:
     done = daemon.ctl("load", "demo", "Refused")
     assert (done.returncode, done.stdout) == (1, "")
