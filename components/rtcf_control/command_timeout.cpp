@@ -38,7 +38,7 @@ class CommandTimeout final : public rtcf::Component {
         this,
         "stop_rate",
         kInfinity,
-        rtcf::Min(0.0),
+        rtcf::Min(1e-9),
         rtcf::Unit("1/s"),
         rtcf::Doc("rate of change to safe_value; infinite = at once")};
     rtcf::Parameter<double> resume_rate{

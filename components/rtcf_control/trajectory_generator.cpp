@@ -29,6 +29,8 @@ class TrajectoryGenerator final : public rtcf::Component {
     static constexpr std::size_t kMostJoints = SynchronizedMotion::kMostAxes;
     // Of a trajectory from a component of the loop, without allocation.
     static constexpr std::size_t kReservedPoints = 128;
+    // Of a message; bounds the work of a cycle.
+    static constexpr std::size_t kMostNames = 1024;
     // Rounding errors of positions and velocities that are compared with their limits, relative.
     static constexpr double kLimitTolerance = 1e-9;
 
@@ -427,11 +429,13 @@ class TrajectoryGenerator final : public rtcf::Component {
     // parameter. Returns the first joint that the message lacks, or count().
     std::size_t firstMissing(const Strings& names) noexcept {
         auto& order = memory_->order;
+        const auto end =
+            names.begin() + static_cast<std::ptrdiff_t>(std::min(names.size(), kMostNames));
         for (std::size_t i = 0; i < count(); ++i) {
             order[i] = i;
             if (names.empty()) continue;
-            const auto found = std::find(names.begin(), names.end(), setup_->joints[i]);
-            if (found == names.end()) return i;
+            const auto found = std::find(names.begin(), end, setup_->joints[i]);
+            if (found == end) return i;
             order[i] = static_cast<std::size_t>(found - names.begin());
         }
         return count();
@@ -639,6 +643,10 @@ class TrajectoryGenerator final : public rtcf::Component {
         constexpr const char* kWhat = "trajectory";
         if (message.points.empty()) {
             stopFrom(last);
+            return;
+        }
+        if (message.points.size() > TrajectoryPoints::kCapacity) {
+            reject(kWhat, "it has too many points");
             return;
         }
         if (const std::size_t missing = firstMissing(message.joint_names); missing < count()) {

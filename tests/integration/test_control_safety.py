@@ -249,20 +249,24 @@ def test_a_counter_that_begins_again_is_a_beat(blocks: Blocks) -> None:
 
 
 @pytest.mark.parametrize(
-    ("parameters", "said"),
+    ("component", "parameters", "said"),
     [
-        ({"lower": 2.0, "upper": 1.0}, "lower = 2 is above upper = 1"),
-        ({"soft_lower": 2.0, "soft_upper": 1.0}, "soft_lower = 2 is above soft_upper = 1"),
-        ({"soft_upper": 1.0, "k_position": 0.0}, "soft limits need a k_position above 0"),
-        ({"max_velocity": -1.0}, "max_velocity"),
-        ({"deceleration": 0.0}, "deceleration"),
+        ("JointLimiter", {"lower": 2.0, "upper": 1.0}, "lower = 2 is above upper = 1"),
+        ("JointLimiter", {"soft_lower": 2.0, "soft_upper": 1.0},
+         "soft_lower = 2 is above soft_upper = 1"),
+        ("JointLimiter", {"soft_upper": 1.0, "k_position": 0.0},
+         "soft limits need a k_position above 0"),
+        ("JointLimiter", {"max_velocity": -1.0}, "max_velocity"),
+        ("JointLimiter", {"deceleration": 0.0}, "deceleration"),
+        ("EStop", {"stop_rate": 0.0}, "stop_rate"),
+        ("CommandTimeout", {"stop_rate": 0.0}, "stop_rate"),
     ],
-)
+)  # fmt: skip
 def test_limits_that_do_not_fit_are_rejected_with_one_line(
-    blocks: Blocks, parameters: dict[str, Any], said: str
+    blocks: Blocks, component: str, parameters: dict[str, Any], said: str
 ) -> None:
     with pytest.raises(refusals.RefusedError) as error:
-        blocks.set("JointLimiter", **parameters)
+        blocks.set(component, **parameters)
     assert said in str(error.value)
     assert "\n" not in str(error.value)
 

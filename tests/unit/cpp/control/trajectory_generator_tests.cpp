@@ -606,5 +606,25 @@ TEST(TrajectoryGenerator, RejectsParametersWithOneLine) {
     EXPECT_THROW(generator.bench.set({{"joints", std::string("a b")}}), std::exception);
 }
 
+TEST(TrajectoryGenerator, RejectsMessagesOfAnySizeThatItCannotUse) {
+    Generator generator({0.0});
+    std::vector<trajectory_msgs::JointTrajectoryPoint> points;
+    for (int i = 0; i <= 1024; ++i) points.push_back(pointAt(0.1 * (i + 1), {0.0}));
+    generator.trajectory(points);
+    generator.next();
+    EXPECT_EQ(generator.rejected(), 1U);
+    // The joint is beyond the names that are read.
+    std::vector<std::string> names(1024, "other");
+    names.emplace_back("j0");
+    generator.bench.write("target", jointState(Vector(names.size(), 1.0), {}, names));
+    generator.next();
+    EXPECT_EQ(generator.rejected(), 2U);
+    EXPECT_TRUE(generator.done());
+    points.resize(1023);  // with the present motion, 1024
+    generator.trajectory(points);
+    generator.next();
+    EXPECT_EQ(generator.rejected(), 2U);
+}
+
 }  // namespace
 }  // namespace rtcf::test
