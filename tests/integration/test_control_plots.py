@@ -1,0 +1,129 @@
+"""Plots on the pages of rtcf_control, drawn from runs of the components.
+
+A plot follows the line `<!-- plot: NAME -->`, as a block of code. RTCF_DRAW_PLOTS=1 writes them.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from daemon_process import BUILD_TREE
+from rtcf.testing import Bench
+from rtcfctl.terminal.pictures import Curves
+
+PAGES = Path(__file__).parents[2] / "docs" / "control"
+PATH = [BUILD_TREE / "lib" / "rtcf"]
+WIDTH, HEIGHT, LABEL = 72, 9, 8
+DT = 0.001  # s
+MASKED: Any = np.ma
+
+_PID = """\
+components:
+  - {name: pid, package: rtcf_control, type: Pid, breaks: [measured],
+     remaps: {measured: /position, effort: /speed},
+     parameters: {kp: 4.0, ki: 8.0, setpoint_weight: 0.5, upper: 1.5}}
+  - {name: plant, package: rtcf_control, type: Integrator,
+     remaps: {in: /speed, out: /position}}
+"""
+
+
+def drawn(title: str, values: Any, ends: tuple[str, str], unit: str = "") -> str:
+    """Return a curve over equal steps, with the labels of its lowest and highest value."""
+    low, high = float(np.min(values)), float(np.max(values))
+    curves = Curves(WIDTH, HEIGHT, low, high)
+    last = values[0]
+    for x, part in enumerate(np.array_split(values, curves.columns)):
+        # From the last value, so that the curve is connected.
+        curves.column(x, min(part.min(), last), max(part.max(), last), 0)
+        last = part[-1]
+    labels = {0: f"{high:.3g}{unit}", HEIGHT - 1: f"{low:.3g}{unit}"}
+    lines = [
+        f"{labels.get(row, ''):>{LABEL}} {''.join(text for text, _ in runs)}".rstrip()
+        for row, runs in enumerate(curves.lines())
+    ]
+    first, second = ends
+    return "\n".join([title, *lines, f"{'':{LABEL}} {first}{second:>{WIDTH - len(first)}}"])
+
+
+def _pid(folder: Path) -> str:
+    file = folder / "loop.yaml"
+    file.write_text(_PID)
+    with Bench(str(file), path=PATH) as bench:
+        setpoint = np.where(np.arange(4000) < 2000, 1.0, 0.0)
+        found = bench.run({"/pid.setpoint": setpoint})
+    ends = ("0 s: setpoint 1", "2 s: setpoint 0 (middle)    4 s")
+    return "\n\n".join(
+        [drawn("position", found["/plant.out"], ends), drawn("speed", found["/pid.effort"], ends)]
+    )
+
+
+def _biquads(_: Path) -> str:
+    with Bench("rtcf_control/Biquads", path=PATH, sections="lowpass 50 0.707; notch 120 5",
+               settled=False) as bench:  # fmt: skip
+        impulse = np.zeros(8192)
+        impulse[0] = 1.0
+        response = np.abs(np.fft.rfft(bench.run({"in": impulse})["out"]))
+    frequencies = np.geomspace(5.0, 400.0, 2 * WIDTH)
+    spectrum = np.interp(frequencies, np.fft.rfftfreq(8192, DT), response)
+    decibels = np.maximum(20.0 * np.log10(spectrum), -60.0)
+    return drawn("gain of lowpass 50 0.707; notch 120 5", decibels, ("5 Hz", "400 Hz"), " dB")
+
+
+def _trajectory(_: Path) -> str:
+    with Bench("rtcf_control/TrajectoryGenerator", path=PATH, initial="0", velocity="1",
+               acceleration="4", jerk="40") as bench:  # fmt: skip
+        targets = np.zeros((1500, 1))
+        targets[[0, 600], 0] = 1.0, 0.2
+        sent = np.isin(np.arange(1500), [0, 600])[:, None]
+        found = bench.run({"target.position": MASKED.array(targets, mask=~sent)})
+    ends = ("0 s: target 1", "0.6 s: target 0.2       1.5 s")
+    names = {"position": "positions", "velocity": "velocities", "acceleration": "accelerations"}
+    return "\n\n".join(
+        drawn(title, found[f"point.{name}"][:, 0], ends) for title, name in names.items()
+    )
+
+
+def _joint_limiter(_: Path) -> str:
+    with Bench("rtcf_control/JointLimiter", path=PATH, upper=1.0, max_velocity=2.0,
+               deceleration=4.0) as bench:  # fmt: skip
+        found = bench.run({"in": np.full(1200, 3.0), "position": 0.0})
+    ends = ("0 s: command 3, upper = 1", "1.2 s")
+    velocity = np.diff(found["out"], prepend=0.0) / DT
+    return "\n\n".join([drawn("out", found["out"], ends), drawn("velocity", velocity, ends)])
+
+
+PLOTS: dict[str, tuple[str, Callable[[Path], str]]] = {
+    "pid": ("pid.md", _pid),
+    "biquads": ("biquads.md", _biquads),
+    "trajectory": ("trajectory.md", _trajectory),
+    "joint-limiter": ("safety.md", _joint_limiter),
+}
+
+
+@pytest.mark.parametrize("name", PLOTS)
+def test_a_page_shows_the_plot_of_its_component(tmp_path: Path, name: str) -> None:
+    page, draw = PLOTS[name]
+    text = (PAGES / page).read_text()
+    block = re.search(rf"<!-- plot: {name} -->\n+```\n(.*?)\n```\n", text, re.DOTALL)
+    assert block, f"{page} has no plot {name}"
+    plot = draw(tmp_path)
+    if os.environ.get("RTCF_DRAW_PLOTS"):
+        begin, end = block.span(1)
+        (PAGES / page).write_text(text[:begin] + plot + text[end:])
+        return
+    assert block[1] == plot
+
+
+def test_each_plot_on_the_pages_is_drawn_here() -> None:
+    found = {
+        name: page.name
+        for page in PAGES.glob("*.md")
+        for name in re.findall(r"<!-- plot: (.*) -->", page.read_text())
+    }
+    assert found == {name: page for name, (page, _) in PLOTS.items()}
