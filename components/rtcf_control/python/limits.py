@@ -1,0 +1,135 @@
+"""Limits of a value: Saturation, RateLimiter, DeadBand, Backlash and Hysteresis of rtcf_control."""
+
+import math
+
+import numpy as np
+from rtcf.component import Component, Input, Output, Parameter, State
+
+
+class Saturation(Component):
+    """Limits a value to a range."""
+
+    u: Input[float]
+    y: Output[float] = Output(finite=True)
+    saturated: Output[bool]
+    lower: Parameter[float] = Parameter(-math.inf, doc="lower limit")
+    upper: Parameter[float] = Parameter(math.inf, doc="upper limit")
+
+    def prepare(self):
+        if self.lower > self.upper:
+            raise ValueError("lower is above upper")
+
+    def update(self):
+        if not self.u.valid:
+            return
+        value = self.u.value
+        if not math.isfinite(value):
+            self.y.write(value)  # rejected by the check: readers keep the last output
+            return
+        limited = np.clip(value, self.lower, self.upper)
+        self.y.write(limited)
+        self.saturated.write(limited != value)
+
+
+class RateLimiter(Component):
+    """Limits the rate of change; the first value passes unlimited."""
+
+    u: Input[float]
+    y: Output[float] = Output(finite=True)
+    limited: Output[bool]
+    rising: Parameter[float] = Parameter(
+        math.inf, min=0.0, unit="1/s", doc="largest rate upwards; 0 holds"
+    )
+    falling: Parameter[float] = Parameter(
+        math.inf, min=0.0, unit="1/s", doc="largest rate downwards; 0 holds"
+    )
+    last: State[float | None]
+
+    def start(self):
+        self.last = None
+
+    def update(self):
+        if not self.u.valid:
+            return
+        value = self.u.value
+        if not math.isfinite(value):
+            self.y.write(value)  # rejected by the check: readers keep the last output
+            return
+        before = value if self.last is None else self.last
+        self.last = np.clip(value, before - self.falling * self.dt, before + self.rising * self.dt)
+        self.y.write(self.last)
+        self.limited.write(self.last != value)
+
+
+class DeadBand(Component):
+    """0 within a band, else the distance to the nearer end of the band."""
+
+    u: Input[float]
+    y: Output[float] = Output(finite=True)
+    lower: Parameter[float] = Parameter(0.0, doc="lower end of the band")
+    upper: Parameter[float] = Parameter(0.0, doc="upper end of the band")
+
+    def prepare(self):
+        if self.lower > self.upper:
+            raise ValueError("lower is above upper")
+
+    def update(self):
+        if self.u.valid:
+            value = self.u.value
+            self.y.write(
+                value - np.clip(value, self.lower, self.upper) if math.isfinite(value) else value
+            )
+
+
+class Backlash(Component):
+    """Mechanical play: the play operator (Brokate & Sprekels, Hysteresis and Phase Transitions)."""
+
+    u: Input[float]
+    y: Output[float] = Output(finite=True)
+    width: Parameter[float] = Parameter(0.0, min=0.0, doc="play from flank to flank")
+    position: State[float | None]
+
+    def start(self):
+        self.position = None
+
+    def update(self):
+        if not self.u.valid:
+            return
+        drive = self.u.value
+        if not math.isfinite(drive):
+            self.y.write(drive)  # rejected by the check: readers keep the last output
+            return
+        before = drive if self.position is None else self.position
+        self.position = np.clip(before, drive - self.width / 2.0, drive + self.width / 2.0)
+        self.y.write(self.position)
+
+
+class Hysteresis(Component):
+    """Schmitt trigger: true above high, false below low, else unchanged."""
+
+    u: Input[float]
+    y: Output[bool]
+    low: Parameter[float] = Parameter(0.0, doc="false below this value")
+    high: Parameter[float] = Parameter(0.0, doc="true above this value")
+    initial: Parameter[bool] = Parameter(False, doc="output until the input leaves the band")
+    on: State[bool]
+    begun: State[bool]
+
+    def prepare(self):
+        if self.low > self.high:
+            raise ValueError("low is above high")
+
+    def start(self):
+        self.begun = False
+
+    def update(self):
+        if not self.u.valid:
+            return
+        if not self.begun:
+            self.on = self.initial
+            self.begun = True
+        if self.u.value > self.high:
+            self.on = True
+        elif self.u.value < self.low:
+            self.on = False
+        self.y.write(self.on)
