@@ -91,7 +91,7 @@ def test_both_have_the_same_outputs(
         assert np.allclose(
             one.astype(float), two.astype(float), rtol=0, atol=ROUNDING, equal_nan=True
         )
-        assert len(np.unique(one.astype(float))) > 1
+    assert len(np.unique(one.astype(float))) > 1 or not parameters
 
 
 def test_the_sources_are_the_compiled_pairs() -> None:

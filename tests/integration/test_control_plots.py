@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -33,8 +33,13 @@ components:
 """
 
 
-def drawn(title: str, values: Any, ends: tuple[str, str], unit: str = "") -> str:
-    """Return a curve over equal steps, with the labels of its lowest and highest value."""
+def drawn(title: str, values: Any, marks: Mapping[float, str]) -> str:
+    """Return a curve over equal steps, with its lowest and highest value.
+
+    `marks` are the texts below it, by the share of the width at which they begin; that of 1 ends
+    there.
+    """
+    values = values[np.isfinite(values)]  # none before the first output
     low, high = float(np.min(values)), float(np.max(values))
     curves = Curves(WIDTH, HEIGHT, low, high)
     last = values[0]
@@ -42,13 +47,15 @@ def drawn(title: str, values: Any, ends: tuple[str, str], unit: str = "") -> str
         # From the last value, so that the curve is connected.
         curves.column(x, min(part.min(), last), max(part.max(), last), 0)
         last = part[-1]
-    labels = {0: f"{high:.3g}{unit}", HEIGHT - 1: f"{low:.3g}{unit}"}
+    labels = {0: f"{high:.2f}", HEIGHT - 1: f"{low:.2f}"}
     lines = [
         f"{labels.get(row, ''):>{LABEL}} {''.join(text for text, _ in runs)}".rstrip()
         for row, runs in enumerate(curves.lines())
     ]
-    first, second = ends
-    return "\n".join([title, *lines, f"{'':{LABEL}} {first}{second:>{WIDTH - len(first)}}"])
+    below = ""
+    for share, text in marks.items():
+        below = below.ljust(round(share * WIDTH) - (len(text) if share == 1.0 else 0)) + text
+    return "\n".join([title, *lines, " " * (LABEL + 1) + below])
 
 
 def _pid(folder: Path) -> str:
@@ -57,9 +64,9 @@ def _pid(folder: Path) -> str:
     with Bench(str(file), path=PATH) as bench:
         setpoint = np.where(np.arange(4000) < 2000, 1.0, 0.0)
         found = bench.run({"/pid.setpoint": setpoint})
-    ends = ("0 s: setpoint 1", "2 s: setpoint 0 (middle)    4 s")
+    marks = {0.0: "0 s: setpoint 1", 0.5: "2 s: setpoint 0", 1.0: "4 s"}
     return "\n\n".join(
-        [drawn("position", found["/plant.out"], ends), drawn("speed", found["/pid.effort"], ends)]
+        [drawn("position", found["/plant.out"], marks), drawn("speed", found["/pid.effort"], marks)]
     )
 
 
@@ -71,21 +78,23 @@ def _biquads(_: Path) -> str:
         response = np.abs(np.fft.rfft(bench.run({"in": impulse})["out"]))
     frequencies = np.geomspace(5.0, 400.0, 2 * WIDTH)
     spectrum = np.interp(frequencies, np.fft.rfftfreq(8192, DT), response)
-    decibels = np.maximum(20.0 * np.log10(spectrum), -60.0)
-    return drawn("gain of lowpass 50 0.707; notch 120 5", decibels, ("5 Hz", "400 Hz"), " dB")
+    decibels = np.round(20.0 * np.log10(spectrum), 2) + 0.0  # no -0
+    marks = {0.0: "5 Hz"}
+    marks |= {float(np.log(f / 5.0) / np.log(80.0)): f"{f} Hz" for f in (50, 120)}
+    return drawn("gain in dB of lowpass 50 0.707; notch 120 5", decibels, marks | {1.0: "400 Hz"})
 
 
 def _trajectory(_: Path) -> str:
     with Bench("rtcf_control/TrajectoryGenerator", path=PATH, initial="0", velocity="1",
                acceleration="4", jerk="40") as bench:  # fmt: skip
-        targets = np.zeros((1500, 1))
+        targets = np.zeros((2000, 1))
         targets[[0, 600], 0] = 1.0, 0.2
-        sent = np.isin(np.arange(1500), [0, 600])[:, None]
+        sent = np.isin(np.arange(2000), [0, 600])[:, None]
         found = bench.run({"target.position": MASKED.array(targets, mask=~sent)})
-    ends = ("0 s: target 1", "0.6 s: target 0.2       1.5 s")
+    marks = {0.0: "0 s: target 1", 0.3: "0.6 s: target 0.2", 1.0: "2 s"}
     names = {"position": "positions", "velocity": "velocities", "acceleration": "accelerations"}
     return "\n\n".join(
-        drawn(title, found[f"point.{name}"][:, 0], ends) for title, name in names.items()
+        drawn(title, found[f"point.{name}"][:, 0], marks) for title, name in names.items()
     )
 
 
@@ -93,9 +102,9 @@ def _joint_limiter(_: Path) -> str:
     with Bench("rtcf_control/JointLimiter", path=PATH, upper=1.0, max_velocity=2.0,
                deceleration=4.0) as bench:  # fmt: skip
         found = bench.run({"in": np.full(1200, 3.0), "position": 0.0})
-    ends = ("0 s: command 3, upper = 1", "1.2 s")
+    marks = {0.0: "0 s: command 3, upper = 1", 1.0: "1.2 s"}
     velocity = np.diff(found["out"], prepend=0.0) / DT
-    return "\n\n".join([drawn("out", found["out"], ends), drawn("velocity", velocity, ends)])
+    return "\n\n".join([drawn("out", found["out"], marks), drawn("velocity", velocity, marks)])
 
 
 PLOTS: dict[str, tuple[str, Callable[[Path], str]]] = {

@@ -218,7 +218,7 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
 
 def show_type(client: rtcf.Client, name: str, output: Output) -> None:
     """Print one component type of a package."""
-    package, slash, type_name = name.partition("/")
+    package, _, type_name = name.partition("/")
     if not (package and type_name) or "/" in type_name:
         raise ValueError(f"--type {name}: must be PKG/COMPONENT, e.g. rtcf_examples/Mimo")
     response = client.list_types(package)
@@ -240,9 +240,9 @@ def show_type(client: rtcf.Client, name: str, output: Output) -> None:
     if found.ports:
         print_ports(list(found.ports), output)
     if found.parameters:
-        print_parameters(list(found.parameters), output)
+        print_parameters(list(found.parameters), output, of_type=True)
     if found.states:
-        print_states(list(found.states), output)
+        print_states(list(found.states), output, of_type=True)
 
 
 def print_ports(ports: list[graph_pb2.PortInfo], output: Output) -> None:
@@ -267,15 +267,17 @@ def print_ports(ports: list[graph_pb2.PortInfo], output: Output) -> None:
     )
 
 
-def print_parameters(parameters: list[graph_pb2.ParameterInfo], output: Output) -> None:
-    """Print parameters with values and bounds."""
+def print_parameters(
+    parameters: list[graph_pb2.ParameterInfo], output: Output, *, of_type: bool = False
+) -> None:
+    """Print parameters with bounds, and with values unless they are those of a type."""
     output.table(
         ("parameter", "type", "value", "unit", "range", "default", "meaning"),
         (
             (
                 each.name,
                 each.type,
-                words.value(each.value),
+                "" if of_type else words.value(each.value),
                 each.unit,
                 _range(each),
                 words.value(each.default_value),
@@ -286,12 +288,21 @@ def print_parameters(parameters: list[graph_pb2.ParameterInfo], output: Output) 
     )
 
 
-def print_states(states: list[graph_pb2.StateInfo], output: Output) -> None:
-    """Print declared state with values."""
+def print_states(
+    states: list[graph_pb2.StateInfo], output: Output, *, of_type: bool = False
+) -> None:
+    """Print declared state, with values unless it is that of a type."""
     output.table(
         ("state", "type", "value", "unit", "initial", "meaning"),
         (
-            (each.name, each.type, each.value or "-", each.unit, each.initial, each.doc)
+            (
+                each.name,
+                each.type,
+                "" if of_type else each.value or "-",
+                each.unit,
+                each.initial,
+                each.doc,
+            )
             for each in states
         ),
     )

@@ -31,7 +31,7 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
             output.line(f"{each.package}/{each.type}  {each.doc}".rstrip(), "bold")
             print_ports(list(each.ports), output)
             if each.parameters:
-                print_parameters(list(each.parameters), output)
+                print_parameters(list(each.parameters), output, of_type=True)
     else:
         output.table(
             ("package", "type", "ports", "parameters", "description"),

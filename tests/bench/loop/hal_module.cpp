@@ -93,21 +93,23 @@ int hal_export_funct(const char*, void (*function)(void*, long), void* argument,
 int hal_pin_float_newf(int, volatile double** pin, int, const char* format, ...) {
     va_list words;
     va_start(words, format);
-    *pin = addTo(rtcf::bench::declared().numbers, rtcf::bench::formatted(format, words));
+    *pin =
+        rtcf::bench::addTo(rtcf::bench::declared().numbers, rtcf::bench::formatted(format, words));
     va_end(words);
     return 0;
 }
 int hal_pin_bit_newf(int, volatile bool** pin, int, const char* format, ...) {
     va_list words;
     va_start(words, format);
-    *pin = addTo(rtcf::bench::declared().bits, rtcf::bench::formatted(format, words));
+    *pin = rtcf::bench::addTo(rtcf::bench::declared().bits, rtcf::bench::formatted(format, words));
     va_end(words);
     return 0;
 }
 int hal_pin_u32_newf(int, volatile unsigned** pin, int, const char* format, ...) {
     va_list words;
     va_start(words, format);
-    *pin = addTo(rtcf::bench::declared().wholes, rtcf::bench::formatted(format, words));
+    *pin =
+        rtcf::bench::addTo(rtcf::bench::declared().wholes, rtcf::bench::formatted(format, words));
     va_end(words);
     return 0;
 }
