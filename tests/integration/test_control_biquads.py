@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+import rtcf
 from block_bench import PATH, Blocks, Stepped
-from rtcf import refusals
 from rtcf.testing import Bench
 from rtcf.v1 import runner_pb2
 from scipy import signal
@@ -158,7 +158,7 @@ def test_numbers_that_are_too_large_leave_output_and_state_as_they_are(blocks: B
 def test_sections_that_do_not_fit_are_rejected_with_one_line(
     blocks: Blocks, text: str, said: str
 ) -> None:
-    with pytest.raises(refusals.RefusedError) as error:
+    with pytest.raises(rtcf.RefusedError) as error:
         blocks.set("Biquads", sections=text)
     assert said in str(error.value)
     assert "\n" not in str(error.value)

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+import rtcf
 from block_bench import PATH, Blocks, Stepped
 from hypothesis import given, seed, settings
 from hypothesis import strategies as st
-from rtcf import refusals
 from rtcf.testing import Bench
 
 DT = 0.001
@@ -265,7 +265,7 @@ def test_a_counter_that_begins_again_is_a_beat(blocks: Blocks) -> None:
 def test_limits_that_do_not_fit_are_rejected_with_one_line(
     blocks: Blocks, component: str, parameters: dict[str, Any], said: str
 ) -> None:
-    with pytest.raises(refusals.RefusedError) as error:
+    with pytest.raises(rtcf.RefusedError) as error:
         blocks.set(component, **parameters)
     assert said in str(error.value)
     assert "\n" not in str(error.value)
@@ -347,7 +347,7 @@ def test_a_velocity_follows_the_braking_distance(blocks: Blocks) -> None:
 
 def test_soft_limits_bound_the_velocity_by_the_distance(blocks: Blocks) -> None:
     position = np.linspace(-2.0, 2.0, 801)
-    parameters = {"command": "velocity", "soft_lower": -1.0, "soft_upper": 1.0,
+    parameters: dict[str, Any] = {"command": "velocity", "soft_lower": -1.0, "soft_upper": 1.0,
                   "k_position": 4.0, "max_velocity": 2.0}  # fmt: skip
     up = blocks.out("JointLimiter", {"in": 9.0, "position": position}, **parameters)
     assert np.allclose(up, np.clip(4.0 * (1.0 - position), -2.0, 2.0), rtol=0, atol=ROUNDING)
@@ -357,7 +357,7 @@ def test_soft_limits_bound_the_velocity_by_the_distance(blocks: Blocks) -> None:
 
 def test_efforts_drive_an_excess_velocity_back(blocks: Blocks) -> None:
     velocity = np.linspace(-6.0, 6.0, 601)
-    parameters = {"command": "effort", "max_velocity": 3.0, "max_effort": 8.0}
+    parameters: dict[str, Any] = {"command": "effort", "max_velocity": 3.0, "max_effort": 8.0}
     inputs = {"position": 0.0, "velocity": velocity}
     out = blocks.out("JointLimiter", {"in": 9.0, **inputs}, k_velocity=5.0, **parameters)
     assert np.allclose(out, np.clip(5.0 * (3.0 - velocity), -8.0, 8.0), rtol=0, atol=ROUNDING)

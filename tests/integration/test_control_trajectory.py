@@ -18,10 +18,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+import rtcf
 from block_bench import PATH, Stepped
 from daemon_process import BUILD_TREE
 from pages import TREE
-from rtcf import refusals
 from rtcf.testing import Bench
 
 DT = 0.001
@@ -139,7 +139,7 @@ def test_nothing_is_written_before_a_measurement() -> None:
 def test_parameters_that_do_not_fit_are_rejected_with_one_line(
     stepped: Bench, parameters: dict[str, str], said: str
 ) -> None:
-    with pytest.raises(refusals.RefusedError) as error:
+    with pytest.raises(rtcf.RefusedError) as error:
         Stepped(
             stepped,
             "TrajectoryGenerator",
