@@ -98,10 +98,12 @@ class ChainReader {
                 "{} is not a section; use lowpass, highpass, bandpass, notch, lead_lag, "
                 "butterworth_lowpass or butterworth_highpass",
                 kind);
-        const char* const form = butterworth ? "ORDER FREQUENCY"
-                                 : lead_lag  ? "ZERO_FREQUENCY POLE_FREQUENCY"
-                                             : "FREQUENCY Q";
-        if (numbers.size() != 2) return fmt::format("write {} {}", kind, form);
+        if (numbers.size() != 2) {
+            const char* form = "FREQUENCY Q";
+            if (butterworth) form = "ORDER FREQUENCY";
+            if (lead_lag) form = "ZERO_FREQUENCY POLE_FREQUENCY";
+            return fmt::format("write {} {}", kind, form);
+        }
         if (butterworth) return butterworthSections(kind, numbers[0], numbers[1]);
         if (lead_lag) return leadLag(numbers[0], numbers[1]);
         return resonant(kind, numbers[0], numbers[1]);

@@ -71,10 +71,10 @@ class Heartbeat final : public rtcf::Component {
         stopped.write(latch_.value().stopped() || !begun_);
         state.write(begun_ ? latch_.value().state()
                            : static_cast<std::int32_t>(StopState::Waiting));
-        step();
+        countUp();
     }
 
-    void step() {
+    void countUp() {
         since_ += elapsed();
         const std::int64_t wanted = std::llround(interval * 1e9);
         if (since_ < wanted) return;

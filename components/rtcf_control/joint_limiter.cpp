@@ -104,16 +104,20 @@ class JointLimiter final : public rtcf::Component {
         velocity.read();
         if (in.read() == rtcf::DataStatus::None) return;
         const double wanted = in.value();
-        switch (command) {
+        switch (command.value()) {
             case Command::Position:
                 // Begins at the measured position, so that the joint does not jump.
                 if (!begun_ && has_position && !std::isfinite(position.value())) {
                     out.write(position.value());  // rejected by the check
                     return;
                 }
-                write(wanted, followed(wanted, begun_         ? last_.value()
-                                               : has_position ? position.value()
-                                                              : Range{lower, upper}.limit(wanted)));
+                if (begun_) {
+                    write(wanted, followed(wanted, last_));
+                } else {
+                    write(wanted,
+                          followed(wanted, has_position ? position.value()
+                                                        : Range{lower, upper}.limit(wanted)));
+                }
                 return;
             case Command::Velocity:
                 if (!usable(position, needsPosition())) return;

@@ -22,10 +22,8 @@ class Latch {
 
     /// Number to publish.
     std::int32_t state() const noexcept {
-        const StopState state = !stopped_ ? StopState::Running
-                                : fresh_  ? StopState::Resettable
-                                          : StopState::Stopped;
-        return static_cast<std::int32_t>(state);
+        if (!stopped_) return static_cast<std::int32_t>(StopState::Running);
+        return static_cast<std::int32_t>(fresh_ ? StopState::Resettable : StopState::Stopped);
     }
 
     /// Begins a stop.

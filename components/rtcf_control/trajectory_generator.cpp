@@ -5,11 +5,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
-#include <cstring>
 #include <limits>
 #include <memory>
 #include <string>
-#include <type_traits>
 #include <vector>
 
 #include <sensor_msgs/JointState.h>
@@ -73,7 +71,7 @@ class TrajectoryGenerator final : public rtcf::Component {
     enum class Kind : std::int64_t { Stop, Target };
 
     // The motion that is under way when there is no trajectory. It determines the plan, so that the
-    // plan itself is no state. No padding: it is compared byte by byte.
+    // plan itself is no state.
     struct Task {
         Kind kind = Kind::Stop;
         std::int64_t joints = 0;
@@ -103,6 +101,21 @@ class TrajectoryGenerator final : public rtcf::Component {
             velocity_limit[i] = limits.velocity;
             acceleration_limit[i] = limits.acceleration;
             jerk_limit[i] = limits.jerk;
+        }
+        bool operator!=(const Task& other) const {
+            if (kind != other.kind || joints != other.joints || begin_ns != other.begin_ns)
+                return true;
+            for (std::size_t i = 0; i < static_cast<std::size_t>(joints); ++i) {
+                if (position[i] != other.position[i] || velocity[i] != other.velocity[i] ||
+                    acceleration[i] != other.acceleration[i] ||
+                    target_position[i] != other.target_position[i] ||
+                    target_velocity[i] != other.target_velocity[i] ||
+                    velocity_limit[i] != other.velocity_limit[i] ||
+                    acceleration_limit[i] != other.acceleration_limit[i] ||
+                    jerk_limit[i] != other.jerk_limit[i])
+                    return true;
+            }
+            return false;
         }
         template <typename Visit>
         void fields(Visit&& visit) {
@@ -176,8 +189,6 @@ class TrajectoryGenerator final : public rtcf::Component {
             return range;
         }
     };
-    static_assert(std::is_trivially_copyable_v<Task>);
-    static_assert(sizeof(Task) == 3 * sizeof(std::int64_t) + 8 * sizeof(Numbers));
 
     // Follows from the state, or is lost with its object.
     struct Memory {
@@ -477,7 +488,7 @@ class TrajectoryGenerator final : public rtcf::Component {
     void makePlan() {
         Memory& memory = *memory_;
         Plan& made = memory.plans[memory.current];
-        if (std::memcmp(&made.task, &task_.value(), sizeof(Task)) != 0) made.make(task_);
+        if (made.task != task_.value()) made.make(task_);
     }
 
     // Stops all joints as fast as possible, from the present motion.
@@ -509,6 +520,8 @@ class TrajectoryGenerator final : public rtcf::Component {
             }
             clearPoints();
         }
+        // State that was set by hand may not fit.
+        if (task_->joints != static_cast<std::int64_t>(count())) stopFrom(last);
         makePlan();
     }
 

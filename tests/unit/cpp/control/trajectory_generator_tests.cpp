@@ -93,13 +93,13 @@ class Generator {
         bench.cycle();
         return now();
     }
-    Sample now() {
+    Sample now() const {
         const auto& point = *bench.read<trajectory_msgs::JointTrajectoryPoint>("point");
         return {point.positions, point.velocities, point.accelerations};
     }
-    bool done() { return *bench.read<bool>("done"); }
-    double progress() { return *bench.read<double>("progress"); }
-    std::uint32_t rejected() { return *bench.read<std::uint32_t>("rejected"); }
+    bool done() const { return *bench.read<bool>("done"); }
+    double progress() const { return *bench.read<double>("progress"); }
+    std::uint32_t rejected() const { return *bench.read<std::uint32_t>("rejected"); }
     // Runs until done; returns the number of cycles.
     int finish(int most = 100000) {
         int cycles = 0;
