@@ -24,7 +24,7 @@ class PolynomialSegment {
     PolynomialSegment() = default;
     /// @param begin    values that `kind` does not name are ignored
     /// @param end      values that `kind` does not name are ignored
-    /// @param kind     what both points give
+    /// @param kind     the values that both points have
     /// @param duration s; the segment is a step if it is not above zero
     PolynomialSegment(const Motion& begin, const Motion& end, PointKind kind,
                       double duration) noexcept RTCF_NONBLOCKING;

@@ -1,15 +1,15 @@
 // Plans synchronised motions that it reads from standard input, samples them finely, and prints
-// what a comparison with another planner needs. Used by compare_with_ruckig.py.
+// durations, errors and motions for compare_with_ruckig.py.
 //
 // A line of input is a case:
 //     axes fraction {position velocity acceleration  position velocity  velocity acceleration jerk}
 // with start, target and limits of each axis. A line of output is
 //     error duration excess gap rounding {shortest  position velocity acceleration}
 // with the PlanError, the duration in s, and, relative to limits and sizes of the motion,
-//     excess    by how much velocity or acceleration exceed the limits, or what the start makes
+//     excess    velocity or acceleration beyond the limits, or beyond the excess that the start makes
 //               unavoidable
-//     gap       by how much position, velocity and acceleration of two samples differ from what the
-//               largest jerk allows
+//     gap       steps of position, velocity and acceleration between two samples beyond those of the
+//               largest jerk
 //     rounding  the distance between the end of the last phase and the target
 // and of each axis the shortest duration of its own and the motion at the fraction of the duration.
 #include <algorithm>
