@@ -99,8 +99,8 @@ def test_joints_arrive_together_in_the_analytic_time(arm: Bench) -> None:
 def test_targets_that_change_while_moving_exceed_no_limit(arm: Bench, moving: bool) -> None:
     steps = 20_000
     draw = np.random.default_rng(29)
-    cycles = np.cumsum(draw.integers(1, 300, size=steps))
-    cycles = [int(each) for each in cycles if each < steps]
+    times = np.cumsum(draw.integers(1, 300, size=steps))
+    cycles = [int(each) for each in times if each < steps]
     inputs = {"target.position": rows_at({c: draw.uniform(-3, 3, 3) for c in cycles}, steps)}
     if moving:
         inputs["target.velocity"] = rows_at({c: draw.uniform(-2, 2, 3) for c in cycles}, steps)
