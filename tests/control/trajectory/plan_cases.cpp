@@ -6,10 +6,10 @@
 // with start, target and limits of each axis. A line of output is
 //     error duration excess gap rounding {shortest  position velocity acceleration}
 // with the PlanError, the duration in s, and, relative to limits and sizes of the motion,
-//     excess    velocity or acceleration beyond the limits, or beyond the excess that the start makes
-//               unavoidable
-//     gap       steps of position, velocity and acceleration between two samples beyond those of the
-//               largest jerk
+//     excess    velocity or acceleration beyond the limits, and beyond the excess that the start
+//               makes unavoidable
+//     gap       steps of position, velocity and acceleration between two samples, beyond those of
+//               the largest jerk
 //     rounding  the distance between the end of the last phase and the target
 // and of each axis the shortest duration of its own and the motion at the fraction of the duration.
 #include <algorithm>
