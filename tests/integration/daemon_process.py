@@ -12,6 +12,9 @@ from typing import Any
 import rtcf
 
 BUILD_TREE = Path(str(rtcf.__file__)).parents[2]
+# Starts a program that ends by Ctrl-C, also where tests run in the background or under nohup, which
+# ignore it. Not preexec_fn: a fork beside an open client hangs on Debian 13.
+MINDS_CTRL_C = ("env", "--default-signal=INT,HUP")
 DEADLINE_S = 60.0
 _POLL_S = 0.01
 

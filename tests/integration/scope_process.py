@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
-from daemon_process import BUILD_TREE, DEADLINE_S, Daemon, wait_for
+from daemon_process import BUILD_TREE, DEADLINE_S, MINDS_CTRL_C, Daemon, wait_for
 from rtcf.closing import Closing
 
 
@@ -29,10 +29,8 @@ class ScopeProcess(Closing):
         environment |= display or {}
         with log.open("wb") as to:
             self.process = subprocess.Popen(
-                [str(BUILD_TREE / "bin" / "rtcfctl"), "scope", *arguments],
+                [*MINDS_CTRL_C, str(BUILD_TREE / "bin" / "rtcfctl"), "scope", *arguments],
                 env=environment, stdin=subprocess.DEVNULL, stdout=to, stderr=to,
-                # Ctrl-C is ignored where tests run in the background.
-                preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
             )  # fmt: skip
 
         def said() -> str:

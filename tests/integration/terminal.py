@@ -5,12 +5,11 @@ import os
 import pty
 import re
 import select
-import signal
 import subprocess
 import termios
 import time
 
-from daemon_process import BUILD_TREE, DEADLINE_S, Daemon
+from daemon_process import BUILD_TREE, DEADLINE_S, MINDS_CTRL_C, Daemon
 
 _PIECE = re.compile(
     r"\x1b\[(?P<parameters>[0-9;?]*)(?P<final>[A-Za-z])|(?P<control>[\r\n])|(?P<text>[^\x1b\r\n]+)"
@@ -87,11 +86,10 @@ class Terminal:
         self._left = ""
         self.before = termios.tcgetattr(self.theirs)
         self.process = subprocess.Popen(
-            [BUILD_TREE / "bin" / "rtcfctl", *words],
+            # As the leader of a session with this terminal: a signal reports a new size.
+            ["setsid", "--ctty", *MINDS_CTRL_C, BUILD_TREE / "bin" / "rtcfctl", *words],
             env=daemon.environment() | {"NO_COLOR": "1"},
             stdin=self.theirs, stdout=self.theirs, stderr=self.theirs,
-            # As the leader of a session with this terminal: a signal reports a new size.
-            start_new_session=True, preexec_fn=self._take_terminal,
         )  # fmt: skip
         self.shown = b""
 
@@ -131,11 +129,6 @@ class Terminal:
         self._read()
         self._cells.resize(columns, lines)
         termios.tcsetwinsize(self._ours, (lines, columns))
-
-    def _take_terminal(self) -> None:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
-        # The first terminal that a session leader opens becomes its controlling terminal.
-        os.close(os.open(os.ttyname(self.theirs), os.O_RDWR))
 
     def _read(self) -> None:
         for _ in range(1000):

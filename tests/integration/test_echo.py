@@ -6,7 +6,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from daemon_process import BUILD_TREE, Daemon, clean_environment
+from daemon_process import BUILD_TREE, MINDS_CTRL_C, Daemon, clean_environment
 
 
 def test_json_has_a_line_per_cycle(running: Daemon) -> None:
@@ -47,11 +47,18 @@ def test_errors_are_one_line(running: Daemon, words: tuple[str, ...], code: int,
 
 def test_ctrl_c_ends_it(running: Daemon) -> None:
     process = subprocess.Popen(
-        [BUILD_TREE / "bin" / "rtcfctl", "--socket", running.socket, "echo", "wave", "-o", "json"],
+        [
+            *MINDS_CTRL_C,
+            BUILD_TREE / "bin" / "rtcfctl",
+            "--socket",
+            running.socket,
+            "echo",
+            "wave",
+            "-o",
+            "json",
+        ],
         stdout=subprocess.PIPE,
         env=clean_environment(),
-        # Ctrl-C is ignored in a shell's background job and under nohup.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
     assert process.stdout is not None
     assert process.stdout.readline()
@@ -66,12 +73,11 @@ def test_a_note_says_that_the_loop_does_not_run(running: Daemon, tmp_path: Path,
     assert running.ctl("stop").returncode == 0
     words = ["-o", str(tmp_path / "run.mcap")] if verb == "record" else []
     process = subprocess.Popen(
-        [BUILD_TREE / "bin" / "rtcfctl", "--socket", running.socket, verb, *words],
+        [*MINDS_CTRL_C, BUILD_TREE / "bin" / "rtcfctl", "--socket", running.socket, verb, *words],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
         env=clean_environment(),
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )
     assert process.stderr is not None
     assert process.stderr.readline() == (

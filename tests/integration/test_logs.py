@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import pytest
 import rtcf
-from daemon_process import BUILD_TREE, Daemon, clean_environment, wait_for
+from daemon_process import BUILD_TREE, MINDS_CTRL_C, Daemon, clean_environment, wait_for
 from rtcf.streams.logs import LogStream
 from rtcf.streams.numbered import Lost, Place
 from rtcf.v1 import control_pb2, runner_pb2
@@ -122,11 +122,9 @@ def test_logs_are_printed_as_text_and_json(daemon: Daemon, client: rtcf.Client) 
 def test_following_continues_until_ctrl_c(daemon: Daemon, client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_examples", "Wave", name="wave"))
     process = subprocess.Popen(
-        [BUILD_TREE / "bin" / "rtcfctl", "--socket", daemon.socket, "logs", "wave", "-f",
-         "-o", "json"],
+        [*MINDS_CTRL_C, BUILD_TREE / "bin" / "rtcfctl", "--socket", daemon.socket, "logs", "wave",
+         "-f", "-o", "json"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=clean_environment(),
-        # Ctrl-C is ignored in a shell's background job and under nohup.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )  # fmt: skip
     assert process.stdout is not None
     assert "configured" in json.loads(process.stdout.readline())["message"]

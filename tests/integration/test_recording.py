@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 import rtcf
-from daemon_process import BUILD_TREE, Daemon, clean_environment, wait_for
+from daemon_process import BUILD_TREE, MINDS_CTRL_C, Daemon, clean_environment, wait_for
 
 # MCAP's reference reader, which is not in Debian.
 _MCAP = ("mcap==1.6.0", "lz4==4.4.5", "zstandard==0.25.0")
@@ -69,9 +69,16 @@ def _recorded(daemon: Daemon, file: Path, *words: str) -> None:
 def _begun(daemon: Daemon, file: Path) -> subprocess.Popen[bytes]:
     """Return a rtcfctl that records and has written some cycles."""
     process = subprocess.Popen(
-        [BUILD_TREE / "bin" / "rtcfctl", "--socket", daemon.socket, "record", "-o", file],
+        [
+            *MINDS_CTRL_C,
+            BUILD_TREE / "bin" / "rtcfctl",
+            "--socket",
+            daemon.socket,
+            "record",
+            "-o",
+            file,
+        ],
         env=clean_environment(),
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
         stdout=subprocess.PIPE,
     )
     wait_for(lambda: file.exists() and file.stat().st_size > 20_000, "a chunk in the file")
@@ -303,12 +310,11 @@ def test_consecutive_files_miss_no_cycle(
 ) -> None:
     files = [tmp_path / name for name in ("run.mcap", "run-1.mcap", "run-2.mcap")]
     process = subprocess.Popen(
-        [BUILD_TREE / "bin" / "rtcfctl", "--socket", running.socket, "record", "-o", files[0],
-         *bound, "--split"],
+        [*MINDS_CTRL_C, BUILD_TREE / "bin" / "rtcfctl", "--socket", running.socket, "record", "-o",
+         files[0], *bound, "--split"],
         env=clean_environment(),
         stdout=subprocess.PIPE,
         text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )  # fmt: skip
     wait_for(lambda: files[2].exists(), "the third file")
     process.send_signal(signal.SIGINT)
@@ -400,14 +406,9 @@ def test_a_signal_interrupts_no_write(
     reader = os.open(disk, os.O_RDONLY | os.O_NONBLOCK)
     fcntl.fcntl(reader, fcntl.F_SETPIPE_SZ, 4096)
     process = subprocess.Popen(
-        [BUILD_TREE / "bin" / "rtcfctl", "--socket", running.socket, "record", "-o", disk,
-         "--force"],
+        [*MINDS_CTRL_C, BUILD_TREE / "bin" / "rtcfctl", "--socket", running.socket, "record", "-o",
+         disk, "--force"],
         env=clean_environment(),
-        # These signals are ignored where tests run in the background, or under nohup.
-        preexec_fn=lambda: (
-            signal.signal(signal.SIGINT, signal.default_int_handler),
-            signal.signal(signal.SIGHUP, signal.SIG_DFL),
-        ),
     )  # fmt: skip
     writer = os.open(disk, os.O_WRONLY)
     wait_for(lambda: not select.select([], [writer], [], 0)[1], "a full disk")

@@ -11,7 +11,7 @@ from pathlib import Path
 import fig_1
 import pytest
 import rtcf
-from daemon_process import BUILD_TREE, Daemon, wait_for
+from daemon_process import BUILD_TREE, MINDS_CTRL_C, Daemon, wait_for
 from rtcf.v1 import runner_pb2
 from values import iteration, number, port_value, state, wait_until_after
 
@@ -146,12 +146,10 @@ def endless_step(daemon: Daemon, client: rtcf.Client) -> Iterator["subprocess.Po
     """Yield the client of a running step, and wait for its end."""
     client.load(rtcf.component("rtcf_test", "Counter", name="steady"))
     with subprocess.Popen(
-        [BUILD_TREE / "bin" / "rtcfctl", "step", str(10**15)],
+        [*MINDS_CTRL_C, BUILD_TREE / "bin" / "rtcfctl", "step", str(10**15)],
         env=daemon.environment(),
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
-        # Ctrl-C is ignored in a shell's background job.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     ) as caller:
         wait_for(lambda: iteration(client) > 1000, "cycles")
         yield caller

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 import rtcf
-from daemon_process import BUILD_TREE, Daemon, clean_environment, wait_for
+from daemon_process import BUILD_TREE, MINDS_CTRL_C, Daemon, clean_environment, wait_for
 from rtcf.v1 import runner_pb2
 
 Event = dict[str, Any]
@@ -42,10 +42,9 @@ def cycles(events: list[Event]) -> list[Event]:
 def tracing(daemon: Daemon, file: Path, expected: int = 0) -> Iterator[None]:
     """Trace during the block, until Ctrl-C."""
     process = subprocess.Popen(
-        [BUILD_TREE / "bin" / "rtcfctl", "--socket", daemon.socket, "trace", "-o", file],
+        [*MINDS_CTRL_C, BUILD_TREE / "bin" / "rtcfctl", "--socket", daemon.socket, "trace", "-o",
+         file],
         stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, env=clean_environment(),
-        # Ctrl-C is ignored in a shell's background job and under nohup.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )  # fmt: skip
 
     def begun() -> bool:
