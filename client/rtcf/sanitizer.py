@@ -8,7 +8,7 @@ from itertools import zip_longest
 _BEGIN = re.compile(r"^==\d+==ERROR: RealtimeSanitizer: (\S+)")
 _CALLED = re.compile(r"(?:unsafe function|blocking function) `(.*)` in real-time context")
 _FRAME = re.compile(r"^\s+#(\d+) 0x[0-9a-f]+ (?:in (.*)|\((.*)\))$")
-_PLACE = re.compile(r"^(.*?) (/[^:]*|[^:\s]+\.\w+):(\d+)(?::\d+)?$")
+_PLACE = re.compile(r"^(.*?) (/[^:]*|[^:\s]+\.\w+):(\d+)(?::\d+)?(?: \(discriminator \d+\))?$")
 _FILE_ONLY = re.compile(r"^(.*?) (?:/\S+\.\w+|\?\?:[?0])$")
 _MODULE = re.compile(r"^(.*?) \((\S+)\)(?: \(BuildId: .*\))?$")
 _BUILD_ID = re.compile(r" \(BuildId: [0-9a-f]*\)$")

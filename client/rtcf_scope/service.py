@@ -127,10 +127,13 @@ async def serve(given: Options, ready: Callable[[str, Door], None]) -> None:
                     f"cannot listen on {given.address} port {given.port}: {error.strerror}: "
                     "choose another --port"
                 ) from None
-            async with server:
+            try:
                 port = server.sockets[0].getsockname()[1]
                 ready(f"http://{_called(given)}:{port}/", door)
                 await ended.wait()
+            finally:
+                # Without wait_closed(): since Python 3.12, it waits for the pages' connections.
+                server.close()
         finally:
             site.close()
             await running.server.shutdown(_END_S)

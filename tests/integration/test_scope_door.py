@@ -335,8 +335,8 @@ DEEP = b"[" * 60_000
         (lambda scope: _good(scope, b"/api/layouts/" + b"%F0%9D%92%9C" * 64), 400),
         (lambda scope: _good(scope, b"/api/recordings/%ff/columns?trace=%ff"), 400),
         (lambda scope: _good(scope, b"/api/nowhere"), 404),
-        (lambda scope: _good(scope, b"/api/nowhere\xff"), 404),
-        (lambda scope: _good(scope, b"/page/main.js\xff"), 404),
+        (lambda scope: _good(scope, b"/api/nowhere\xff"), (400, 404)),
+        (lambda scope: _good(scope, b"/page/main.js\xff"), (400, 404)),
         (lambda scope: _good(scope, b"/page/%ff%0a"), 404),
         (lambda scope: _good(scope, b"/api/about", b"DELETE"), 405),
         (lambda scope: _good(scope, b"/stream"), 400),
@@ -355,10 +355,13 @@ DEEP = b"[" * 60_000
     ],
 )  # fmt: skip
 def test_invalid_requests_are_rejected_in_one_line(
-    scope: ScopeProcess, make: Callable[[ScopeProcess], list[bytes]], expected: int | None
+    scope: ScopeProcess,
+    make: Callable[[ScopeProcess], list[bytes]],
+    expected: int | tuple[int, int] | None,  # of aiohttp in Debian 13 and 12; None: any
 ) -> None:
     status = _is_in_order(scope, _request(*make(scope)))
-    assert expected in (None, status)
+    if expected is not None:
+        assert status in (expected if isinstance(expected, tuple) else (expected,))
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ Intercepted call to real-time unsafe function `malloc` in real-time context!
     #0 0x55d0 in malloc (/usr/lib/rtcf/rtcf-executor-rtsan+0xf0a2d) (BuildId: 09ab)
     #1 0x7f12 in operator new(unsigned long) (/lib/libstdc++.so.6+0xa1) (BuildId: 77)
     #2 0x7f13 in (anonymous namespace)::Pid::grow(int) /src/my pkg/pid.cpp:22:40
-    #3 0x7f14 in Base::update() /src/base.hpp:7
+    #3 0x7f14 in Base::update() /src/base.hpp:7 (discriminator 8)
     #4 0x55d1 in rtcf::executor::(anonymous namespace)::call(rtcf::Component&) /b/loop.cpp:90:20
     #5 0x7f15  (<unknown module>)
 
