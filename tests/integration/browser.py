@@ -2,6 +2,7 @@
 
 import asyncio
 import base64
+import contextlib
 import os
 import subprocess
 import time
@@ -75,6 +76,10 @@ class Browser(Closing):
         return self._loop.run_until_complete(asyncio.wait_for(what, DEADLINE_S))
 
 
+class _NavigatedError(Exception):
+    """The page went to another address before it answered."""
+
+
 class Page:
     """One page of the browser."""
 
@@ -107,12 +112,15 @@ class Page:
     def wait(self, expression: str) -> Any:
         """Return the value of an expression once it is true."""
         deadline = time.monotonic() + DEADLINE_S
-        while not (found := self.ask(f"(() => {{ try {{ return {expression} }} catch {{ }} }})()")):
+        asked = f"(() => {{ try {{ return {expression} }} catch {{ }} }})()"
+        while True:
+            with contextlib.suppress(_NavigatedError):
+                if found := self.ask(asked):
+                    return found
             assert time.monotonic() < deadline, f"waited for {expression}; the page says: " + str(
                 self.ask("document.body.innerText.slice(0, 600)")
             )
             time.sleep(_POLL_S)
-        return found
 
     def picture(self, file: Path) -> None:
         """Write a screenshot as PNG."""
@@ -152,6 +160,8 @@ class Page:
             ):
                 self.errors.append(str(told["params"]["entry"]["text"]))
             if told.get("id") == number:
+                if "navigated" in told.get("error", {}).get("message", ""):
+                    raise _NavigatedError
                 assert "error" not in told, told["error"]
                 return told["result"]
 
