@@ -208,12 +208,7 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         output.line(f"  fault: {_fault(found)}", "bold red")
     if notes := _notes(found.spec, found.holder):
         output.line(f"  {notes}")
-    if found.ports:
-        print_ports(list(found.ports), output)
-    if found.parameters:
-        print_parameters(list(found.parameters), output)
-    if found.states:
-        print_states(list(found.states), output)
+    _print_members(found, output)
 
 
 def show_type(client: rtcf.Client, name: str, output: Output) -> None:
@@ -237,12 +232,22 @@ def show_type(client: rtcf.Client, name: str, output: Output) -> None:
     if found.doc:
         output.line(f"  {found.doc}")
     output.line(f"  from {found.library}")
+    _print_members(found, output, of_type=True)
+
+
+def _print_members(
+    found: graph_pb2.ComponentInfo | graph_pb2.ComponentType,
+    output: Output,
+    *,
+    of_type: bool = False,
+) -> None:
+    """Print ports, parameters and declared state, as far as there are any."""
     if found.ports:
         print_ports(list(found.ports), output)
     if found.parameters:
-        print_parameters(list(found.parameters), output, of_type=True)
+        print_parameters(list(found.parameters), output, of_type=of_type)
     if found.states:
-        print_states(list(found.states), output, of_type=True)
+        print_states(list(found.states), output, of_type=of_type)
 
 
 def print_ports(ports: list[graph_pb2.PortInfo], output: Output) -> None:

@@ -129,7 +129,7 @@ void AxisMotion::prepare(const Motion& begin, const MotionTarget& target,
     }
     return_duration_ = return_.duration();
 
-    // What the tolerance of the limit lets pass stays the limit.
+    // A velocity within the tolerance of the limit becomes the limit.
     const double eased = returned_.easedVelocity(limits.jerk);
     const double over = std::max({limits.velocity, eased, target.velocity});
     const double under = std::max({limits.velocity, -eased, -target.velocity});

@@ -8,8 +8,8 @@
 
 namespace rtcf_control {
 
-/// What a point of a trajectory gives besides the position. A trajectory_msgs/JointTrajectoryPoint
-/// without velocities or accelerations has empty lists of them.
+/// The values of a point of a trajectory. A trajectory_msgs/JointTrajectoryPoint without velocities
+/// or accelerations has empty lists of them.
 enum class PointKind { Position, PositionVelocity, PositionVelocityAcceleration };
 
 /// A polynomial of the time between two points: a quintic one if both give accelerations, a cubic
@@ -45,7 +45,7 @@ class PolynomialSegment {
     double duration_ = 0.0;
 };
 
-/// What two points both give. Real-time safe.
+/// The values that both points have. Real-time safe.
 [[nodiscard]] constexpr PointKind commonKind(PointKind one, PointKind other) noexcept {
     return one < other ? one : other;
 }

@@ -9,7 +9,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstdint>
 #include <cstdio>
 #include <exception>
 #include <functional>
@@ -19,11 +18,13 @@
 #include <vector>
 
 #include "hal_module.hpp"
+#include "median.hpp"
 #include "rtcf/test.hpp"
 
 namespace {
 
 using rtcf::bench::HalModule;
+using rtcf::bench::median;
 using rtcf::test::Bench;
 
 constexpr int kRounds = 201;
@@ -81,12 +82,6 @@ struct Contest {
     std::function<double()> difference;  // of the outputs; empty: other laws
     int settling = 0;                    // cycles without a comparison
 };
-
-double median(std::vector<double> values) {
-    std::nth_element(values.begin(),
-                     values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-    return values[values.size() / 2];
-}
 
 // ns per update
 double timed(const Contest& contest, const std::function<void()>& update) {

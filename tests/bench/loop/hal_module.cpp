@@ -7,14 +7,13 @@
 #include <cstddef>
 #include <cstdio>
 #include <cstdlib>
-#include <cstring>
 #include <map>
 #include <stdexcept>
 
 namespace rtcf::bench {
 namespace {
 
-// What the modules of this process have declared.
+// Pins and functions of the modules of this process.
 struct Declared {
     std::map<std::string, volatile double*> numbers;
     std::map<std::string, volatile bool*> bits;

@@ -20,9 +20,12 @@
 #include <utility>
 #include <vector>
 
+#include "median.hpp"
 #include "rtcf/component.hpp"
 
 namespace {
+
+using rtcf::bench::median;
 
 constexpr int kRounds = 201;
 constexpr int kUpdates = 1000;       // per round
@@ -222,12 +225,6 @@ class Contender {
     std::vector<rtcf::OutputBase*> outputs_;
     std::size_t written_ = 0;
 };
-
-double median(std::vector<double> values) {
-    std::nth_element(values.begin(),
-                     values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
-    return values[values.size() / 2];
-}
 
 // Medians over the rounds of one contender.
 class Times {

@@ -49,7 +49,7 @@ void expectSmooth(const SynchronizedMotion& motion, std::size_t axis, const Axis
         const Motion now = motion.at(axis, i < kSamples ? i * h : duration);
         ASSERT_LE(std::abs(now.velocity), largest_velocity * (1.0 + 1e-9));
         ASSERT_LE(std::abs(now.acceleration), largest_acceleration * (1.0 + 1e-9));
-        // What the largest jerk allows in the time.
+        // The steps of the largest jerk in the time.
         const double da = now.acceleration - last.acceleration;
         const double dv = now.velocity - last.velocity - h * last.acceleration;
         const double dp =
