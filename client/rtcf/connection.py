@@ -2,13 +2,14 @@
 
 import os
 import time
-from collections.abc import Callable
-from typing import Any
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from types import TracebackType
+from typing import Any, Self
 
 import grpc
 
 from rtcf import failures
-from rtcf.closing import Closing
 from rtcf.errors import DaemonUnreachableError, RefusedError
 from rtcf.v1 import control_pb2, control_pb2_grpc
 
@@ -42,8 +43,32 @@ def default_socket() -> str:
     return os.environ.get("RTCF_SOCKET") or DEFAULT_SOCKET
 
 
+class Closing(ABC):
+    """Calls close() at the end of a `with` statement, also after an exception."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Release all resources; a second call does nothing."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
 class Connection(Closing):
-    """A connection to rtcfd, opened by the first call; thread-safe."""
+    """A channel to rtcfd, opened by the first call; thread-safe; owned by a Client.
+
+    stub  has a method for each call of rtcf.v1.Control, which are the `method` below
+
+    Calls raise RefusedError, DaemonUnreachableError or RtcfError.
+    """
 
     def __init__(self, socket: str | os.PathLike[str] | None = None) -> None:
         self.socket = os.path.abspath(socket if socket is not None else default_socket())
@@ -53,18 +78,22 @@ class Connection(Closing):
                 "path"
             )
         self._channel = grpc.insecure_channel(f"unix:{self.socket}", options=_OPTIONS)
-        self._stub: Any = control_pb2_grpc.ControlStub(self._channel)  # type: ignore[no-untyped-call]
+        self.stub: Any = control_pb2_grpc.ControlStub(self._channel)  # type: ignore[no-untyped-call]
 
     def close(self) -> None:
         """Close the connection."""
         self._channel.close()
 
-    def _pages(self, method: Any, request: Any, field: str) -> list[Any]:
+    def ask(self, method: Any, request: Any, timeout_s: float | None = QUERY_TIMEOUT_S) -> Any:
+        """Make a call with one response; return it."""
+        return self._with_retries(lambda: method(request, timeout=timeout_s), _CROWDED_S)
+
+    def pages(self, method: Any, request: Any, field: str) -> list[Any]:
         """Return a whole list; start again if it changes between two pages."""
         found: list[Any] = []
         while True:
             try:
-                response = self._ask(method, request)
+                response = self.ask(method, request)
             except RefusedError as refused:
                 if refused.reason != "LIST_CHANGED":
                     raise
@@ -76,26 +105,40 @@ class Connection(Closing):
             if not request.page_token:
                 return found
 
-    def _ask(self, method: Any, request: Any, timeout_s: float | None = QUERY_TIMEOUT_S) -> Any:
-        until = time.monotonic() + _CROWDED_S
-        while True:
-            try:
-                return method(request, timeout=timeout_s)
-            except grpc.RpcError as error:
-                if not self._crowded(error, until):
-                    raise failures.from_grpc(error, self.socket) from None
+    def stream(self, method: Any, request: Any, timeout_s: float | None = None) -> Iterator[Any]:
+        """Yield the responses of a call."""
+        try:
+            yield from method(request, timeout=timeout_s)
+        except grpc.RpcError as error:
+            raise failures.from_grpc(error, self.socket) from None
 
-    def _crowded(self, error: Any, until: float) -> bool:
-        """Return whether to retry because the listen queue was full, after a short pause.
+    def change(
+        self,
+        method: Any,
+        request: Any,
+        on_progress: OnProgress | None,
+        timeout_s: float | None = CHANGE_TIMEOUT_S,
+        *,
+        patient: bool = True,
+    ) -> Any:
+        """Make a call with progress messages; return its last message.
 
-        gRPC does not wait for a place in the queue.
+        With `patient`, the call waits for a place in the listen queue.
         """
-        if time.monotonic() > until or not failures.is_crowded(error, self.socket):
-            return False
-        time.sleep(_RETRY_S)
-        return True
 
-    def _changed(
+        def change() -> Any:
+            last: Any = None
+            # With the time of the request, an rtcfd that was frozen can reject a request older than
+            # a stop at the executor.
+            asked = (("rtcf-asked-ns", str(time.monotonic_ns())),)
+            for last in method(request, timeout=timeout_s, metadata=asked):
+                if on_progress is not None and last.WhichOneof("kind") == "progress":
+                    on_progress(last.progress)
+            return last
+
+        return self._with_retries(change, _CROWDED_S if patient else 0.0)
+
+    def changed(
         self,
         method: Any,
         request: Any,
@@ -104,36 +147,17 @@ class Connection(Closing):
         *,
         patient: bool = True,
     ) -> control_pb2.ChangeResult:
-        last = self._change(method, request, on_progress, timeout_s, patient=patient)
+        """Do the same as change(); return only the result in the last message."""
+        last = self.change(method, request, on_progress, timeout_s, patient=patient)
         return last.result  # type: ignore[no-any-return]
 
-    def _change(
-        self,
-        method: Any,
-        request: Any,
-        on_progress: OnProgress | None,
-        timeout_s: float | None = CHANGE_TIMEOUT_S,
-        *,
-        patient: bool = True,
-    ) -> Any:
-        """Make a call with progress messages; return its last message."""
-        until = time.monotonic() + (_CROWDED_S if patient else 0.0)
+    def _with_retries(self, call: Callable[[], Any], patience_s: float) -> Any:
+        """Repeat a call while the listen queue of rtcfd's socket is full: gRPC does not wait."""
+        until = time.monotonic() + patience_s
         while True:
             try:
-                return self._change_once(method, request, on_progress, timeout_s)
+                return call()
             except grpc.RpcError as error:
-                if not self._crowded(error, until):
+                if time.monotonic() > until or not failures.is_crowded(error, self.socket):
                     raise failures.from_grpc(error, self.socket) from None
-
-    @staticmethod
-    def _change_once(
-        method: Any, request: Any, on_progress: OnProgress | None, timeout_s: float | None
-    ) -> Any:
-        last: Any = None
-        # With the time of the request, an rtcfd that was frozen can reject a request older than a
-        # stop at the executor.
-        asked = (("rtcf-asked-ns", str(time.monotonic_ns())),)
-        for last in method(request, timeout=timeout_s, metadata=asked):
-            if on_progress is not None and last.WhichOneof("kind") == "progress":
-                on_progress(last.progress)
-        return last
+            time.sleep(_RETRY_S)

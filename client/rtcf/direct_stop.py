@@ -68,7 +68,7 @@ def stop(runner: str, socket: str) -> Stopped:
     )
 
 
-def where_rtcfd_does_not(
+def stop_with_fallback(
     ask: Callable[[Callable[[str], None]], control_pb2.ChangeResult],
     runner: str,
     socket: str,

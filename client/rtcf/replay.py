@@ -12,10 +12,9 @@ from typing import Any
 
 from rtcf_shared.whole_file import whole_file
 
-from rtcf.client import Client
+from rtcf.client import Client, ReplayCall
 from rtcf.recording import bags
 from rtcf.recording.reader import RecordingError
-from rtcf.replay_call import ReplayCall
 from rtcf.v1 import control_pb2
 
 # Of one request; far below the maximum size of a message.

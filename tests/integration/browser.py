@@ -11,7 +11,7 @@ from typing import Any
 
 import aiohttp
 from daemon_process import DEADLINE_S, wait_for
-from rtcf.closing import Closing
+from rtcf.connection import Closing
 
 _POLL_S = 0.05
 

@@ -12,7 +12,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from daemon_process import BUILD_TREE, DEADLINE_S, MINDS_CTRL_C, Daemon, wait_for
-from rtcf.closing import Closing
+from rtcf.connection import Closing
 
 
 class ScopeProcess(Closing):

@@ -9,15 +9,14 @@ import pytest
 import rtcf
 from daemon_process import Daemon, stopped, wait_for
 from fig_1 import mimo
-from rtcf.streams.events import EventStream
-from rtcf.streams.numbered import Lost, Place
+from rtcf.streams.numbered import Lost, NumberedStream, Place
 from rtcf.v1 import control_pb2, runner_pb2
 
 Event = control_pb2.Event
 
 
 def until(
-    stream: EventStream, condition: Callable[[control_pb2.Event], bool]
+    stream: NumberedStream[control_pb2.Event], condition: Callable[[control_pb2.Event], bool]
 ) -> list[control_pb2.Event]:
     """Return the events up to a condition; fails if the daemon ends."""
     found = []

@@ -9,8 +9,7 @@ from collections.abc import Callable
 import pytest
 import rtcf
 from daemon_process import BUILD_TREE, MINDS_CTRL_C, Daemon, clean_environment, wait_for
-from rtcf.streams.logs import LogStream
-from rtcf.streams.numbered import Lost, Place
+from rtcf.streams.numbered import Lost, NumberedStream, Place
 from rtcf.v1 import control_pb2, runner_pb2
 
 Record = control_pb2.LogRecord
@@ -18,7 +17,8 @@ KEPT = 4096
 
 
 def until(
-    stream: LogStream, condition: Callable[[control_pb2.LogRecord], bool]
+    stream: NumberedStream[control_pb2.LogRecord],
+    condition: Callable[[control_pb2.LogRecord], bool],
 ) -> control_pb2.LogRecord:
     """Return the first record that fulfils a condition; fails if the daemon ends."""
     for record in stream:

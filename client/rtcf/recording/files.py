@@ -8,7 +8,7 @@ from typing import BinaryIO, TypeVar
 from rtcf_shared.errors import RtcfError
 from rtcf_shared.whole_file import whole_file
 
-from rtcf.closing import Closing
+from rtcf.connection import Closing
 from rtcf.recording.mcap_writer import McapWriter
 from rtcf.recording.recorder import Recorder
 from rtcf.streams.ports import PortBatch

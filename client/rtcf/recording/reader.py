@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from rtcf_shared.arrays import as_list
 from rtcf_shared.errors import RtcfError
 
-from rtcf.closing import Closing
+from rtcf.connection import Closing
 from rtcf.recording import mcap_writer as mcap
 from rtcf.recording.fields import Fields
 from rtcf.streams import ros_layout

@@ -1,6 +1,5 @@
 """A stream of numbered entries; lost entries are counted."""
 
-from abc import abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
@@ -8,7 +7,7 @@ from typing import Any, Generic, TypeVar
 import grpc
 
 from rtcf import failures
-from rtcf.closing import Closing
+from rtcf.connection import Closing
 
 Entry = TypeVar("Entry")
 
@@ -39,13 +38,24 @@ class NumberedStream(Closing, Generic[Entry]):
     """
 
     def __init__(
-        self, method: Any, socket: str, request: Any, after: Place | None, until_now: bool
+        self,
+        method: Any,
+        socket: str,
+        request: Any,
+        after: Place | None,
+        until_now: bool,
+        entries: str,
     ) -> None:
+        """Open the stream; called by Client.watch_events and watch_logs.
+
+        entries  the field of a response that holds its entries
+        """
         request.until_now = until_now
         if after is not None:
             request.after, request.log_id = after.sequence, after.log_id
         self.place = after or Place()
         self._socket = socket
+        self._field = entries
         self._call = method(request)
         self._waiting: list[Entry | Lost] = []
         self._fetch()  # from now on no entry is missed
@@ -61,10 +71,6 @@ class NumberedStream(Closing, Generic[Entry]):
         """End the stream; callable from any thread."""
         self._call.cancel()
 
-    @abstractmethod
-    def _entries(self, response: Any) -> Iterator[Entry]:
-        """Return the entries of a message."""
-
     def _fetch(self) -> bool:
         """Receive the next message; return whether there was one."""
         try:
@@ -78,5 +84,5 @@ class NumberedStream(Closing, Generic[Entry]):
         self.place = Place(response.log_id, response.sequence)
         if response.lost:
             self._waiting.append(Lost(response.lost))
-        self._waiting.extend(self._entries(response))
+        self._waiting.extend(getattr(response, self._field))
         return True

@@ -9,7 +9,7 @@ import grpc
 from rtcf_shared.errors import RtcfError
 
 from rtcf import failures
-from rtcf.closing import Closing
+from rtcf.connection import Closing
 from rtcf.streams import ros_layout
 from rtcf.v1 import ports_pb2
 

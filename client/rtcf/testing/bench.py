@@ -22,7 +22,7 @@ from rtcf_shared.value_text import parse
 
 import rtcf
 from rtcf.client import DEFAULT_RUNNER, Client
-from rtcf.closing import Closing
+from rtcf.connection import Closing
 from rtcf.private_daemon import PrivateDaemon, component_folders, program
 from rtcf.streams.numbered import Place
 from rtcf.testing import messages

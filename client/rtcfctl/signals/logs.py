@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import rtcf
-from rtcf.streams.logs import LEVELS
+from rtcf.client import LOG_LEVELS
 from rtcf.streams.numbered import Lost, Place
 from rtcf.v1 import control_pb2
 
@@ -39,7 +39,7 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     )
     verb.add_argument(
         "--level",
-        choices=LEVELS,
+        choices=LOG_LEVELS,
         default="debug",
         help="show records of this level or above (default: debug)",
     )

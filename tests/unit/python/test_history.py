@@ -176,7 +176,9 @@ def test_a_parameter_changed_since_is_not_undone(client: rtcf.Client) -> None:
 def test_apply_records_its_changes(client: rtcf.Client) -> None:
     for text in ("kp:=1.5", "kp:=1.5", "kp:=2.0"):
         spec = rtcf.component("demo", "Fine", name="pid", parameters=[text])
-        client._change(client._stub.Apply, control_pb2.ApplyRequest(components=[spec]), None)
+        client._connection.change(
+            client._stub.Apply, control_pb2.ApplyRequest(components=[spec]), None
+        )
     assert [each.value.double_value for each in client.get_history("pid")] == [1.5, 2.0]
 
 
