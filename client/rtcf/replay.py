@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rtcf_shared.whole_file import whole_file
+from rtcf_shared.whole_files import whole_file
 
 from rtcf.client import Client, ReplayCall
 from rtcf.recording import bags

@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from rtcf_shared import durable
+from rtcf_shared import whole_files
 
 MOST_BYTES = 64 * 1024
 MOST = 200
@@ -50,7 +50,7 @@ class Layouts:
             if not file.exists() and len(self.names()) >= MOST:
                 raise LayoutError(f"limit of {MOST} layouts reached: remove some")
             self._folder.mkdir(parents=True, exist_ok=True)
-            durable.replace(file, text.encode())
+            whole_files.replace(file, text.encode())
         except OSError as error:
             raise LayoutError(f"cannot save layout {name}: {error.strerror}") from None
 

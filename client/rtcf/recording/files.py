@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import BinaryIO, TypeVar
 
 from rtcf_shared.errors import RtcfError
-from rtcf_shared.whole_file import whole_file
+from rtcf_shared.whole_files import whole_file
 
 from rtcf.connection import Closing
 from rtcf.recording.mcap_writer import McapWriter

@@ -5,7 +5,7 @@ from typing import Any
 
 import rtcf
 from rtcf.v1 import control_pb2
-from rtcf_shared import bounded_file, durable
+from rtcf_shared import whole_files
 
 from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.plain import enumerator
@@ -123,7 +123,7 @@ def read(file: str) -> tuple[str, str]:
     """Return the text of a file and its name for messages.  Raises GraphFileError."""
     name = "standard input" if file == "-" else file
     try:
-        return bounded_file.read(file).decode(), name
+        return whole_files.read(file).decode(), name
     except OSError as error:
         raise rtcf.GraphFileError(f"{name}: {error.strerror}") from None
     except UnicodeDecodeError:
@@ -133,6 +133,6 @@ def read(file: str) -> tuple[str, str]:
 def _write(file: str, text: str) -> None:
     """Replace a file atomically: a partial file would be a different valid graph."""
     try:
-        durable.write_named(file, text.encode())
+        whole_files.write_named(file, text.encode())
     except OSError as error:
         raise rtcf.RtcfError(f"{file}: {error.strerror}") from None

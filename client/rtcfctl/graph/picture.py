@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import rtcf
-from rtcf_shared import durable
+from rtcf_shared import whole_files
 
 from rtcfctl.graph.drawing import dot
 from rtcfctl.graph.loop_graph import LoopGraph
@@ -45,7 +45,7 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     drawing = dot(graph)
     content = drawing.encode() if kind == "dot" else _drawn(drawing, kind)
     try:
-        durable.write_named(str(args.file), content)
+        whole_files.write_named(str(args.file), content)
     except OSError as error:
         raise rtcf.RtcfError(f"{args.file}: {error.strerror}") from None
     if output.for_people:

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import rtcf
-from rtcf_shared import bounded_file, durable
+from rtcf_shared import whole_files
 
 from rtcfctl.terminal.output import Output
 
@@ -47,7 +47,7 @@ def take(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
 def restore(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Restore a snapshot."""
     try:
-        snapshot = bounded_file.read(args.file)
+        snapshot = whole_files.read(args.file)
     except OSError as error:
         raise rtcf.RtcfError(f"{args.file}: {error.strerror}") from None
     result = client.restore_snapshot(snapshot, args.runner, output.progress)
@@ -57,6 +57,6 @@ def restore(client: rtcf.Client, args: argparse.Namespace, output: Output) -> No
 def _write(file: Path, snapshot: bytes) -> None:
     """Replace a file atomically, so that it always has a complete snapshot."""
     try:
-        durable.write_named(file, snapshot)
+        whole_files.write_named(file, snapshot)
     except OSError as error:
         raise rtcf.RtcfError(f"{file}: {error.strerror}") from None

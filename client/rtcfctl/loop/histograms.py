@@ -13,7 +13,7 @@ from typing import Any
 
 import rtcf
 from rtcf.v1 import runner_pb2
-from rtcf_shared import durable
+from rtcf_shared import whole_files
 
 from rtcfctl.terminal.pictures import bar
 
@@ -95,7 +95,7 @@ def draw(found: runner_pb2.RunnerStatistics, file: Path) -> None:
         figure.savefig(picture, dpi=150, format=file.suffix.removeprefix("."))
     pyplot.close(figure)
     try:
-        durable.write_named(file, picture.getvalue())
+        whole_files.write_named(file, picture.getvalue())
     except OSError as error:
         raise rtcf.RtcfError(f"{file}: {error.strerror or error}") from None
 

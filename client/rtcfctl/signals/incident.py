@@ -14,7 +14,7 @@ from typing import IO, Any
 import rtcf
 from rtcf.v1 import incidents_pb2
 from rtcf_shared.arrays import as_list
-from rtcf_shared.whole_file import whole_file
+from rtcf_shared.whole_files import whole_file
 
 from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.words import counted, date, microseconds

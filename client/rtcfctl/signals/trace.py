@@ -13,7 +13,7 @@ from rtcf.recording.trace import Trace
 from rtcf.streams.numbered import Place
 from rtcf.streams.ports import PortStream
 from rtcf.v1 import runner_pb2
-from rtcf_shared.whole_file import whole_file
+from rtcf_shared.whole_files import whole_file
 
 from rtcfctl.signals.ending import ended_by_signals
 from rtcfctl.signals.idle_loop import say_if_ended, say_if_idle

@@ -9,7 +9,7 @@ import logging
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from rtcf_shared import durable
+from rtcf_shared import whole_files
 
 from rtcfd.common import regular_files
 from rtcfd.common.refusals import Refusal
@@ -62,8 +62,8 @@ class Settings:
             if regular_files.read_bytes(self._copy) == data:
                 return
         try:
-            durable.replace(self._copy, data)
-            durable.sync_folder(self._copy.parent)
+            whole_files.replace(self._copy, data)
+            whole_files.sync_folder(self._copy.parent)
         except OSError as error:
             log.warning("cannot copy the settings to %s: %s", self._copy, error.strerror)
 

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2
-from rtcf_shared import durable
+from rtcf_shared import whole_files
 
 from rtcfd.common import regular_files
 from rtcfd.common.aside import Aside
@@ -102,7 +102,7 @@ class LoadedCode:
     def store(self, file: Path) -> None:
         """Save the files for the next rtcfd, which adopts the executor."""
         with contextlib.suppress(OSError):  # the next rtcfd then does not know them
-            durable.replace(file, json.dumps(self._files).encode(), sync=False, mode=0o600)
+            whole_files.replace(file, json.dumps(self._files).encode(), sync=False, mode=0o600)
 
     def restore(self, file: Path) -> None:
         """Load the files that the previous rtcfd saved."""

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from google.protobuf import json_format
 from rtcf.v1 import runner_pb2
-from rtcf_shared import durable
+from rtcf_shared import whole_files
 
 from rtcfd.common import known_values, regular_files
 from rtcfd.common.nonsense import NONSENSE
@@ -56,7 +56,7 @@ def write(folder: Path, handover: Handover) -> None:
         "graphs": handover.graphs,
     }
     try:
-        durable.replace(folder / _NAME, json.dumps(document).encode(), sync=False, mode=0o600)
+        whole_files.replace(folder / _NAME, json.dumps(document).encode(), sync=False, mode=0o600)
     except OSError as error:
         log.warning("cannot write %s: %s", folder / _NAME, error.strerror)
 

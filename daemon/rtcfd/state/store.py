@@ -20,7 +20,7 @@ from typing import Any
 
 from google.protobuf import json_format
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
-from rtcf_shared import durable
+from rtcf_shared import whole_files
 
 from rtcfd.common import known_values, regular_files
 from rtcfd.common.names import check_base_name, full_name
@@ -192,17 +192,17 @@ class Store:
             try:
                 _unmark(mark)
                 # At once: the rest may fail, and in the old state the loop runs.
-                durable.sync_folder(self._folder)
+                whole_files.sync_folder(self._folder)
             except OSError:
                 self.note_stop(runner)
                 raise
         file = self._folder / f"{runner}{_SUFFIX}"
         self._require_known(file)
-        durable.replace(file, text)
+        whole_files.replace(file, text)
         if running and not _is_mark(mark):
             # This replaces anything else of that name.
-            durable.replace(mark, b"", sync=False)
-        durable.sync_folder(self._folder)
+            whole_files.replace(mark, b"", sync=False)
+        whole_files.sync_folder(self._folder)
 
     def save_history(self, runner: str, changes: Sequence[Change], anew: bool) -> None:
         """Write the result of History.to_write(); raises OSError.  May run on any thread.
@@ -215,7 +215,7 @@ class Store:
         self._require_known(file)
         data = history.text(changes).encode()
         if anew:
-            durable.replace(file, data, sync=False)
+            whole_files.replace(file, data, sync=False)
         else:
             regular_files.append(file, data)
 
@@ -239,7 +239,7 @@ class Store:
             file = self._folder / f"{runner}{suffix}"
             self._require_known(file)
             file.unlink(missing_ok=True)
-        durable.sync_folder(self._folder)
+        whole_files.sync_folder(self._folder)
 
     def _note(self, runner: str) -> Path | None:
         return None if self._boot_folder is None else self._boot_folder / f"{runner}{_STOPPED}"
@@ -252,7 +252,7 @@ class Store:
         note = self._note(runner)
         if note is not None:
             with contextlib.suppress(OSError):
-                durable.replace(note, b"", sync=False)
+                whole_files.replace(note, b"", sync=False)
 
     def _stop_is_noted(self, runner: str) -> bool:
         note = self._note(runner)
@@ -281,7 +281,7 @@ class Store:
     def _keep_beside(self, file: Path, text: bytes, version: int) -> None:
         beside = file.with_name(f"{file.stem}.version-{version}")
         try:
-            durable.replace(beside, text)
+            whole_files.replace(beside, text)
         except OSError as failure:
             log.warning("state %s of version %d is not kept: %s", file, version, failure.strerror)
             return

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from rtcf_shared import durable
+from rtcf_shared import whole_files
 from rtcfd.common import regular_files
 from rtcfd.state import store
 
@@ -53,7 +53,7 @@ class FailingDisk:
 
     def install(self, monkeypatch: Any) -> None:
         """Install it between the store and its folder."""
-        monkeypatch.setattr(store, "durable", self)
+        monkeypatch.setattr(store, "whole_files", self)
         monkeypatch.setattr(store, "regular_files", self)
         unmark, remove = store._unmark, store.Store.remove
         monkeypatch.setattr(store, "_unmark", lambda mark: self._do(mark, lambda: unmark(mark)))
@@ -63,13 +63,13 @@ class FailingDisk:
 
         monkeypatch.setattr(store.Store, "remove", remove_all)
 
-    # The functions of durable and regular_files that the store uses.
+    # The functions of whole_files and regular_files that the store uses.
 
     def replace(self, file: Path, data: bytes, *, sync: bool = True) -> None:
-        self._do(file, lambda: durable.replace(file, data, sync=sync), room=True)
+        self._do(file, lambda: whole_files.replace(file, data, sync=sync), room=True)
 
     def sync_folder(self, folder: Path) -> None:
-        self._do(folder / "any", lambda: durable.sync_folder(folder))
+        self._do(folder / "any", lambda: whole_files.sync_folder(folder))
 
     def append(self, file: Path, data: bytes) -> None:
         self._do(file, lambda: regular_files.append(file, data), room=True)

@@ -247,7 +247,7 @@ def machine() -> Any:
         patch.setattr(leases, "RETURN_S", 0.01)
         patch.setattr(held_runners, "RETURN_S", 0.01)
         patch.setattr(leases, "GATHER_S", 0.001)
-        patch.setattr("rtcf_shared.durable.os.fsync", lambda _: None)
+        patch.setattr("rtcf_shared.whole_files.os.fsync", lambda _: None)
         quiet()
         yield machine
         import logging

@@ -1,10 +1,18 @@
-"""Replaces files atomically, so that they survive a power cut."""
+"""Files that are read up to a limit, and written completely or not at all.
+
+An interrupted write leaves the old file.
+"""
 
 import contextlib
 import errno
 import os
 import stat
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO
 
+MOST_BYTES = 16 * 1024 * 1024  # the limit of a message to rtcfd
 # Files in these folders are written to, never replaced.
 _NO_FILES = ("/dev/", "/proc/")
 
@@ -85,3 +93,57 @@ def sync_folder(folder: str | os.PathLike[str]) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+@contextlib.contextmanager
+def whole_file(path: Path, *, force: bool = False) -> Iterator[Path]:
+    """Yield the path to write to, in the folder of `path`; at the end, the file gets that name.
+
+    A device or a pipe is written to directly.  Raises FileExistsError if the file exists, unless
+    `force`, even if it was created meanwhile; raises OSError.
+    """
+    target = path.resolve()
+    if target.exists() and not target.is_file():
+        yield target
+        return
+    if target.exists() and not force:
+        raise FileExistsError(f"{path} is there already")
+    part = target.with_name(f".{target.name}.{os.getpid()}.part")
+    try:
+        yield part
+        _name(part, target, force)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _name(part: Path, target: Path, force: bool) -> None:
+    if not force:
+        try:
+            os.link(part, target)
+            return
+        except FileExistsError:
+            raise
+        except OSError as error:
+            # A file system without hard links, as on a USB stick.
+            if error.errno not in (errno.EPERM, errno.EOPNOTSUPP) or target.exists():
+                raise
+    part.replace(target)
+
+
+def read(path: str | Path) -> bytes:
+    """Return the content of a file that a user names; "-" is standard input.
+
+    The file may be a device or an endless pipe.  Raises OSError, also for more than MOST_BYTES.
+    """
+    if str(path) == "-":
+        return _all_of(sys.stdin.buffer)
+    with open(path, "rb") as file:
+        return _all_of(file)
+
+
+def _all_of(file: BinaryIO) -> bytes:
+    content = file.read(MOST_BYTES + 1)
+    if len(content) > MOST_BYTES:
+        why = f"{os.strerror(errno.EFBIG)}: more than {MOST_BYTES // 1024 // 1024} MiB"
+        raise OSError(errno.EFBIG, why)
+    return content

@@ -6,7 +6,7 @@ import threading
 from pathlib import Path
 
 import pytest
-from rtcf_shared.whole_file import whole_file
+from rtcf_shared.whole_files import whole_file
 
 
 def test_the_file_appears_once_it_is_complete(tmp_path: Path) -> None:
