@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rtcf.streams.ports import PortBatch, PortSchema
+from rtcf_shared.ports import PortBatch, PortSchema
 
 ELEMENTS = 64  # listed elements of an array, each a signal
 _LONGEST = 1000  # characters of a name

@@ -11,8 +11,9 @@ from collections import deque
 from typing import Any, Protocol
 
 import rtcf
-from rtcf.streams.ports import PortBatch, PortSchema, PortStream
+from rtcf.streams.ports import PortStream
 from rtcf_shared.errors import RtcfError
+from rtcf_shared.ports import PortBatch, PortSchema
 
 from rtcf_scope.chunk import Chunk, Memory
 

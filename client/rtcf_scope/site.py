@@ -11,9 +11,9 @@ from urllib.parse import quote
 
 import rtcf
 from aiohttp import web
-from rtcf.recording.mcap_writer import McapWriter
-from rtcf.recording.recorder import Recorder
 from rtcf_shared.errors import RtcfError
+from rtcf_shared.mcap_writer import McapWriter
+from rtcf_shared.recorder import Recorder
 
 from rtcf_scope import catalog
 from rtcf_scope.door import Door

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from aiohttp import WSMsgType, web
 from numpy.typing import NDArray
-from rtcf.streams.ports import PortSchema
+from rtcf_shared.ports import PortSchema
 
 from rtcf_scope import wire
 from rtcf_scope.chunk import Chunk, column_of, is_there

@@ -14,10 +14,10 @@ import std_msgs.msg
 from daemon_process import Daemon
 from rtcf.recording.bags import md5_of
 from rtcf.recording.convert import convert
-from rtcf.recording.mcap_writer import Column, McapWriter
-from rtcf.recording.recorder import Recorder
-from rtcf.streams.ports import PortBatch, schema_of
 from rtcf.v1 import ports_pb2
+from rtcf_shared.mcap_writer import Column, McapWriter
+from rtcf_shared.ports import PortBatch, schema_of
+from rtcf_shared.recorder import Recorder
 
 
 @pytest.fixture

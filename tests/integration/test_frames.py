@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import rtcf
 from daemon_process import NO_ROS, Daemon, wait_for
-from rtcf.streams.ports import PortBatch, schema_of
 from rtcf.v1 import runner_pb2
+from rtcf_shared.ports import PortBatch, schema_of
 from rtcfd.incidents import frame_file
 from shared_memory import SharedMemory
 from test_survival import is_gone

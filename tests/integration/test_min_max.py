@@ -12,7 +12,7 @@ import rtcf
 from daemon_process import NO_ROS, Daemon
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from rtcf.streams.ports import PortBatch
+from rtcf_shared.ports import PortBatch
 
 _WINDOWS, _EVERY = 100, 1000
 _CYCLES = _WINDOWS * _EVERY

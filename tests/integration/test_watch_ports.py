@@ -9,8 +9,9 @@ import pytest
 import rtcf
 from daemon_process import DEADLINE_S, Daemon, stopped, wait_for
 from rtcf.executor.v1 import executor_pb2 as wire
-from rtcf.streams.ports import PortBatch, PortStream
+from rtcf.streams.ports import PortStream
 from rtcf.v1 import graph_pb2, runner_pb2
+from rtcf_shared.ports import PortBatch
 from rtcfd.executor.link import Link
 
 

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 from rtcf_shared.arrays import as_list
+from rtcf_shared.mcap_writer import McapWriter
 from rtcf_shared.whole_files import whole_file
 
 from rtcf.recording import bags
-from rtcf.recording.mcap_writer import McapWriter
 from rtcf.recording.reader import RecordedColumn, RecordedTopic, Recording, RecordingError
 
 if TYPE_CHECKING:

@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import BinaryIO, TypeVar
 
 from rtcf_shared.errors import RtcfError
+from rtcf_shared.mcap_writer import McapWriter
+from rtcf_shared.ports import PortBatch
+from rtcf_shared.recorder import Recorder
 from rtcf_shared.whole_files import whole_file
 
 from rtcf.connection import Closing
-from rtcf.recording.mcap_writer import McapWriter
-from rtcf.recording.recorder import Recorder
-from rtcf.streams.ports import PortBatch
 
 Result = TypeVar("Result")
 

@@ -3,8 +3,9 @@
 from collections import deque
 from itertools import islice
 
+from rtcf_shared.ports import PortBatch
+
 from rtcf.streams.condition import Condition
-from rtcf.streams.ports import PortBatch
 
 MOST_BYTES = 512 * 1024 * 1024  # memory limit of the pre-trigger data
 

@@ -11,14 +11,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from rtcf_shared import mcap_writer as mcap
+from rtcf_shared import ros_layout
 from rtcf_shared.arrays import as_list
 from rtcf_shared.errors import RtcfError
+from rtcf_shared.ports import signal_name
 
 from rtcf.connection import Closing
-from rtcf.recording import mcap_writer as mcap
 from rtcf.recording.fields import Fields
-from rtcf.streams import ros_layout
-from rtcf.streams.ports import signal_name
 
 if TYPE_CHECKING:
     import numpy as np

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from rtcf_shared.enums import word
+from rtcf_shared.ports import PortBatch
 
 from rtcf.streams.numbered import Lost
-from rtcf.streams.ports import PortBatch
 from rtcf.v1 import control_pb2, runner_pb2
 
 _CYCLES, _EVENTS, _LOGS, _KERNEL = 1, 2, 3, 4  # numbers of tracks, followed by those of components

@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
-
-    from rtcf.streams.ports import PortBatch, PortSchema
+    from rtcf_shared.ports import PortBatch, PortSchema
 
 _LONGEST = 1000  # characters
 _DEEPEST = 50

@@ -7,10 +7,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
+from rtcf_shared import ros_layout
 from rtcf_shared.naming import listing, suggestion
 from rtcf_shared.ros_definition import Definition, Field
-
-from rtcf.streams import ros_layout
 
 _LENGTH = struct.Struct("<I")
 _SIZES = {"string": 0, "bool": 1, "byte": 1, "char": 1, "time": 8, "duration": 8} | {

@@ -7,7 +7,7 @@ import time
 from typing import Any
 
 import rtcf
-from rtcf.streams.ports import PortBatch
+from rtcf_shared.ports import PortBatch
 
 from rtcfctl.signals.idle_loop import say_if_ended, say_if_idle
 from rtcfctl.terminal.output import Output

@@ -3,8 +3,8 @@
 import sys
 
 import rtcf
-from rtcf.streams.ports import PortBatch
 from rtcf.v1 import runner_pb2
+from rtcf_shared.ports import PortBatch
 
 from rtcfctl.terminal.output import Output
 

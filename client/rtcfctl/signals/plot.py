@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import rtcf
-from rtcf.streams.ports import PortBatch, PortStream
+from rtcf.streams.ports import PortStream
+from rtcf_shared.ports import PortBatch
 
 from rtcfctl.signals.idle_loop import say_if_idle
 from rtcfctl.terminal.output import Output, coloured, styled

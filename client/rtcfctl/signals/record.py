@@ -10,7 +10,8 @@ import rtcf
 from rtcf.recording.files import Files
 from rtcf.recording.moment import Moment
 from rtcf.streams.condition import Condition
-from rtcf.streams.ports import PortBatch, PortStream
+from rtcf.streams.ports import PortStream
+from rtcf_shared.ports import PortBatch
 
 from rtcfctl.signals.ending import ended_by_signals
 from rtcfctl.signals.idle_loop import say_if_ended, say_if_idle

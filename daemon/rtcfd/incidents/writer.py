@@ -11,6 +11,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from rtcf_shared.mcap_writer import McapWriter
+from rtcf_shared.ports import PortBatch, schema_of
+from rtcf_shared.recorder import Recorder
+
 from rtcfd.incidents import build_id, head
 
 
@@ -32,10 +36,6 @@ def main(arguments: Sequence[str]) -> int:
 
 
 def _write(descriptor: int, file: Path, facts: dict[str, Any]) -> None:
-    from rtcf.recording.mcap_writer import McapWriter
-    from rtcf.recording.recorder import Recorder
-    from rtcf.streams.ports import PortBatch, schema_of
-
     from rtcfd.incidents import frame_file
 
     rings = frame_file.read(descriptor)

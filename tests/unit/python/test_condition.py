@@ -7,8 +7,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from rtcf.streams.condition import Condition, ConditionError
-from rtcf.streams.ports import PortBatch, PortSchema, Signal
 from rtcf.v1 import ports_pb2
+from rtcf_shared.ports import PortBatch, PortSchema, Signal
 
 
 def over(text: str, **columns: list[float]) -> list[bool]:

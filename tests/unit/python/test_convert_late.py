@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 from rtcf.recording.convert import convert
-from rtcf.recording.mcap_writer import McapWriter
 from rtcf.recording.reader import Recording
-from rtcf.recording.recorder import Recorder
-from rtcf.streams.ports import PortBatch, PortSchema, schema_of
 from rtcf.v1 import ports_pb2
+from rtcf_shared.mcap_writer import McapWriter
+from rtcf_shared.ports import PortBatch, PortSchema, schema_of
+from rtcf_shared.recorder import Recorder
 
 
 def _state(component: str, name: str, kind: str, size: int) -> ports_pb2.PortColumn:

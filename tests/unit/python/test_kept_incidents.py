@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 from daemon_under_test import DEADLINE_S
-from rtcf.recording.mcap_writer import McapWriter
 from rtcf.v1 import control_pb2
+from rtcf_shared.mcap_writer import McapWriter
 from rtcfd.common.limits import Limits
 from rtcfd.incidents import copying, frame_file, frame_layout, head, incidents
 from rtcfd.incidents.incidents import Incidents

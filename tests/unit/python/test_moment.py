@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 from rtcf.recording.moment import Moment
-from rtcf.streams.ports import PortBatch, PortSchema
 from rtcf.v1 import ports_pb2
+from rtcf_shared.ports import PortBatch, PortSchema
 
 
 class _At:

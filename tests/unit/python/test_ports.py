@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import rtcf
 import yaml
-from rtcf.recording.mcap_writer import McapWriter
-from rtcf.recording.recorder import Recorder
-from rtcf.streams.ports import PortBatch, PortSchema, schema_of
 from rtcf.v1 import ports_pb2
 from rtcf_shared.arrays import as_list
+from rtcf_shared.mcap_writer import McapWriter
+from rtcf_shared.ports import PortBatch, PortSchema, schema_of
+from rtcf_shared.recorder import Recorder
 from rtcfctl.signals import echo
 from rtcfctl.terminal.output import Output
 

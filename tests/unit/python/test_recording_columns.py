@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rtcf.recording import mcap_writer as mcap
 from rtcf.recording.convert import repair
-from rtcf.recording.mcap_writer import McapWriter
 from rtcf.recording.reader import Recording, RecordingError, read_recording
-from rtcf.recording.recorder import Recorder
-from rtcf.streams.ports import PortBatch, schema_of
 from rtcf.v1 import ports_pb2
+from rtcf_shared import mcap_writer as mcap
+from rtcf_shared.mcap_writer import McapWriter
+from rtcf_shared.ports import PortBatch, schema_of
+from rtcf_shared.recorder import Recorder
 
 _KINDS = {"double": "<f8", "bool": "?", "uint16[3]": "<u2", "float[2x2]": "<f4"}
 _COUNTS = {"double": (), "bool": (), "uint16[3]": (3,), "float[2x2]": (2, 2)}

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from geometry_msgs.msg import PoseWithCovariance, TwistStamped
-from rtcf.streams.ros_layout import Leaf, leaves, size_of
+from rtcf_shared.ros_layout import Leaf, leaves, size_of
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray, Header, MultiArrayDimension, UInt8
 

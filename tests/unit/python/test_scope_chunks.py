@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 import rtcf
-from rtcf.streams.ports import PortBatch, PortSchema
 from rtcf.v1 import ports_pb2
 from rtcf_scope import wire
 from rtcf_scope.chunk import Chunk, Memory, column_of, split_element
 from rtcf_scope.hub import Hub
 from rtcf_scope.tab import Tab
+from rtcf_shared.ports import PortBatch, PortSchema
 
 
 def _batch(first: int, count: int, lost: int = 0) -> PortBatch:

@@ -10,13 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from rtcf.recording.mcap_writer import McapWriter
 from rtcf.recording.reader import RecordingError
-from rtcf.recording.recorder import Recorder
-from rtcf.streams.ports import PortBatch, schema_of
 from rtcf.v1 import ports_pb2
 from rtcf_scope import recordings
 from rtcf_scope.recordings import Recordings
+from rtcf_shared.mcap_writer import McapWriter
+from rtcf_shared.ports import PortBatch, schema_of
+from rtcf_shared.recorder import Recorder
 
 _HEAD = 40
 _BEGIN_NS = 10**18

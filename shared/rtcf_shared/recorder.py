@@ -4,9 +4,10 @@ import struct
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from rtcf.recording.mcap_writer import Column, McapWriter
-from rtcf.streams.ports import PortBatch, PortSchema, Signal
 from rtcf.v1 import ports_pb2
+
+from rtcf_shared.mcap_writer import Column, McapWriter
+from rtcf_shared.ports import PortBatch, PortSchema, Signal
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
