@@ -135,7 +135,9 @@ class _Writer:
             with contextlib.ExitStack() as opening, self._said():
                 # The file gets its name only when it is complete.
                 part = opening.enter_context(whole_file(self._path, force=True))
-                self._bag = opening.enter_context(bags.rosbag().Bag(str(part), "w"))
+                # Bag.close() leaves its own file open if the disk is full.
+                file = opening.enter_context(part.open("w+b"))
+                self._bag = opening.enter_context(bags.rosbag().Bag(file, "w"))
                 self._open = opening.pop_all()
         return self
 
