@@ -1,7 +1,8 @@
 """Drawings made of characters: spark lines, bars, and curves of braille dots."""
 
+import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 _BLOCKS = "▁▂▃▄▅▆▇█"
 _PARTS = " ▏▎▍▌▋▊▉"  # parts of a block, in eighths of its width
@@ -75,3 +76,51 @@ class Curves:
         span = self._high / 2 - self._low / 2
         above = min(max(value, self._low), self._high) / 2 - self._low / 2
         return rows - 1 - round(above / span * (rows - 1) if span > 0 else 0.0)
+
+
+def drawn(
+    title: str,
+    curves: Sequence[Sequence[float]],
+    marks: Mapping[float, str],
+    *,
+    width: int = 72,
+    height: int = 9,
+    label: int = 8,
+) -> list[str]:
+    """Return the lines of a plot of curves over equal steps, with its lowest and highest value.
+
+    curves  values from left to right; NaN leaves a gap
+    marks   texts below the curves, by the share of the width at which they begin; that of 1 ends
+            there
+    label   width of the numbers at the left
+    """
+    finite = [float(value) for curve in curves for value in curve if math.isfinite(value)]
+    low, high = min(finite, default=0.0), max(finite, default=0.0)
+    field = Curves(width, height, low, high)
+    for owner, curve in enumerate(curves):
+        last: float | None = None
+        for x, part in enumerate(_parts(curve, field.columns)):
+            values = [float(value) for value in part if math.isfinite(value)]
+            if not values:
+                last = None
+                continue
+            # From the last value, so that the curve is connected.
+            before = values[0] if last is None else last
+            field.column(x, min(*values, before), max(*values, before), owner)
+            last = values[-1]
+    labels = {0: f"{high:.2f}", height - 1: f"{low:.2f}"}
+    lines = [
+        f"{labels.get(row, ''):>{label}} {''.join(text for text, _ in runs)}".rstrip()
+        for row, runs in enumerate(field.lines())
+    ]
+    below = ""
+    for share, text in marks.items():
+        below = below.ljust(round(share * width) - (len(text) if share == 1.0 else 0)) + text
+    return [title, *lines, " " * (label + 1) + below]
+
+
+def _parts(values: Sequence[float], count: int) -> list[Sequence[float]]:
+    """Return `count` parts of nearly equal length, the longer ones first."""
+    size, longer = divmod(len(values), count)
+    ends = [each * size + min(each, longer) for each in range(count + 1)]
+    return [values[begin:end] for begin, end in itertools.pairwise(ends)]
