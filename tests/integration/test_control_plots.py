@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 from daemon_process import BUILD_TREE
 from rtcf.testing import Bench
-from rtcfctl.terminal.pictures import Curves
+from rtcfctl.terminal import pictures
 
 PAGES = Path(__file__).parents[2] / "docs" / "control"
 PATH = [BUILD_TREE / "lib" / "rtcf"]
-WIDTH, HEIGHT, LABEL = 72, 9, 8
+WIDTH = 72
 DT = 0.001  # s
 MASKED: Any = np.ma
 
@@ -34,28 +34,8 @@ components:
 
 
 def drawn(title: str, values: Any, marks: Mapping[float, str]) -> str:
-    """Return a curve over equal steps, with its lowest and highest value.
-
-    `marks` are the texts below it, by the share of the width at which they begin; that of 1 ends
-    there.
-    """
-    values = values[np.isfinite(values)]  # none before the first output
-    low, high = float(np.min(values)), float(np.max(values))
-    curves = Curves(WIDTH, HEIGHT, low, high)
-    last = values[0]
-    for x, part in enumerate(np.array_split(values, curves.columns)):
-        # From the last value, so that the curve is connected.
-        curves.column(x, min(part.min(), last), max(part.max(), last), 0)
-        last = part[-1]
-    labels = {0: f"{high:.2f}", HEIGHT - 1: f"{low:.2f}"}
-    lines = [
-        f"{labels.get(row, ''):>{LABEL}} {''.join(text for text, _ in runs)}".rstrip()
-        for row, runs in enumerate(curves.lines())
-    ]
-    below = ""
-    for share, text in marks.items():
-        below = below.ljust(round(share * WIDTH) - (len(text) if share == 1.0 else 0)) + text
-    return "\n".join([title, *lines, " " * (LABEL + 1) + below])
+    """Return a curve from its first value on."""
+    return "\n".join(pictures.drawn(title, [values[np.isfinite(values)]], marks))
 
 
 def _pid(folder: Path) -> str:
@@ -107,11 +87,23 @@ def _joint_limiter(_: Path) -> str:
     return "\n\n".join([drawn("out", found["out"], marks), drawn("velocity", velocity, marks)])
 
 
+def _motor(_: Path) -> str:
+    with Bench("rtcf_control/Motor", path=PATH, inertia=1e-4, load_inertia=4e-4, stiffness=5.0,
+               damping=2e-3, viscous=1e-3, coulomb=0.02,
+               static_friction=0.03) as bench:  # fmt: skip
+        found = bench.run({"command": np.where(np.arange(500) < 250, 0.06, 0.0)})
+    marks = {0.0: "0 s: 0.06 N m", 0.5: "0.25 s: 0 N m", 1.0: "0.5 s"}
+    return "\n\n".join(
+        drawn(f"{name} in rad/s", found[name], marks) for name in ("velocity", "load_velocity")
+    )
+
+
 PLOTS: dict[str, tuple[str, Callable[[Path], str]]] = {
     "pid": ("pid.md", _pid),
     "biquads": ("biquads.md", _biquads),
     "trajectory": ("trajectory.md", _trajectory),
     "joint-limiter": ("safety.md", _joint_limiter),
+    "motor": ("motor.md", _motor),
 }
 
 
