@@ -1,37 +1,13 @@
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <limits>
 
 #include <rtcf/component.hpp>
 
+#include "waveform.hpp"
+
 namespace rtcf_control {
 namespace {
-
-enum class Shape { Step, Ramp, Sine, Square, Triangle, LinearChirp, LogChirp, Prbs, Multisine };
-
-constexpr double kTurn = 6.28318530717958647692;  // 2 pi
-// Phases closer than this to an edge count as on it: sums of rounded steps miss it by less.
-constexpr double kPhaseTolerance = 1e-9;
-
-// The sum of `lines` sines, multiples of the frequency, with the phases of Schroeder (Synthesis of
-// low-peak-factor signals, IEEE Transactions on Information Theory, 1970), which keep its peak low.
-// Real-time safe.
-double multisine(int lines, double phase) {
-    double sum = 0.0;
-    for (int k = 1; k <= lines; ++k)
-        sum += std::sin(kTurn * k * phase - kTurn / 2.0 * k * (k - 1) / lines);
-    return sum;
-}
-
-// Largest absolute value of this sum. Not real-time: takes some ms.
-double peakOfMultisine(int lines) {
-    const int points = 256 * lines;
-    double peak = 0.0;
-    for (int i = 0; i < points; ++i)
-        peak = std::max(peak, std::abs(multisine(lines, static_cast<double>(i) / points)));
-    return peak;
-}
 
 class SignalGenerator final : public rtcf::Component {
     static constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -126,15 +102,12 @@ class SignalGenerator final : public rtcf::Component {
             write(0.0);
             return;
         }
-        write(amplitude * unit());
-        advance();
+        const Waveform signal = waveform();
+        write(amplitude * wave().value(signal));
+        wave().advance(signal, elapsed());
     }
 
-    void restart() {
-        time_ = 0;
-        phase_ = 0.0;
-        register_ = 1U;
-    }
+    void restart() { wave().restart(); }
 
     void write(double signal) noexcept {
         const double value = offset + signal;
@@ -142,61 +115,10 @@ class SignalGenerator final : public rtcf::Component {
         out.write(std::clamp(value, lower.value(), upper.value()));
     }
 
-    static std::int64_t nanoseconds(double seconds) { return std::llround(seconds * 1e9); }
+    WaveState wave() noexcept { return {time_.value(), phase_.value(), register_.value()}; }
 
-    // Value of the signal in this cycle, between -1 and 1.
-    double unit() const {
-        const std::int64_t since = time_ - nanoseconds(delay);
-        switch (shape.value()) {
-            case Shape::Step:
-                return since >= 0 ? 1.0 : 0.0;
-            case Shape::Ramp:
-                return std::clamp(1e-9 * static_cast<double>(since) / duration, 0.0, 1.0);
-            case Shape::Sine:
-            case Shape::LinearChirp:
-            case Shape::LogChirp:
-                return std::sin(kTurn * phase_);
-            case Shape::Square:
-                return phase_ < 0.5 - kPhaseTolerance ? 1.0 : -1.0;
-            case Shape::Triangle:
-                // From 0 to 1, -1 and 0, as a sine.
-                return 1.0 - 4.0 * std::abs(std::fmod(phase_ + 0.25, 1.0) - 0.5);
-            case Shape::Prbs:
-                return (register_ & 1U) != 0U ? 1.0 : -1.0;
-            case Shape::Multisine:
-                return std::clamp(multisine(lines, phase_) / *peak_, -1.0, 1.0);
-        }
-        return 0.0;
-    }
-
-    // Turns of a chirp from its start to a time, s.
-    double turns(double time) const {
-        if (shape == Shape::LinearChirp)
-            return time * (frequency_ + (end_frequency - frequency_) * time / (2.0 * duration));
-        const double ratio = std::log(end_frequency / frequency_);
-        return ratio == 0.0 ? frequency_ * time
-                            : frequency_ * duration / ratio * std::expm1(ratio * time / duration);
-    }
-
-    void advance() {
-        const bool chirps = shape == Shape::LinearChirp || shape == Shape::LogChirp;
-        const double before = 1e-9 * static_cast<double>(time_);
-        time_ += elapsed();
-        if (chirps && time_ >= nanoseconds(duration)) {
-            time_ = 0;
-            phase_ = 0.0;
-            return;
-        }
-        phase_ +=
-            chirps ? turns(1e-9 * static_cast<double>(time_)) - turns(before) : frequency_ * dt();
-        const double whole = std::floor(phase_ + kPhaseTolerance);
-        phase_ -= whole;
-        // At most one new bit a cycle. x^15 + x^14 + 1 has the period 32767.
-        if (shape == Shape::Prbs && whole > 0.0) {
-            const std::uint32_t bit = ((register_ >> 14U) ^ (register_ >> 13U)) & 1U;
-            register_ = ((register_ << 1U) | bit) & 0x7FFFU;
-            if (register_ == 0U) register_ = 1U;
-        }
+    Waveform waveform() const noexcept {
+        return {shape, frequency_, end_frequency, duration, delay, lines, *peak_};
     }
 };
 

@@ -54,6 +54,7 @@ PREPARE: dict[str, Callable[[Daemon, rtcf.Client], None]] = {
     "boot.md": _nothing,
     "control/index.md": _nothing,
     "control/biquads.md": _nothing,
+    "control/excitation.md": _nothing,
     "control/motor.md": _nothing,
     "control/pid.md": _nothing,
     "control/safety.md": _nothing,

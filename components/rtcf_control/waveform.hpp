@@ -1,0 +1,122 @@
+/// @file
+/// The signals of SignalGenerator and Excitation. The component owns the state of the signal and
+/// calls the functions in each cycle.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+namespace rtcf_control {
+
+/// Form of a signal.
+enum class Shape { Step, Ramp, Sine, Square, Triangle, LinearChirp, LogChirp, Prbs, Multisine };
+
+constexpr double kTurn = 6.28318530717958647692;  ///< 2 pi
+/// Phases closer than this to an edge count as on it: sums of rounded steps miss it by less.
+constexpr double kPhaseTolerance = 1e-9;
+
+/// The sum of `lines` sines, multiples of the frequency, with the phases of Schroeder (Synthesis of
+/// low-peak-factor signals, IEEE Transactions on Information Theory, 1970), which keep its peak
+/// low. Real-time safe.
+inline double multisine(int lines, double phase) noexcept {
+    double sum = 0.0;
+    for (int k = 1; k <= lines; ++k)
+        sum += std::sin(kTurn * k * phase - kTurn / 2.0 * k * (k - 1) / lines);
+    return sum;
+}
+
+/// Largest absolute value of this sum. Not real-time: takes some ms.
+inline double peakOfMultisine(int lines) {
+    const int points = 256 * lines;
+    double peak = 0.0;
+    for (int i = 0; i < points; ++i)
+        peak = std::max(peak, std::abs(multisine(lines, static_cast<double>(i) / points)));
+    return peak;
+}
+
+/// Nanoseconds of a time in s.
+inline std::int64_t nanoseconds(double seconds) noexcept { return std::llround(seconds * 1e9); }
+
+/// What a signal is, from the parameters of its component.
+struct Waveform {
+    Shape shape = Shape::Sine;
+    double frequency = 1.0;      ///< Hz; of a chirp the first, of a PRBS the bits per second
+    double end_frequency = 1.0;  ///< Hz, of a chirp
+    double duration = 1.0;       ///< s, of a ramp or chirp
+    double delay = 0.0;          ///< s, before a step or ramp
+    int lines = 1;               ///< of a multisine
+    double peak = 1.0;           ///< peakOfMultisine(lines)
+
+    bool chirps() const noexcept { return shape == Shape::LinearChirp || shape == Shape::LogChirp; }
+
+    /// Turns of a chirp from its start to a time, s. Real-time safe.
+    double turns(double time) const noexcept {
+        if (shape == Shape::LinearChirp)
+            return time * (frequency + (end_frequency - frequency) * time / (2.0 * duration));
+        const double ratio = std::log(end_frequency / frequency);
+        return ratio == 0.0 ? frequency * time
+                            : frequency * duration / ratio * std::expm1(ratio * time / duration);
+    }
+};
+
+/// A running signal: refers to the state of its component. All functions are real-time safe.
+struct WaveState {
+    std::int64_t& time;   ///< ns since the signal began
+    double& phase;        ///< of the wave, 0 to 1
+    std::uint32_t& bits;  ///< shift register of PRBS
+
+    void restart() const noexcept {
+        time = 0;
+        phase = 0.0;
+        bits = 1U;
+    }
+
+    /// Value of the signal in this cycle, between -1 and 1.
+    double value(const Waveform& wave) const noexcept {
+        const std::int64_t since = time - nanoseconds(wave.delay);
+        switch (wave.shape) {
+            case Shape::Step:
+                return since >= 0 ? 1.0 : 0.0;
+            case Shape::Ramp:
+                return std::clamp(1e-9 * static_cast<double>(since) / wave.duration, 0.0, 1.0);
+            case Shape::Sine:
+            case Shape::LinearChirp:
+            case Shape::LogChirp:
+                return std::sin(kTurn * phase);
+            case Shape::Square:
+                return phase < 0.5 - kPhaseTolerance ? 1.0 : -1.0;
+            case Shape::Triangle:
+                // From 0 to 1, -1 and 0, as a sine.
+                return 1.0 - 4.0 * std::abs(std::fmod(phase + 0.25, 1.0) - 0.5);
+            case Shape::Prbs:
+                return (bits & 1U) != 0U ? 1.0 : -1.0;
+            case Shape::Multisine:
+                return std::clamp(multisine(wave.lines, phase) / wave.peak, -1.0, 1.0);
+        }
+        return 0.0;
+    }
+
+    /// Moves to the next cycle, `elapsed` ns later. A chirp begins again at its end.
+    void advance(const Waveform& wave, std::int64_t elapsed) const noexcept {
+        const double before = 1e-9 * static_cast<double>(time);
+        time += elapsed;
+        if (wave.chirps() && time >= nanoseconds(wave.duration)) {
+            time = 0;
+            phase = 0.0;
+            return;
+        }
+        phase += wave.chirps() ? wave.turns(1e-9 * static_cast<double>(time)) - wave.turns(before)
+                               : wave.frequency * (1e-9 * static_cast<double>(elapsed));
+        const double whole = std::floor(phase + kPhaseTolerance);
+        phase -= whole;
+        // At most one new bit a cycle. x^15 + x^14 + 1 has the period 32767.
+        if (wave.shape == Shape::Prbs && whole > 0.0) {
+            const std::uint32_t bit = ((bits >> 14U) ^ (bits >> 13U)) & 1U;
+            bits = ((bits << 1U) | bit) & 0x7FFFU;
+            if (bits == 0U) bits = 1U;
+        }
+    }
+};
+
+}  // namespace rtcf_control
