@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from rtcf.component import Component, Derived, Input, Output, Parameter, Queue, State
-from rtcf.signal import c2d
+from rtcf.linear import c2d
 
 A = np.array([[1.0, 0.001], [0.0, 0.98]])
 B = np.array([0.0, 0.02])

@@ -103,7 +103,7 @@ def is_own(value: Any) -> bool:
     """Tell whether a value is a Python function of the user, which must be compiled too."""
     if not isinstance(value, FunctionType):
         return False
-    if value.__module__ == "rtcf.signal":
+    if value.__module__ == "rtcf.linear":
         return True
     module = sys.modules.get(value.__module__ or "")
     file = getattr(module, "__file__", None) or ""

@@ -4,6 +4,7 @@ import operator
 from typing import Any
 
 import numpy as np
+
 from rtcf.component.message_type import MessageType
 from rtcf.component.value_type import ValueType
 

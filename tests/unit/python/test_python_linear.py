@@ -1,10 +1,10 @@
-"""rtcf.signal against closed-form solutions."""
+"""rtcf.linear against closed-form solutions."""
 
 import math
 
 import numpy as np
 import pytest
-from rtcf.signal import c2d, expm, tustin
+from rtcf.linear import c2d, expm, tustin
 
 
 @pytest.mark.parametrize("angle", [0.0, 1e-9, 0.3, 2.0, 50.0])

@@ -7,6 +7,7 @@ import enum
 from typing import Any
 
 import numpy as np
+
 from rtcf.component.declaration import (
     LOG_LEVELS,
     TIME_FIELDS,

@@ -15,6 +15,7 @@ from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
+
 from rtcf.component.message_type import Leaf, MessageType, is_message, message_type
 from rtcf.component.ros_name import advice, is_member_name
 from rtcf.component.value_type import DeclarationError, ValueType, value_type

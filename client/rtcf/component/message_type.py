@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+
 from rtcf.component.value_type import DeclarationError, ValueType
 
 _SCALARS = {
