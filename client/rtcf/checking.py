@@ -7,16 +7,18 @@ import os
 import shutil
 import signal
 import subprocess
-from collections.abc import Sequence
+import threading
+import time
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import IO
 
 from rtcf_shared.errors import RtcfError
 from rtcf_shared.folders import component_folders, packages
 from rtcf_shared.naming import listing, suggestion
 
 from rtcf.sanitizer import Violation, violations
-from rtcf.watched import Watched
 
 INSTALLED = Path("/usr/lib/rtcf/rtcf-executor-rtsan")
 CONFIGURATION = Path("/etc/rtcfd/rtcfd.toml")
@@ -24,6 +26,12 @@ _DESCRIBE_TIMEOUT_S = 30.0
 # The sanitizer selects the protocol by the program's name. rtcf-check depends on the last one; the
 # others are faster, but belong to LLVM packages.
 _SYMBOLIZERS = ("llvm-symbolizer-22", "llvm-symbolizer", "addr2line")
+# For one hook or some updates; a longer one would stop a real loop.
+_HANG_S = 10.0
+# Within a report: looking up its source lines can take long.
+_REPORT_S = 120.0
+_POLL_S = 0.05
+_BEGIN, _END = "==ERROR: RealtimeSanitizer: ", "SUMMARY: "
 
 
 @dataclass
@@ -75,9 +83,9 @@ def check(
                "--cycles", str(cycles)]  # fmt: skip
     for parameter in parameters:
         command += ["--param", parameter]
-    watched = Watched(command, os.environ | {"RTSAN_OPTIONS": sanitizer_options()})
-    status = watched.wait()
-    lines = watched.errors
+    process = _GuardedProcess(command, os.environ | {"RTSAN_OPTIONS": sanitizer_options()})
+    status = process.wait()
+    lines = process.errors
     found = Checked(str(library), list(violations(lines)))
     found.log = [line for line in lines if line.startswith("/checked: ")]
     found.not_finite = [
@@ -86,7 +94,7 @@ def check(
     found.undeclared = [
         line.removeprefix("undeclared: ") for line in lines if line.startswith("undeclared: ")
     ]
-    found.ended = watched.hang or (_why(status, lines, watched.stage) if status else "")
+    found.ended = process.hang or (_why(status, lines, process.stage) if status else "")
     return found
 
 
@@ -165,3 +173,69 @@ def _why(status: int, lines: Sequence[str], stage: str) -> str:
     if said:
         return said[-1].removeprefix("rtcf-executor: ")
     return f"the component ended its process{where}: exit status {status}"
+
+
+class _GuardedProcess:
+    """A process that runs a component and is killed after too long without output.
+
+    It writes each stage to standard output before the stage begins, and reports to standard error.
+    Owned by the caller of wait().
+    """
+
+    def __init__(self, command: Sequence[str], environment: Mapping[str, str]) -> None:
+        self.stage = ""  # the present stage
+        self.errors: list[str] = []  # lines of standard error
+        self.hang = ""  # a message if the component did not return
+        self._heard = time.monotonic()
+        self._reporting = False
+        self._process = subprocess.Popen(
+            command,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            errors="replace",
+        )
+        assert self._process.stdout is not None and self._process.stderr is not None
+        self._readers = [
+            threading.Thread(target=self._read_stages, args=(self._process.stdout,)),
+            threading.Thread(target=self._read_errors, args=(self._process.stderr,)),
+        ]
+
+    def wait(self, hang_s: float = _HANG_S) -> int:
+        """Wait for the end of the process; return its exit status, negative for a signal.
+
+        The process is killed after `hang_s` without output.
+        """
+        for reader in self._readers:
+            reader.start()
+        try:
+            while self._process.poll() is None:
+                limit = _REPORT_S if self._reporting else hang_s
+                if time.monotonic() - self._heard > limit:
+                    self.hang = (
+                        f"the component does not return: no progress for {limit:g} s while "
+                        f"{self.stage or 'loading'}"
+                    )
+                    self._process.kill()
+                    break
+                time.sleep(_POLL_S)
+        finally:
+            self._process.kill()
+            self._process.wait()
+        for reader in self._readers:
+            reader.join()
+        return self._process.returncode
+
+    def _read_stages(self, stream: IO[str]) -> None:
+        for line in stream:
+            self.stage = line.strip()
+            self._heard = time.monotonic()
+
+    def _read_errors(self, stream: IO[str]) -> None:
+        for line in stream:
+            text = line.rstrip("\n")
+            self.errors.append(text)
+            self._reporting = _BEGIN in text or (self._reporting and not text.startswith(_END))
+            self._heard = time.monotonic()

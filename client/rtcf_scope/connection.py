@@ -9,7 +9,7 @@ from typing import Any
 from aiohttp import web
 from aiohttp.http_exceptions import HttpProcessingError
 
-from rtcf_scope.line import line
+from rtcf_scope.printable import printable
 
 HEADERS = {
     "Content-Security-Policy": (
@@ -35,7 +35,7 @@ class _OneLine(logging.Formatter):
     def format(self, record: logging.LogRecord) -> str:
         error = record.exc_info[1] if record.exc_info else None
         text = record.getMessage()
-        return "rtcf-scope: " + line(f"{text}: {error!r}" if error is not None else text)
+        return "rtcf-scope: " + printable(f"{text}: {error!r}" if error is not None else text)
 
 
 def logger() -> logging.Logger:
@@ -102,7 +102,7 @@ class Connection(web.RequestHandler):
                 logger().error("%s %s failed", request.method, request.path, exc_info=exc)
         if request.writer.output_size > 0:
             raise ConnectionError("the response has already started")
-        text = line(" ".join(text.split())[:_LONGEST])
+        text = printable(" ".join(text.split())[:_LONGEST])
         answer = web.Response(status=status, text=f"{text}\n", headers=HEADERS)
         answer.force_close()
         return answer

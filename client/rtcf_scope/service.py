@@ -16,8 +16,8 @@ import rtcf
 from aiohttp import web
 from rtcf_shared.errors import RtcfError
 
+from rtcf_scope.authentication import LOOPBACK, Authentication
 from rtcf_scope.connection import logger
-from rtcf_scope.door import LOOPBACK, Door
 from rtcf_scope.layouts import Layouts
 from rtcf_scope.recordings import Recordings
 from rtcf_scope.site import RIGHTS, Site
@@ -99,28 +99,28 @@ def options(args: argparse.Namespace, files: Sequence[Path] = ()) -> Options:
     )  # fmt: skip
 
 
-async def serve(given: Options, ready: Callable[[str, Door], None]) -> None:
+async def serve(given: Options, ready: Callable[[str, Authentication], None]) -> None:
     """Serve until SIGINT or SIGTERM.
 
-    When the server listens, call `ready` with its address and its door.  Raises RtcfError if it
-    cannot listen on the address.
+    When the server listens, call `ready` with its address and its authentication.  Raises RtcfError
+    if it cannot listen on the address.
     """
     ended = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, ended.set)
     loop.set_exception_handler(_log)
-    door = Door(given.token, given.names, MOST_CONNECTIONS, given.token_file)
+    authentication = Authentication(given.token, given.names, MOST_CONNECTIONS, given.token_file)
     recordings = Recordings(given.files, given.recordings)
     with rtcf.Client(given.socket) as client:
-        site = Site(client, door, given.right, Layouts(given.layouts), recordings)
+        site = Site(client, authentication, given.right, Layouts(given.layouts), recordings)
         running = web.AppRunner(site.app)
         await running.setup()
         assert running.server is not None
         try:
             try:
                 server = await loop.create_server(
-                    door.open(running.server), given.address, given.port
+                    authentication.open(running.server), given.address, given.port
                 )
             except OSError as error:
                 raise RtcfError(
@@ -129,7 +129,7 @@ async def serve(given: Options, ready: Callable[[str, Door], None]) -> None:
                 ) from None
             try:
                 port = server.sockets[0].getsockname()[1]
-                ready(f"http://{_called(given)}:{port}/", door)
+                ready(f"http://{_called(given)}:{port}/", authentication)
                 await ended.wait()
             finally:
                 # Without wait_closed(): since Python 3.12, it waits for the pages' connections.
@@ -161,7 +161,7 @@ def _log(loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
     logger().error("%s: %r", context.get("message"), context.get("exception"))
 
 
-def _tell_service_manager(address: str, _: Door) -> None:
+def _tell_service_manager(address: str, _: Authentication) -> None:
     # Without the token: more users can read the journal than the token's file.
     print(f"serving {address}", flush=True)
     path = os.environ.get("NOTIFY_SOCKET")

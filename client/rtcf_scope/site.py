@@ -16,12 +16,12 @@ from rtcf_shared.mcap_writer import McapWriter
 from rtcf_shared.recorder import Recorder
 
 from rtcf_scope import catalog
-from rtcf_scope.door import Door
+from rtcf_scope.authentication import Authentication
 from rtcf_scope.hub import Hub
 from rtcf_scope.layouts import MOST_BYTES, LayoutError, Layouts
-from rtcf_scope.line import line
-from rtcf_scope.news import News
+from rtcf_scope.printable import printable
 from rtcf_scope.recordings import Recordings
+from rtcf_scope.status_feed import StatusFeed
 from rtcf_scope.tab import PROTOCOL, Tab
 
 RIGHTS = ("observe", "tune", "operate")
@@ -37,16 +37,23 @@ class Site:
     """One server's pages, hubs and tabs; lives in one event loop."""
 
     def __init__(
-        self, client: rtcf.Client, door: Door, right: str, layouts: Layouts, recordings: Recordings
+        self,
+        client: rtcf.Client,
+        authentication: Authentication,
+        right: str,
+        layouts: Layouts,
+        recordings: Recordings,
     ) -> None:
         self._client = client
         self._right = right
         self._layouts = layouts
         self._recordings = recordings
         self._hubs: dict[str, Hub] = {}
-        self._news: dict[str, News] = {}
+        self._feeds: dict[str, StatusFeed] = {}
         self._tabs: set[web.WebSocketResponse | Tab] = set()
-        self.app = web.Application(middlewares=[door.middleware()], client_max_size=MOST_BYTES * 2)
+        self.app = web.Application(
+            middlewares=[authentication.middleware()], client_max_size=MOST_BYTES * 2
+        )
         # Read once, by URL path: no path of a request becomes a path of the file system.
         self._files = {
             f"/page/{file.relative_to(_PAGE)}": (file.read_bytes(), _TYPES[file.suffix])
@@ -56,7 +63,7 @@ class Site:
         route = self.app.router
         route.add_get("/", self._file)
         route.add_get("/page/{name:.*}", self._file)
-        route.add_post("/api/session", door.enter)
+        route.add_post("/api/session", authentication.enter)
         route.add_get("/api/about", self._told(self._about))
         route.add_get("/api/graph", self._told(self._graph))
         route.add_get("/api/statistics", self._told(self._statistics))
@@ -77,13 +84,13 @@ class Site:
         """Close all streams."""
         for hub in self._hubs.values():
             hub.close()
-        for news in self._news.values():
-            news.close()
+        for feed in self._feeds.values():
+            feed.close()
 
     async def _file(self, request: web.Request) -> web.Response:
         path = "/page/index.html" if request.path == "/" else request.path
         if path not in self._files:
-            raise web.HTTPNotFound(text=f"not found: {line(path[:_LONGEST])}\n")
+            raise web.HTTPNotFound(text=f"not found: {printable(path[:_LONGEST])}\n")
         data, kind = self._files[path]
         return web.Response(body=data, content_type=kind, charset="utf-8")
 
@@ -218,19 +225,19 @@ class Site:
             return refused("/stream requires a WebSocket")
         runner = runner_of(request) or "rt_runner"
         hub = self._hubs.setdefault(runner, Hub(self._client, runner))
-        news = self._news.setdefault(runner, News(self._client, runner))
+        feed = self._feeds.setdefault(runner, StatusFeed(self._client, runner))
         tab = Tab(hub)
         self._tabs.add(tab)
-        news.join(tab)
+        feed.join(tab)
         try:
             return await tab.serve(request)
         finally:
-            news.leave(tab)
+            feed.leave(tab)
             self._tabs.discard(tab)
             if hub.is_empty:  # names of nonexistent runners must not accumulate
                 self._hubs.pop(runner, None)
-            if news.is_empty:
-                self._news.pop(runner, None)
+            if feed.is_empty:
+                self._feeds.pop(runner, None)
 
 
 def runner_of(request: web.Request) -> str:

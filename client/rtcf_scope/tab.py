@@ -18,7 +18,7 @@ from rtcf_shared.ports import PortSchema
 from rtcf_scope import wire
 from rtcf_scope.chunk import Chunk, column_of, is_there
 from rtcf_scope.hub import Hub
-from rtcf_scope.line import line
+from rtcf_scope.printable import printable
 from rtcf_scope.trigger import CYCLE, Search, Trigger, TriggerError, parse
 
 PROTOCOL = "rtcf-scope"  # subprotocol of the WebSocket
@@ -318,5 +318,5 @@ class _Missing:
 
 def _few(names: tuple[str, ...]) -> str:
     more = len(names) - _NAMED
-    shown = ", ".join(line(name[:_LONGEST_NAMED]) for name in names[:_NAMED])
+    shown = ", ".join(printable(name[:_LONGEST_NAMED]) for name in names[:_NAMED])
     return f"{shown} and {more} more" if more > 0 else shown

@@ -269,9 +269,9 @@ def test_a_source_is_loaded_cached_and_swapped_in_when_saved(
 def test_a_save_during_compilation_is_noticed(tmp_path: Path) -> None:
     source = tmp_path / "counts.py"
     source.write_text(COUNTS)
-    looks = python_source.looks(str(source))
+    changes = python_source.changes(str(source))
     source.write_text(COUNTS + "\n")
-    seeing = threading.Thread(target=lambda: next(saved for saved in looks if saved), daemon=True)
+    seeing = threading.Thread(target=lambda: next(saved for saved in changes if saved), daemon=True)
     seeing.start()
     seeing.join(DEADLINE_S)
     assert not seeing.is_alive()

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import rtcf
-from rtcfctl.graph import component, wires
+from rtcfctl.graph import component, connections
 from rtcfctl.terminal.output import Output
 
 from rtcf_launch import arguments, rendezvous, runner_info, tcpros
@@ -42,14 +42,17 @@ TOOLS = {
         "one component and its ports", "component", runner_info.component_info, component.show
     ),
     "component_order": Tool(
-        "the order in which the components run", "", runner_info.component_order, wires.show_order
+        "the order in which the components run",
+        "",
+        runner_info.component_order,
+        connections.show_order,
     ),
     "connection_list": Tool(
-        "the connections of a loop", "", runner_info.connection_list, wires.show_connections
+        "the connections of a loop", "", runner_info.connection_list, connections.show_connections
     ),
     "connection_info": Tool(
         "one connection: who writes and who reads", "connection", runner_info.connection_info,
-        wires.show_connection,
+        connections.show_connection,
     ),
 }  # fmt: skip
 

@@ -14,7 +14,7 @@ from rtcfctl.terminal import words
 from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.plain import enumerator
 
-_LOOKS_PER_CHECK = 5  # looks at a watched source per check that its component still exists
+_POLLS_PER_CHECK = 5  # comparisons of a watched source per check that its component still exists
 _STYLES = {
     graph_pb2.COMPONENT_STATE_FAULTED: "bold red",
     graph_pb2.COMPONENT_STATE_LEFT_OUT: "bold red",
@@ -78,14 +78,14 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
 
 def load(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Load a component."""
-    if args.watch and not python_source.is_one(args.package):
+    if args.watch and not python_source.is_source(args.package):
         raise ValueError("--watch requires a Python source: rtcfctl load FILE.py COMPONENT --watch")
-    looks = python_source.looks(args.package) if args.watch else None
+    changes = python_source.changes(args.package) if args.watch else None
     result = client.load(_spec(args, output), args.runner, output.progress, wait=args.wait)
     output.changed(f"loaded {result.component}", result)
-    if looks is not None:
+    if changes is not None:
         sys.stdout.flush()
-        watch(client, args, output, result.component, looks)
+        watch(client, args, output, result.component, changes)
 
 
 def watch(
@@ -93,11 +93,11 @@ def watch(
     args: argparse.Namespace,
     output: Output,
     name: str,
-    looks: Iterable[bool],
+    changes: Iterable[bool],
 ) -> None:
     """Replace a component whenever its Python source is saved."""
-    for at, saved in enumerate(looks):
-        if at % _LOOKS_PER_CHECK == 0:
+    for at, saved in enumerate(changes):
+        if at % _POLLS_PER_CHECK == 0:
             _require(client, args.runner, name)
         if not saved:
             continue
@@ -358,7 +358,7 @@ def _component_options(to: argparse.ArgumentParser, needed: bool = True) -> None
 
 def _spec(args: argparse.Namespace, output: Output) -> graph_pb2.ComponentSpec:
     package = args.package
-    if python_source.is_one(package):
+    if python_source.is_source(package):
         package = python_source.compiled(
             package, args.build_tree, output.progress, not args.no_verify
         )

@@ -18,7 +18,7 @@ from pathlib import Path
 import rtcf
 from rtcf_shared.folders import compiled_folder
 
-_LOOK_S = 0.2
+_POLL_S = 0.2
 _VERIFY = "1s"  # processor time of the comparison
 _DIFFERENT = 3  # exit status of rtcf-compile if machine code and interpreter differ
 _VERIFIED = " verified"
@@ -28,7 +28,7 @@ class NotCompiledError(rtcf.RtcfError):
     """The source cannot be compiled; the message is one line."""
 
 
-def is_one(package: str) -> bool:
+def is_source(package: str) -> bool:
     """Return whether the package argument is a Python source."""
     return package.endswith(".py")
 
@@ -88,7 +88,7 @@ def _ros_name(stem: str) -> str:
     return name if name[:1].isalpha() else f"source_{name}"
 
 
-def looks(source: str) -> Iterator[bool]:
+def changes(source: str) -> Iterator[bool]:
     """Yield, every 0.2 s, whether the content of a source or of a Python file beside it has changed
     since the last time.  The first comparison is with the content at the time of this call, so
     that a change during a compilation is not missed."""
@@ -98,7 +98,7 @@ def looks(source: str) -> Iterator[bool]:
 
 def _changes(file: Path, last: str) -> Iterator[bool]:
     while True:
-        time.sleep(_LOOK_S)
+        time.sleep(_POLL_S)
         now = fingerprint(file)
         yield now != last
         last = now

@@ -18,7 +18,7 @@ from rtcfctl.graph import files, python_source
 from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.words import counted
 
-_LOOK_S = 0.5
+_POLL_S = 0.5
 
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
@@ -39,10 +39,10 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
 
 def show(_: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Run the loop until Ctrl-C.  Raises ValueError, and RtcfError if the daemon ends."""
-    if python_source.is_one(args.file) != bool(args.type):
+    if python_source.is_source(args.file) != bool(args.type):
         raise ValueError("run: specify a graph file, or FILE.py and CLASS")
-    work = _Work(args, output)
-    graphs = work.read()  # report errors in the file before the daemon starts
+    source = _Source(args, output)
+    graphs = source.read()  # report errors in the file before the daemon starts
     try:
         folders = component_folders(args.path)
     except ValueError as error:
@@ -55,14 +55,14 @@ def show(_: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     try:
         daemon.start()
         with rtcf.Client(daemon.socket) as client:
-            runners = work.apply(client, graphs)
+            runners = source.apply(client, graphs)
             for runner in [] if args.no_start else runners:
                 client.start(runner, output.progress)
             _say(f"{'stopped' if args.no_start else 'running'}; Ctrl-C ends it")
             _say(f"from another terminal: rtcfctl --socket {daemon.socket} status")
             while not daemon.ended:
-                time.sleep(_LOOK_S)
-                work.look(client)
+                time.sleep(_POLL_S)
+                source.reload(client)
         raise rtcf.RtcfError("rtcfd has ended: see above")
     except KeyboardInterrupt:
         return
@@ -79,7 +79,7 @@ def _full_name(spec: graph_pb2.ComponentSpec) -> str:
     return "/" + "/".join([*parts, spec.name or spec.type])
 
 
-class _Work:
+class _Source:
     """The graph file or Python source, its last applied version, and the last reported error."""
 
     def __init__(self, args: argparse.Namespace, output: Output) -> None:
@@ -121,7 +121,7 @@ class _Work:
             names.append(graph.runner)
         return names
 
-    def look(self, client: rtcf.Client) -> None:
+    def reload(self, client: rtcf.Client) -> None:
         """Apply a saved file or rebuilt libraries.  Print an error once; the loop continues."""
         content = self._content()
         try:

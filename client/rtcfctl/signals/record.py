@@ -13,8 +13,8 @@ from rtcf.streams.condition import Condition
 from rtcf.streams.ports import PortStream
 from rtcf_shared.ports import PortBatch
 
-from rtcfctl.signals.ending import ended_by_signals
 from rtcfctl.signals.idle_loop import say_if_ended, say_if_idle
+from rtcfctl.signals.termination import ended_by_signals
 from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.words import amount, counted
 

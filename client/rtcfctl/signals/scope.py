@@ -40,20 +40,22 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
 def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Serve until Ctrl-C."""
     from rtcf_scope import service
-    from rtcf_scope.door import Door
+    from rtcf_scope.authentication import Authentication
     from rtcf_scope.redirect import Redirect
 
     given = service.options(args, args.files)
     with contextlib.ExitStack() as at_the_end:
 
-        def ready(address: str, door: Door) -> None:
+        def ready(address: str, authentication: Authentication) -> None:
             print(f"{address}?token={given.token}", flush=True)
             if hint := _way_through_ssh(urlsplit(address).port or 80):
                 print(f"from your machine:  {hint}", file=sys.stderr)
             if args.no_browser or not _has_display():
                 return
             try:
-                redirect = Redirect(f"{address}?token={door.ticket(lambda: redirect.remove())}")
+                redirect = Redirect(
+                    f"{address}?token={authentication.ticket(lambda: redirect.remove())}"
+                )
             except OSError as error:
                 print(f"cannot open a browser: {error}; open the address above", file=sys.stderr)
                 return

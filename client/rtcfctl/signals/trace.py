@@ -15,8 +15,8 @@ from rtcf.streams.ports import PortStream
 from rtcf.v1 import runner_pb2
 from rtcf_shared.whole_files import whole_file
 
-from rtcfctl.signals.ending import ended_by_signals
 from rtcfctl.signals.idle_loop import say_if_ended, say_if_idle
+from rtcfctl.signals.termination import ended_by_signals
 from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.words import counted, whole
 

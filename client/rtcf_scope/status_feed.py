@@ -22,7 +22,7 @@ _EVERY_S = 1.0
 _MOST_RECORDS = 100  # log records per _EVERY_S; the rest is counted
 
 
-class News:
+class StatusFeed:
     """Sends state, events and log records of one runner to its tabs; lives in the event loop."""
 
     def __init__(self, client: rtcf.Client, runner: str) -> None:

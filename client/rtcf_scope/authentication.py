@@ -23,7 +23,7 @@ from urllib.parse import urlsplit
 from aiohttp import web
 
 from rtcf_scope.connection import HEADERS, Connection
-from rtcf_scope.line import line
+from rtcf_scope.printable import printable
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 _MOST_SESSIONS = 256  # the least recently used ones are removed
@@ -37,7 +37,7 @@ _CROWDED = (
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
-class Door:
+class Authentication:
     """Authentication of one server; used only in the event loop."""
 
     def __init__(
@@ -125,12 +125,12 @@ class Door:
     def _check(self, request: web.Request) -> None:
         host = request.headers.get("Host", "")
         if not self._is_ours(host):
-            text = f"unknown host name {line(host[:_LONGEST])}: allow it with --name\n"
+            text = f"unknown host name {printable(host[:_LONGEST])}: allow it with --name\n"
             raise web.HTTPForbidden(text=text)
         origin = request.headers.get("Origin")
         if origin is not None and origin not in (f"http://{host}", f"https://{host}"):
             raise web.HTTPForbidden(
-                text=f"requests from pages of {line(origin[:_LONGEST])} are rejected\n"
+                text=f"requests from pages of {printable(origin[:_LONGEST])} are rejected\n"
             )
         if is_public(request.path):
             return
