@@ -21,12 +21,13 @@ from rtcfd.access.clients import Clients, Doors
 from rtcfd.access.endpoint import Endpoint
 from rtcfd.catalog.catalog import Catalog
 from rtcfd.catalog.describe import Describer
-from rtcfd.common.aside import Aside
+from rtcfd.common.background import WorkerThreads
 from rtcfd.common.names import DEFAULT_RUNNER
 from rtcfd.common.refusals import FailedPrecondition, Refusal, Unavailable
 from rtcfd.configuration import options
-from rtcfd.executor import frames, left_over
+from rtcfd.executor import left_over
 from rtcfd.executor.command import ExecutorCommand, claims_folder_of_user
+from rtcfd.executor.link import MAX_MESSAGE
 from rtcfd.incidents.incidents import Incidents
 from rtcfd.notify import Notify, machine_goes_down
 from rtcfd.operations.runner_core import Surroundings
@@ -209,7 +210,7 @@ class Daemon:
         log.info("leaving all loops to the next rtcfd")
         self._notify.stopping("leaving all loops to the next rtcfd")
         try:
-            await Aside("settings file").run(self._read_options, _LAST_LOOK_S)
+            await WorkerThreads("settings file").run(self._read_options, _LAST_LOOK_S)
         except Unavailable as silence:
             log.error("cannot check the settings for the next rtcfd: %s", silence)
         except Refusal as refusal:
@@ -285,7 +286,7 @@ def _when_stdin_ends(do: Callable[[], None]) -> None:
 def _server_options(message_kb: int) -> list[tuple[str, int]]:
     return [
         ("grpc.max_receive_message_length", message_kb * 1024),
-        ("grpc.max_send_message_length", frames.MAX_FRAME),
+        ("grpc.max_send_message_length", MAX_MESSAGE),
     ]
 
 
@@ -321,7 +322,7 @@ def _check(arguments: Sequence[str] | None, build_tree: Path | None) -> int:
     """Check settings and graphs, and print the errors."""
     log.addHandler(logging.NullHandler())  # the errors are printed, not logged
     given = options.parse(arguments, build_tree)
-    _, problems = BootGraphs(given.graphs_dir, {}, given.opinion).read()
+    _, problems = BootGraphs(given.graphs_dir, {}, given.settings_error).read()
     for problem in problems:
         print(f"rtcfd: {problem}", file=sys.stderr)
     if not problems:

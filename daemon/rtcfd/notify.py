@@ -9,7 +9,7 @@ import os
 import socket
 from collections.abc import Callable
 
-from rtcfd.common.tasks import looked_at
+from rtcfd.common.background import log_failure
 
 _EXTEND_EVERY_S = 10
 _ASKING_TIMEOUT_S = 10.0  # of systemctl, which is slow while the machine shuts down
@@ -64,7 +64,7 @@ class Notify:
 
     def starting(self) -> None:
         """Extend the start timeout repeatedly, until ready() is called."""
-        self._starting = looked_at(asyncio.create_task(self._extend()), "asking systemd for time")
+        self._starting = log_failure(asyncio.create_task(self._extend()), "asking systemd for time")
 
     def ready(self, status: str) -> None:
         """Report that rtcfd serves clients, and begin to feed the watchdog."""
@@ -74,7 +74,7 @@ class Notify:
         usec = os.environ.get("WATCHDOG_USEC", "")
         pid = os.environ.get("WATCHDOG_PID", str(os.getpid()))
         if usec.isdigit() and pid == str(os.getpid()):
-            self._watchdog = looked_at(
+            self._watchdog = log_failure(
                 asyncio.create_task(self._feed(int(usec) / 2e6)), "the watchdog's feeding"
             )
 

@@ -17,7 +17,7 @@ from rtcfd.access.admission import Admission
 from rtcfd.access.clients import Clients
 from rtcfd.catalog.catalog import Catalog
 from rtcfd.common import runner_settings
-from rtcfd.common.aside import Aside
+from rtcfd.common.background import WorkerThreads
 from rtcfd.common.refusals import Refusal, Unavailable
 from rtcfd.configuration.options import Options
 from rtcfd.operations.runner_core import Surroundings
@@ -60,11 +60,11 @@ class Reloads:
         self._clients = clients
         self._admission = admission
         self._store = store
-        self._users = Aside("user database")
-        self._aside = Aside("settings and graphs")
-        self._copy = Aside("state folder")
+        self._asking_users = WorkerThreads("user database")
+        self._reading = WorkerThreads("settings and graphs")
+        self._copying = WorkerThreads("state folder")
         self._left: Handover | None = None  # from the previous rtcfd
-        self._graphs = BootGraphs(given.graphs_dir, {}, self._opinion)
+        self._graphs = BootGraphs(given.graphs_dir, {}, self._settings_error)
         self._late: list[Given] = []  # changed graphs of runners whose executors are adopted first
         self._graph_problems: list[str] = []
         self._refused = ""  # the error of the last reload; empty = it succeeded
@@ -83,7 +83,7 @@ class Reloads:
             if not left.defaults.HasField("priority"):
                 before.ClearField("priority")
             self._shared.defaults = before
-            self._graphs = BootGraphs(self._given.graphs_dir, left.graphs, self._opinion)
+            self._graphs = BootGraphs(self._given.graphs_dir, left.graphs, self._settings_error)
         graphs, self._graph_problems = self._graphs.read()
         found = {state.runner: state for state in states}
         for given in graphs:
@@ -111,7 +111,7 @@ class Reloads:
         """Return the access rules for executors."""
         access = self._admission.access
         try:
-            return await self._users.run(
+            return await self._asking_users.run(
                 lambda: access.for_executors(self._given.socket), _USERS_TIMEOUT_S
             )
         except (Refusal, OSError) as problem:
@@ -155,9 +155,9 @@ class Reloads:
         return lines
 
     async def _read_again(self) -> list[str]:
-        new = await self._aside.run(self._read_options, _FILES_TIMEOUT_S)
+        new = await self._reading.run(self._read_options, _FILES_TIMEOUT_S)
         with contextlib.suppress(Unavailable):  # a hanging disk must not delay the rest
-            await self._copy.run(new.settings.keep, _COPY_TIMEOUT_S)
+            await self._copying.run(new.settings.keep, _COPY_TIMEOUT_S)
         lines = [
             f"{name} changes with the next restart of rtcfd"
             for name in _FIXED
@@ -179,7 +179,7 @@ class Reloads:
         for runner in self._runners.all():
             await runner.follow_limits()
         lines += await self._follow_defaults(new.defaults)
-        graphs, self._graph_problems = await self._aside.run(self._graphs.read, _FILES_TIMEOUT_S)
+        graphs, self._graph_problems = await self._reading.run(self._graphs.read, _FILES_TIMEOUT_S)
         lines += self._graph_problems
         lines += await self._apply([given for given in graphs if given.changed])
         self._leave_note()
@@ -193,8 +193,8 @@ class Reloads:
         )
         return lines
 
-    def _opinion(self, settings: runner_pb2.RunnerSettings) -> str:
-        return self._given.opinion(settings)
+    def _settings_error(self, settings: runner_pb2.RunnerSettings) -> str:
+        return self._given.settings_error(settings)
 
     def _leave_note(self) -> None:
         handover.write(self._command_folder, Handover(self._shared.defaults, self._graphs.digests))

@@ -14,7 +14,7 @@ import grpc
 from google.protobuf.message import DecodeError
 from rtcf.v1 import errors_pb2
 
-from rtcfd.access import calls, lengths
+from rtcfd.access import calls
 from rtcfd.access.caller import ASKED_KEY, Caller, enter
 from rtcfd.access.calls import Level
 from rtcfd.access.clients import Client, Clients
@@ -182,14 +182,14 @@ def _asked_ns(context: Any) -> int:
 
 
 def _runner(request: Any) -> str:
-    return str(getattr(request, "runner", ""))[: lengths.LONGEST_NAME]
+    return str(getattr(request, "runner", ""))[: calls.LONGEST_NAME]
 
 
 def _require_formed(method: str, request: Any) -> None:
     if isinstance(request, _Malformed):
         raise request.problem
     if hasattr(request, "DESCRIPTOR"):
-        lengths.check(request)
+        calls.check_texts(request)
         known_values.check(request)
 
 

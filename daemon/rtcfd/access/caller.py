@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 from rtcfd.access.calls import Level
 from rtcfd.access.peer import Peer
-from rtcfd.access.tuning import Tuning
+from rtcfd.access.rights import Tuning
 
 # Metadata of a call: CLOCK_MONOTONIC of the caller, which is on this machine.
 ASKED_KEY = "rtcf-asked-ns"

@@ -1,4 +1,4 @@
-"""The calls of rtcf.v1.Control, each with its required right and its largest request.
+"""The calls of rtcf.v1.Control, each with its required right and its largest request and texts.
 
 A call that is missing here requires the right to administer; a test checks that
 none is missing.
@@ -6,8 +6,11 @@ none is missing.
 
 import enum
 from dataclasses import dataclass
+from typing import Any
 
-from rtcf.v1 import runner_pb2
+from rtcf.v1 import errors_pb2, runner_pb2
+
+from rtcfd.common.refusals import InvalidArgument
 
 
 class Level(enum.IntEnum):
@@ -36,6 +39,18 @@ WORDS = {level.word: level for level in Level}
 _NAMES = 16 * 1024  # a handful of names
 _LISTS = 1024 * 1024  # names of many components
 _ANY = 16 * 1024 * 1024  # a graph or a recording: the limit of rtcfd's gRPC servers
+# Longest texts in requests, in characters.
+LONGEST_NAME = 255  # the limit of ROS
+LONGEST_TEXT = 4096  # remaps, expressions, URIs
+LONGEST_VALUE = 64 * 1024  # string parameters
+_NAME_FIELDS = frozenset(
+    {
+        "runner", "component", "components", "package", "type", "name", "ns", "port", "run_id",
+        "token", "holder",
+    }
+)  # fmt: skip
+_VALUES = "rtcf.v1.ParameterValue"
+_BULK = frozenset({"rtcf.v1.RecordedMessage"})
 
 
 @dataclass(frozen=True)
@@ -97,3 +112,35 @@ CALLS = {
 def of(method: str) -> Call:
     """Return the requirements of a method."""
     return CALLS.get(method, UNKNOWN)
+
+
+def check_texts(message: Any) -> None:
+    """Raise InvalidArgument if a text in a request, at any depth, is too long.
+
+    Names go into look-ups, suggestions, log records and errors.  The cost of each grows with their
+    length, so this comes before all other work.
+    """
+    full_name = message.DESCRIPTOR.full_name
+    if full_name in _BULK:
+        return
+    for field, value in message.ListFields():
+        if field.message_type is not None:
+            # `value` is one message or a list of messages.
+            for each in [value] if hasattr(value, "DESCRIPTOR") else value:
+                check_texts(each)
+        elif field.cpp_type == field.CPPTYPE_STRING and field.type == field.TYPE_STRING:
+            longest = (
+                LONGEST_VALUE
+                if full_name == _VALUES
+                else LONGEST_NAME
+                if field.name in _NAME_FIELDS
+                else LONGEST_TEXT
+            )
+            for text in [value] if isinstance(value, str) else value:
+                if len(text) > longest:
+                    raise InvalidArgument(
+                        f"{field.name} of {len(text)} characters is too long: at most {longest} "
+                        f"({text[:40]}…)",
+                        errors_pb2.REASON_TEXT_TOO_LONG,
+                        field=field.name,
+                    )

@@ -8,7 +8,7 @@ import struct
 import time
 from dataclasses import dataclass
 
-from rtcfd.common.aside import Aside
+from rtcfd.common.background import WorkerThreads
 from rtcfd.common.refusals import Refusal
 
 _CREDENTIALS = struct.Struct("3i")  # struct ucred, unix(7)
@@ -67,7 +67,7 @@ class Directory:
     """
 
     def __init__(self) -> None:
-        self._aside = Aside("user database")
+        self._threads = WorkerThreads("user database")
         self._kept: dict[tuple[int, frozenset[int]], tuple[float, str, frozenset[str]]] = {}
         # A hanging user database must not lock out root and our own user.
         self._sure = {0: "root", os.geteuid(): user_name(os.geteuid())}
@@ -86,7 +86,7 @@ class Directory:
     async def peer(self, found: Credentials) -> Peer:
         """Return a peer with its names; not `known` if the user database does not answer."""
         try:
-            user, groups = await self._aside.run(lambda: _names(found), _TIMEOUT_S)
+            user, groups = await self._threads.run(lambda: _names(found), _TIMEOUT_S)
         except (Refusal, OSError):
             return Peer(found.pid, found.uid, f"#{found.uid}", frozenset(), known=False)
         if len(self._kept) >= _MOST_KEPT:
@@ -99,7 +99,7 @@ class Directory:
         try:
             if uid in self._sure:
                 return self._sure[uid]
-            return await self._aside.run(lambda: user_name(uid), _TIMEOUT_S)
+            return await self._threads.run(lambda: user_name(uid), _TIMEOUT_S)
         except (Refusal, OSError):
             return f"#{uid}"
 

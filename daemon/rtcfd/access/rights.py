@@ -1,12 +1,16 @@
-"""The rights of clients, by user and group.
+"""The rights of clients, by user and group, and the rules on single parameters.
 
-Owned by the daemon; admission.py checks them before each call.
+Owned by the daemon; admission.py checks the rights before each call, operations/parameters.py the
+rules ([[access.parameters]] of the settings) before each change.  A rule lets users with the right
+to observe set some parameters, and restricts users with the right to tune to them.  Users with the
+right to operate are not restricted.
 """
 
 import grp
 import logging
 import os
 import pwd
+import re
 import stat
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
@@ -18,17 +22,62 @@ from rtcf.v1 import errors_pb2
 from rtcfd.access import calls
 from rtcfd.access.calls import WORDS, Level
 from rtcfd.access.peer import Peer
-from rtcfd.access.tuning import Rule, Tuning, bound
-from rtcfd.common.refusals import PermissionDenied
+from rtcfd.common.refusals import FailedPrecondition, PermissionDenied
 
-__all__ = ["WORDS", "Access", "Level", "needed", "rules"]
+__all__ = ["WORDS", "Access", "Level", "Rule", "Tuning", "needed", "require_pace", "rules"]
 
 log = logging.getLogger(__name__)
+
+# The allowed step grows with the time since the last change, up to this time.
+LONGEST_PAUSE_S = 10.0
+_FIRST_PAUSE_S = 1.0  # assumed before the first change
 
 
 def needed(method: str) -> Level:
     """Return the right that a method of rtcf.v1.Control requires."""
     return calls.of(method).right
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A set of users, and the parameters that they may set."""
+
+    who: frozenset[str]  # users, and groups with @
+    runner: str = ".*"  # regular expression that matches the whole name
+    names: tuple[str, ...] = (".*",)  # likewise, for COMPONENT.PARAMETER
+    most_per_s: float | None = None  # largest change of a number per second, in its unit
+
+    def of(self, peer: Peer) -> bool:
+        """Return whether the rule names this user or one of its groups."""
+        return peer.user in self.who or not self.who.isdisjoint(f"@{each}" for each in peer.groups)
+
+    def allows(self, runner: str, name: str) -> bool:
+        """Return whether the rule covers a parameter; `name` is COMPONENT.PARAMETER."""
+        if not re.fullmatch(self.runner, runner):
+            return False
+        return any(re.fullmatch(pattern, name) for pattern in self.names)
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """The rules that bind one user."""
+
+    user: str
+    rules: tuple[Rule, ...]
+
+    def rule(self, runner: str, name: str) -> Rule:
+        """Return the rule for a parameter; raises PermissionDenied if there is none."""
+        for rule in self.rules:
+            if rule.allows(runner, name):
+                return rule
+        allowed = ", ".join(sorted({each for rule in self.rules for each in rule.names}))
+        raise PermissionDenied(
+            f"user {self.user} may not set {name} of runner {runner}, only parameters that match "
+            f"{allowed}: see [[access.parameters]] in rtcfd's settings",
+            errors_pb2.REASON_PARAMETER_FORBIDDEN,
+            parameter=name,
+            user=self.user,
+        )
 
 
 @dataclass(frozen=True)
@@ -44,7 +93,8 @@ class Access:
     def tuning(self, peer: Peer) -> Tuning | None:
         """Return the parameter rules that bind a peer; None: its right alone decides."""
         rules = tuple(rule for rule in self.parameters if rule.of(peer))
-        return Tuning(peer.user, rules) if bound(self.level(peer), rules) else None
+        bound = bool(rules) and self.level(peer) < Level.OPERATE
+        return Tuning(peer.user, rules) if bound else None
 
     def level(self, peer: Peer) -> Level:
         """Return the right of a peer."""
@@ -122,6 +172,30 @@ def rules(
             else:
                 users[name] = level
     return Access(default, users, groups, parameters)
+
+
+def require_pace(
+    rule: Rule, name: str, old: object, new: object, last: float | None, now: float
+) -> None:
+    """Raise FailedPrecondition if a number changes faster than the rule allows.
+
+    `last` is the time of the last change (None: there was none), `now` the current time,
+    both in seconds on one clock.
+    """
+    if rule.most_per_s is None or not isinstance(old, int | float) or isinstance(old, bool):
+        return
+    if not isinstance(new, int | float):
+        return  # the component rejects a value of another type
+    pause_s = _FIRST_PAUSE_S if last is None else min(now - last, LONGEST_PAUSE_S)
+    most = rule.most_per_s * pause_s
+    # "not <=" instead of ">": NaN must fail.
+    if not abs(new - old) <= most:
+        raise FailedPrecondition(
+            f"{name} may change by {rule.most_per_s:g} a second: from {old:g} to between "
+            f"{old - most:g} and {old + most:g} for now, not to {new:g}",
+            errors_pb2.REASON_PARAMETER_TOO_FAST,
+            parameter=name,
+        )
 
 
 def _deed(level: Level) -> str:

@@ -17,7 +17,7 @@ from rtcf_shared.folders import packages
 from rtcf_shared.naming import closest, listing, suggestion
 
 from rtcfd.catalog.describe import Describer
-from rtcfd.common.aside import Aside
+from rtcfd.common.background import WorkerThreads
 from rtcfd.common.names import check_base_name
 from rtcfd.common.refusals import FailedPrecondition, NotFound
 
@@ -82,7 +82,7 @@ class Catalog:
         self.folders = list(folders)
         self._describer = describer
         # The folders may be on a server that does not answer.
-        self._aside = Aside("folders of components")
+        self._threads = WorkerThreads("folders of components")
 
     def look_again(self) -> None:
         """Forget the cached failures of libraries."""
@@ -179,7 +179,7 @@ class Catalog:
 
     async def _packages(self) -> dict[str, list[Path]]:
         folders = [folder.path for folder in self.folders]
-        return await self._aside.run(lambda: packages(folders), _FOLDERS_TIMEOUT_S)
+        return await self._threads.run(lambda: packages(folders), _FOLDERS_TIMEOUT_S)
 
     def _owner(self, library: Path) -> int | None:
         """Return the owner() of the folder with a library's package."""

@@ -16,7 +16,7 @@ from google.protobuf.message import DecodeError
 from rtcf.executor.v1 import executor_pb2 as wire
 
 from rtcfd.common import regular_files
-from rtcfd.common.aside import Aside
+from rtcfd.common.background import WorkerThreads
 from rtcfd.common.refusals import Refusal
 from rtcfd.executor.command import ExecutorCommand
 from rtcfd.executor.process import describe_exit
@@ -75,7 +75,7 @@ class Describer:
     def __post_init__(self) -> None:
         self._known: dict[_File, _Known] = {}
         self._running: dict[tuple[_File, _Identity], asyncio.Task[wire.LibraryDescription]] = {}
-        self._aside = Aside("folders of components")
+        self._threads = WorkerThreads("folders of components")
         self._slots = asyncio.Semaphore(_AT_ONCE)
 
     @property
@@ -97,7 +97,7 @@ class Describer:
         `owner` is a uid whose libraries are trusted besides root's and our own.
         """
         try:
-            found = await self._aside.run(library.stat, TIMEOUT_S)
+            found = await self._threads.run(library.stat, TIMEOUT_S)
             # Loading a FIFO would wait for its other end.
             regular_files.require_regular(library, found)
         except OSError as error:

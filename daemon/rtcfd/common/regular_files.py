@@ -14,6 +14,19 @@ import stat
 from collections.abc import Callable
 from pathlib import Path
 
+from google.protobuf import json_format
+
+# Raised by parsing unexpected content of a file.
+PARSE_ERRORS = (
+    ValueError,
+    TypeError,
+    AttributeError,
+    LookupError,
+    OverflowError,
+    RecursionError,
+    json_format.ParseError,
+)
+
 _KINDS: tuple[tuple[Callable[[int], bool], str], ...] = (
     (stat.S_ISDIR, "a folder"),
     (stat.S_ISFIFO, "a named pipe"),

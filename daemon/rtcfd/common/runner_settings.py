@@ -1,7 +1,7 @@
 """Settings of runners: defaults, merging, checks.
 
 Regular expressions are checked by an executor, because it compiles them with the
-engine that uses them: see executor/opinion.py.
+engine that uses them: see executor/command.py.
 """
 
 import math

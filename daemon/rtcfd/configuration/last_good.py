@@ -34,18 +34,18 @@ class Settings:
         file: Path | None,
         folder: Path | None,
         last_good: bool,
-        opinion: settings_file.Opinion = lambda _: "",
+        settings_error: settings_file.SettingsError = lambda _: "",
     ) -> "Settings":
         """Read `file`, unless it is None; the copy is in `folder`.
 
-        `opinion` is for settings_file.read.  Raises Refusal for a bad file; with `last_good`,
-        only if there is no good copy either.
+        `settings_error` is for settings_file.read.  Raises Refusal for a bad file; with
+        `last_good`, only if there is no good copy either.
         """
         copy = folder / _NAME if folder else None
         if file is None:
             return Settings()
         try:
-            return Settings(settings_file.read(file, opinion), _copy=copy)
+            return Settings(settings_file.read(file, settings_error), _copy=copy)
         except Refusal as refusal:
             if not last_good or copy is None or not _is_there(copy):
                 raise

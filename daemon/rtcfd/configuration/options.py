@@ -16,10 +16,16 @@ from rtcfd.access.rights import Access
 from rtcfd.catalog.catalog import Folder
 from rtcfd.common import regular_files, runner_settings
 from rtcfd.common.limits import Limits
-from rtcfd.configuration import paths, settings_file
+from rtcfd.configuration import settings_file
 from rtcfd.configuration.last_good import Settings
-from rtcfd.executor import opinion
+from rtcfd.executor.command import settings_error
 
+# rtcf_shared.folders has the default folders of components.
+_SOCKET = Path("/run/rtcfd/control.sock")
+_RUNTIME_DIR = Path("/run/rtcfd")
+_STATE_DIR = Path("/var/lib/rtcfd")
+_GRAPHS_DIR = Path("/etc/rtcfd/graphs.d")
+_EXECUTOR = Path("/usr/lib/rtcf/rtcf-executor")
 _REALTIME = {
     "required": runner_pb2.REALTIME_REQUIRED,
     "preferred": runner_pb2.REALTIME_PREFERRED,
@@ -46,9 +52,9 @@ class Options:
     verbose: bool
     settings: Settings  # from the configuration file
 
-    def opinion(self, settings: runner_pb2.RunnerSettings) -> str:
+    def settings_error(self, settings: runner_pb2.RunnerSettings) -> str:
         """Return why an executor would reject the settings of a runner; empty = it accepts them."""
-        return opinion.of_settings(self.executor, runner_settings.merged(self.defaults, settings))
+        return settings_error(self.executor, runner_settings.merged(self.defaults, settings))
 
 
 def parse(
@@ -61,16 +67,16 @@ def parse(
     args = _parser(build_tree).parse_args(arguments)
     kept = None
     if not args.foreground:
-        kept = _absolute(args.state_dir or _from_systemd("STATE_DIRECTORY", paths.STATE_DIR))
+        kept = _absolute(args.state_dir or _from_systemd("STATE_DIRECTORY", _STATE_DIR))
 
     def executor(file: settings_file.Config) -> Path:
-        return _absolute(args.executor or file.executor or paths.executor(build_tree))
+        return _absolute(args.executor or file.executor or _executor_of(build_tree))
 
     settings = Settings.read(
         _file(args),
         kept,
         last_good,
-        lambda file: opinion.of_settings(executor(file), file.runner),
+        lambda file: settings_error(executor(file), file.runner),
     )
     file = settings.found
     socket = _socket(args, file)
@@ -83,9 +89,9 @@ def parse(
         own_runtime_dir = runtime_dir is None
         runtime_dir = runtime_dir or socket.with_name(socket.name + ".d")
     else:
-        runtime_dir = runtime_dir or paths.RUNTIME_DIR
-        state_dir = state_dir or _from_systemd("STATE_DIRECTORY", paths.STATE_DIR)
-        graphs_dir = graphs_dir or paths.GRAPHS_DIR
+        runtime_dir = runtime_dir or _RUNTIME_DIR
+        state_dir = state_dir or _from_systemd("STATE_DIRECTORY", _STATE_DIR)
+        graphs_dir = graphs_dir or _GRAPHS_DIR
     return Options(
         socket=socket,
         runtime_dir=_absolute(runtime_dir),
@@ -147,7 +153,7 @@ def _parser(build_tree: Path | None) -> argparse.ArgumentParser:
         "--socket",
         type=Path,
         metavar="PATH",
-        help=f"listen on this control socket (default: $RTCF_SOCKET, else {paths.SOCKET})",
+        help=f"listen on this control socket (default: $RTCF_SOCKET, else {_SOCKET})",
     )
     parser.add_argument(
         "--runtime-dir",
@@ -168,7 +174,7 @@ def _parser(build_tree: Path | None) -> argparse.ArgumentParser:
         type=Path,
         metavar="DIR",
         help="apply the graphs in this folder at the start "
-        f"(default: {paths.GRAPHS_DIR}; with --foreground: none)",
+        f"(default: {_GRAPHS_DIR}; with --foreground: none)",
     )
     parser.add_argument(
         "--config",
@@ -189,7 +195,7 @@ def _parser(build_tree: Path | None) -> argparse.ArgumentParser:
         "--executor",
         type=Path,
         metavar="FILE",
-        help=f"run this executor binary (default: {paths.executor(build_tree)})",
+        help=f"run this executor binary (default: {_executor_of(build_tree)})",
     )
     parser.add_argument(
         "--realtime",
@@ -245,9 +251,7 @@ def _file(args: argparse.Namespace) -> Path | None:
 
 
 def _socket(args: argparse.Namespace, file: settings_file.Config) -> Path:
-    return _absolute(
-        args.socket or file.socket or Path(os.environ.get("RTCF_SOCKET") or paths.SOCKET)
-    )
+    return _absolute(args.socket or file.socket or Path(os.environ.get("RTCF_SOCKET") or _SOCKET))
 
 
 def check_wanted(arguments: Sequence[str] | None) -> bool:
@@ -259,6 +263,11 @@ def _folders(named: Sequence[Path], build_tree: Path | None) -> list[Folder]:
     """Return the search path.  In named folders, libraries of the folder's owner are trusted."""
     chosen = {Path(os.path.abspath(folder)) for folder in named}
     return [Folder(path, path in chosen) for path in component_folders(named, build_tree)]
+
+
+def _executor_of(build_tree: Path | None) -> Path:
+    """Return the executor that belongs to this rtcfd."""
+    return _EXECUTOR if build_tree is None else build_tree / "bin" / "rtcf-executor"
 
 
 def _from_systemd(variable: str, default: Path) -> Path:

@@ -14,6 +14,7 @@ error with its name and line.
 import math
 import re
 import tomllib
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -24,12 +25,10 @@ from rtcf_shared.enums import choices
 from rtcf_shared.naming import listing, suggestion
 
 from rtcfd.access import rights
-from rtcfd.access.rights import Access, Level
-from rtcfd.access.tuning import Rule
+from rtcfd.access.rights import Access, Level, Rule
 from rtcfd.common import regular_files, runner_settings
 from rtcfd.common.limits import RANGES, Limits
 from rtcfd.common.refusals import InvalidArgument, Refusal
-from rtcfd.configuration.toml_lines import lines_of_keys
 
 DEFAULT_FILE = Path("/etc/rtcfd/rtcfd.toml")
 
@@ -39,6 +38,11 @@ _PRINCIPAL = re.compile(r"@?[A-Za-z_][A-Za-z0-9_.-]*\$?")
 _INTEGERS = range(-(2**63), 2**63)
 _ENDLESS = re.compile(r"\d[\d_]{4300}")  # sys.int_info.default_max_str_digits
 _TYPE_WORDS = {bool: "true or false", int: "an integer", float: "a number", str: "a string"}
+
+# Lines of a TOML file.
+_TABLE = re.compile(r"\s*\[\s*([^\[\]]+?)\s*\]\s*(#.*)?$")
+_ENTRY = re.compile(r"\s*\[\[\s*([^\[\]]+?)\s*\]\]\s*(#.*)?$")
+_KEY = re.compile(r"\s*([A-Za-z0-9_.\"'-]+(?:\s*\.\s*[A-Za-z0-9_\"'-]+)*)\s*=")
 
 
 @dataclass
@@ -59,7 +63,7 @@ class Config:
 
 
 # Returns why an executor would reject the settings of a file; empty = it accepts them.
-Opinion = Callable[[Config], str]
+SettingsError = Callable[[Config], str]
 
 
 class _Wrong(InvalidArgument):
@@ -70,10 +74,10 @@ class _Wrong(InvalidArgument):
         self.key = key
 
 
-def read(file: Path, opinion: Opinion = lambda _: "") -> Config:
+def read(file: Path, settings_error: SettingsError = lambda _: "") -> Config:
     """Read a configuration file; raises Refusal with the file, the line and the error.
 
-    `opinion` asks an executor whether it accepts the settings of runners.
+    `settings_error` asks an executor whether it accepts the settings of runners.
     """
     try:
         # Some editors write a byte order mark.
@@ -108,10 +112,10 @@ def read(file: Path, opinion: Opinion = lambda _: "") -> Config:
         _read_limits(_table(document, "limits"), config)
         _read_message(_table(document, "runner"), "runner", config.runner)
         _check_runner(config.runner)
-        if config.runner.ListFields() and (reason := opinion(config)):
+        if config.runner.ListFields() and (reason := settings_error(config)):
             raise _Wrong(_key(reason), reason)
     except _Wrong as wrong:
-        lines = lines_of_keys(text)
+        lines = _lines_of_keys(text)
         # A missing key, or one of an inline table, has the line of its table.
         line = lines.get(wrong.key) or lines.get(wrong.key.rpartition(".")[0])
         where = f"{file}:{line}" if line else str(file)
@@ -322,3 +326,32 @@ def _check_keys(where: str, table: dict[str, Any], known: Iterable[str]) -> None
                 f"{where}{key}",
                 f'unknown key "{where}{key}"{suggestion(key, names)} (known: {listing(names)})',
             )
+
+
+def _lines_of_keys(text: str) -> dict[str, int]:
+    """Return the line, from 1, of each table and key, which tomllib does not return.
+
+    Keys are complete, as "runner.ros.queue", and with an index in tables of a list, as
+    "access.parameters[0].who".
+    """
+    found: dict[str, int] = {}
+    entries: Counter[str] = Counter()
+    table = ""
+    for number, line in enumerate(text.splitlines(), start=1):
+        if match := _TABLE.match(line):
+            table = _plain(match[1])
+            found.setdefault(table, number)
+        elif match := _ENTRY.match(line):
+            name = _plain(match[1])
+            found.setdefault(name, number)
+            table = f"{name}[{entries[name]}]"
+            entries[name] += 1
+            found[table] = number
+        elif match := _KEY.match(line):
+            key = _plain(match[1])
+            found.setdefault(f"{table}.{key}" if table else key, number)
+    return found
+
+
+def _plain(name: str) -> str:
+    return ".".join(part.strip().strip("\"'") for part in name.split("."))

@@ -1,15 +1,17 @@
-"""The command line of an executor: its binary, its sockets, its environment."""
+"""The command lines of an executor: to run a loop, and to check settings."""
 
 import contextlib
 import hashlib
 import os
+import signal
 import stat
+import subprocess
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from rtcf.v1 import errors_pb2
+from rtcf.v1 import errors_pb2, runner_pb2
 
 from rtcfd.common.refusals import FailedPrecondition
 
@@ -20,6 +22,12 @@ _OWN_VARIABLES = ("NOTIFY_SOCKET", "WATCHDOG_USEC", "WATCHDOG_PID", "LISTEN_FDS"
 
 # sizeof(sockaddr_un::sun_path) - 1, see unix(7).
 MAX_SOCKET_PATH = 107
+
+# Of --check-settings.
+_CHECK_TIMEOUT_S = 10.0
+_REJECTED = 1
+_BEGIN = "rtcf-executor: "
+_MAX_LENGTH = 1500  # characters of the error, which may quote the longest allowed expression
 
 
 @dataclass(frozen=True)
@@ -97,6 +105,33 @@ class ExecutorCommand:
     def environment() -> dict[str, str]:
         """Return our environment (ROS_MASTER_URI, ROS_IP …) without the variables for rtcfd."""
         return {name: value for name, value in os.environ.items() if name not in _OWN_VARIABLES}
+
+
+def settings_error(binary: Path, settings: runner_pb2.RunnerSettings) -> str:
+    """Return why an executor would reject the settings, in one line; empty = it accepts them, or
+    there is no executor to ask.
+
+    Asks it in a process of its own that runs no loop.  So regular expressions, and other values
+    that only the executor understands, are checked by the code that will use them.  Blocks.
+    """
+    try:
+        asked = subprocess.run(
+            [binary, "--check-settings"],
+            input=settings.SerializeToString(),
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            env=ExecutorCommand.environment(),
+            timeout=_CHECK_TIMEOUT_S,
+            check=False,
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return ""
+    if asked.returncode < 0:
+        return f"an executor crashes with it ({signal.Signals(-asked.returncode).name})"
+    if asked.returncode != _REJECTED:
+        return ""  # an executor of another version, or no executor
+    said = asked.stderr.decode(errors="replace").partition(_BEGIN)[2]
+    return " ".join(said.split())[:_MAX_LENGTH]  # an expression may have any characters
 
 
 def claims_folder_of_user(fallback: Path) -> Path:

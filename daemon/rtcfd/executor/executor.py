@@ -18,9 +18,9 @@ from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import errors_pb2, ports_pb2
 
 from rtcfd import VERSION
+from rtcfd.common.background import log_failure
 from rtcfd.common.limits import Limits
 from rtcfd.common.refusals import FailedPrecondition, Refusal, Silent, Unavailable
-from rtcfd.common.tasks import looked_at
 from rtcfd.executor import left_over
 from rtcfd.executor.command import ExecutorCommand
 from rtcfd.executor.flight_recorder import FlightRecorder, Note, Trace
@@ -333,7 +333,7 @@ class Executor:
     def _begin_to_watch(self) -> None:
         # Own context: do not attribute its end to the client whose call started it.
         watching = asyncio.create_task(self._watch(), context=contextvars.Context())
-        self._watching = looked_at(watching, f"the watch over {self._peer}")
+        self._watching = log_failure(watching, f"the watch over {self._peer}")
 
     async def _watch(self) -> None:
         """Wait for the end of the process; reconnect if the link breaks before."""

@@ -17,8 +17,7 @@ from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import errors_pb2, ports_pb2
 
 from rtcfd.common import refusals
-from rtcfd.common.tasks import looked_at
-from rtcfd.executor import frames
+from rtcfd.common.background import log_failure
 
 # The protocol version of this rtcfd.  It increases with features that need support by the peer.
 # rtcfd and an executor of neighbouring versions work together: the newer one does not use the new
@@ -28,6 +27,8 @@ LIMITS_PROTOCOL = 2  # since then, executors enforce [limits]
 ACCESS_PROTOCOL = 3  # since then, executors accept and report direct stops
 FIGURES_PROTOCOL = 4  # since then, one reset begins the counts of status and statistics
 PORTS_PROTOCOL = 4  # since then, executors send the values of ports
+MAX_MESSAGE = 16 * 1024 * 1024  # bytes, without the length before it
+_LENGTH_BYTES = 4  # little-endian, before each message
 _CREDENTIALS = struct.Struct("3i")  # struct ucred, unix(7)
 
 Progress = Callable[[str], None]
@@ -51,6 +52,10 @@ _REFUSALS: dict[int, tuple[type[refusals.Refusal], errors_pb2.Reason]] = {
         errors_pb2.REASON_LIMIT_REACHED,
     ),
 }
+
+
+class MessageError(Exception):
+    """A message violates the protocol."""
 
 
 class _Pending:
@@ -95,7 +100,7 @@ class Link:
         self.peer_pid, self.peer_uid, _ = _CREDENTIALS.unpack(credentials)
         # Own context: do not attribute executor messages to the connecting client.
         reading = asyncio.create_task(self._read(reader), context=contextvars.Context())
-        self._reading = looked_at(reading, f"the link to {peer}")
+        self._reading = log_failure(reading, f"the link to {peer}")
 
     @classmethod
     async def connect(cls, peer: str, path: Path, on_unasked: Unasked) -> "Link":
@@ -142,7 +147,7 @@ class Link:
             if opening.id and not self.ended.is_set():
                 # Nobody waits for its response.
                 closing = wire.Request(end_watch=wire.EndWatch(watch=opening.id))
-                self._writer.write(frames.pack(self._numbered(closing).SerializeToString()))
+                self._writer.write(pack_message(self._numbered(closing).SerializeToString()))
 
     def _numbered(self, request: wire.Request) -> wire.Request:
         request.id = self._next_id
@@ -158,7 +163,7 @@ class Link:
         self._numbered(request)
         self._pending[request.id] = pending
         try:
-            self._writer.write(frames.pack(request.SerializeToString()))
+            self._writer.write(pack_message(request.SerializeToString()))
             async with asyncio.timeout(timeout_s):
                 await self._writer.drain()
                 response = await pending.result
@@ -167,7 +172,7 @@ class Link:
                 f"{self.peer} did not answer {request.WhichOneof('kind')} within {timeout_s:g} s",
                 errors_pb2.REASON_EXECUTOR_SILENT,
             ) from None
-        except frames.FrameError as error:
+        except MessageError as error:
             raise refusals.InvalidArgument(
                 f"request too large: {error}", errors_pb2.REASON_REQUEST_TOO_LARGE
             ) from None
@@ -189,9 +194,9 @@ class Link:
 
     async def _read(self, reader: asyncio.StreamReader) -> None:
         try:
-            while (message := await frames.read(reader)) is not None:
+            while (message := await read_message(reader)) is not None:
                 self._dispatch(wire.Response.FromString(message))
-        except (frames.FrameError, DecodeError) as error:
+        except (MessageError, DecodeError) as error:
             self.problem = f"{self.peer} violates the protocol: {error}"
         finally:
             self._writer.close()
@@ -234,3 +239,21 @@ def _refusal(error: wire.Error) -> refusals.Refusal:
         error.code, (refusals.FailedPrecondition, errors_pb2.REASON_COMPONENT_REFUSED)
     )
     return kind(error.message, error.reason or reason)
+
+
+def pack_message(message: bytes) -> bytes:
+    """Return a serialized message with its length before it."""
+    if len(message) > MAX_MESSAGE:
+        raise MessageError(f"a message of {len(message)} bytes is above the limit of {MAX_MESSAGE}")
+    return len(message).to_bytes(_LENGTH_BYTES, "little") + message
+
+
+async def read_message(reader: asyncio.StreamReader) -> bytes | None:
+    """Return the next message, or None at the end of the stream."""
+    try:
+        size = int.from_bytes(await reader.readexactly(_LENGTH_BYTES), "little")
+        if size > MAX_MESSAGE:
+            raise MessageError(f"a message of {size} bytes is above the limit of {MAX_MESSAGE}")
+        return await reader.readexactly(size)
+    except (asyncio.IncompleteReadError, ConnectionError):
+        return None

@@ -15,7 +15,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from rtcfd.common.aside import Aside
+from rtcfd.common.background import WorkerThreads
 from rtcfd.executor.flight_recorder import Trace
 
 _READ_TIMEOUT_S = 2.0  # for the headers of one file
@@ -57,7 +57,9 @@ class Found:
     lines: tuple[str, ...] = ()
 
 
-async def find(trace: Trace, libraries: Iterable[str], program: str, folders: Aside) -> Found:
+async def find(
+    trace: Trace, libraries: Iterable[str], program: str, folders: WorkerThreads
+) -> Found:
     """Find the source lines of a crash; raises Unavailable if a disk does not answer.
 
     `libraries` are the library files of the components, without those that have changed since.
@@ -115,7 +117,7 @@ def _where(frame: _Frame) -> str:
     return f"{frame.name}+{frame.offset:#x}" if frame.offset else frame.name
 
 
-async def _lines(tool: str, file: str, frames: list[_Frame], folders: Aside) -> list[str]:
+async def _lines(tool: str, file: str, frames: list[_Frame], folders: WorkerThreads) -> list[str]:
     """Return addr2line's answers for places in one file; empty where it finds nothing."""
     try:
         addresses = await folders.run(

@@ -16,7 +16,7 @@ from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import ports_pb2
 from rtcf_shared.arrays import as_list
 
-from rtcfd.incidents import frame_layout
+from rtcfd.incidents import frame_memory
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ class Ring:
         )
 
     def _values(self, value: wire.FrameValue, part: slice) -> bytes:
-        rows = np.ascontiguousarray(self.words[part, frame_layout.HEAD_WORDS :]).view("u1")
+        rows = np.ascontiguousarray(self.words[part, frame_memory.HEAD_WORDS :]).view("u1")
         raw = rows[:, value.offset : value.offset + value.size]
         if not value.output:
             return raw.tobytes()
@@ -138,11 +138,11 @@ def read(descriptor: int) -> list[Ring]:
     Raises OSError, or ValueError if this is not a memory of frames.
     """
     with mmap.mmap(descriptor, 0, prot=mmap.PROT_READ) as memory:
-        if frame_layout.HEAD.unpack_from(memory) != (frame_layout.MAGIC, frame_layout.VERSION):
-            raise ValueError(f"not a memory of frames of version {frame_layout.VERSION}")
+        if frame_memory.HEAD.unpack_from(memory) != (frame_memory.MAGIC, frame_memory.VERSION):
+            raise ValueError(f"not a memory of frames of version {frame_memory.VERSION}")
         entries = [
-            frame_layout.ENTRY.unpack_from(memory, frame_layout.entry_at(index))
-            for index in range(frame_layout.ENTRIES)
+            frame_memory.ENTRY.unpack_from(memory, frame_memory.entry_at(index))
+            for index in range(frame_memory.ENTRIES)
         ]
         return [_ring(memory, *entry[1:]) for entry in sorted(entries) if entry[0]]
 

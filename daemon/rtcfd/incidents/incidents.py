@@ -24,7 +24,7 @@ from rtcf.v1 import errors_pb2, incidents_pb2
 import rtcfd
 from rtcfd.common.limits import Limits
 from rtcfd.common.refusals import FailedPrecondition, NotFound, Unavailable
-from rtcfd.incidents import copying, head
+from rtcfd.incidents import frame_memory, head
 
 log = logging.getLogger(__name__)
 
@@ -69,18 +69,18 @@ class Incidents:
         """Write a file with the frames of `descriptor`, which is closed, and with the facts."""
         try:
             folder = self._place()
-            frozen = await self._aside(copying.copied, descriptor, threads=self._copier)
+            frozen = await self._in_thread(frame_memory.copied, descriptor, threads=self._copier)
         finally:
             os.close(descriptor)
         try:
             async with self._writing:
-                await self._aside(_make, folder)
+                await self._in_thread(_make, folder)
                 stamp = time.strftime("%Y%m%d-%H%M%S", time.gmtime(facts["time_ns"] / 1e9))
-                name = await self._aside(_free_name, folder, f"{stamp}-{facts['runner']}")
+                name = await self._in_thread(_free_name, folder, f"{stamp}-{facts['runner']}")
                 file = folder / (name + _SUFFIX)
-                facts["sequence"] = 1 + await self._aside(_last_sequence, folder)
-                await self._aside(_write, frozen, file, facts)
-                await self._aside(_tidy, folder, self._limits().incidents_mb * 1_000_000, file)
+                facts["sequence"] = 1 + await self._in_thread(_last_sequence, folder)
+                await self._in_thread(_write, frozen, file, facts)
+                await self._in_thread(_tidy, folder, self._limits().incidents_mb * 1_000_000, file)
         finally:
             os.close(frozen)
         return await self._look(_incident, file)  # type: ignore[no-any-return]
@@ -125,9 +125,9 @@ class Incidents:
         return self._folder
 
     async def _look(self, work: Callable[..., Any], *arguments: Any) -> Any:
-        return await self._aside(work, *arguments, threads=self._readers)
+        return await self._in_thread(work, *arguments, threads=self._readers)
 
-    async def _aside(
+    async def _in_thread(
         self, work: Callable[..., Any], *arguments: Any, threads: ThreadPoolExecutor | None = None
     ) -> Any:
         loop = asyncio.get_running_loop()

@@ -15,9 +15,8 @@ from rtcf.v1 import control_pb2
 from rtcf_shared import whole_files
 
 from rtcfd.common import regular_files
-from rtcfd.common.aside import Aside
+from rtcfd.common.background import WorkerThreads
 from rtcfd.common.names import absolute, full_name
-from rtcfd.common.nonsense import NONSENSE
 from rtcfd.common.refusals import Unavailable
 
 _Kinds = control_pb2.Difference
@@ -28,7 +27,7 @@ _TIMEOUT_S = 2.0  # for a folder, which may be remote
 class LoadedCode:
     """The library files, by component.  A file is unknown if its folder does not answer."""
 
-    def __init__(self, folders: Aside) -> None:
+    def __init__(self, folders: WorkerThreads) -> None:
         self._folders = folders
         self._files: dict[str, tuple[str, _Identity]] = {}
 
@@ -107,7 +106,7 @@ class LoadedCode:
     def restore(self, file: Path) -> None:
         """Load the files that the previous rtcfd saved."""
         self._files = {}
-        with contextlib.suppress(OSError, *NONSENSE):
+        with contextlib.suppress(OSError, *regular_files.PARSE_ERRORS):
             found = json.loads(regular_files.read_bytes(file))
             self._files = {
                 str(name): (str(path), (int(then[0]), int(then[1]), int(then[2])))

@@ -1,8 +1,9 @@
-"""Changes of parameters, by clients and ROS peers; their history; undo.
+"""Changes of parameters, by clients and ROS peers; their history; undo.  Writes to inputs.
 
 Functions on a RunnerCore; each is one transaction of its executor.
 """
 
+import asyncio
 import contextlib
 import time
 from collections.abc import Iterable, Mapping
@@ -13,10 +14,10 @@ from rtcf_shared.graph_writer import same_value
 
 from rtcfd.access import caller
 from rtcfd.access.caller import Caller
-from rtcfd.access.tuning import require_pace
-from rtcfd.common import declared_values
+from rtcfd.access.rights import require_pace
+from rtcfd.common import declared_values, ros_value
 from rtcfd.common.names import absolute
-from rtcfd.common.refusals import FailedPrecondition, NotFound
+from rtcfd.common.refusals import FailedPrecondition, InvalidArgument, NotFound
 from rtcfd.executor.link import Progress
 from rtcfd.operations.runner_core import Asked, RunnerCore
 from rtcfd.state.history import UNANSWERED, Change
@@ -66,6 +67,33 @@ async def undo(
         return result
 
     return await runner.change(f"an undo of parameters of {name}", work)
+
+
+async def write_input(
+    runner: RunnerCore, request: control_pb2.WritePortRequest, progress: Progress
+) -> control_pb2.ChangeResult:
+    """Write a value to an input at the next cycle boundary; it is not saved."""
+    name = absolute(request.component)
+    port = {"component": name, "port": request.port}
+
+    async def work() -> control_pb2.ChangeResult:
+        asked = await runner.ask(wire.Request(describe_input=wire.DescribeInput(**port)))
+        found = asked.input_type
+        try:
+            # In a thread, because the YAML parser is slow.
+            message = await asyncio.to_thread(ros_value.encode, found.ros_definition, request.value)
+        except ValueError as error:
+            raise InvalidArgument(
+                f"{name}.{request.port} takes {found.ros_type}: {error}",
+                errors_pb2.REASON_VALUE_INVALID,
+                field="value",
+            ) from None
+        written = wire.WriteInput(message=message, **port)
+        return (await runner.ask(wire.Request(write_input=written), progress)).change
+
+    result = await runner.change(f"a value of {name}.{request.port}", work)
+    runner.log.info("%s: input %s written by %s", name, request.port, caller.name())
+    return result
 
 
 def history(

@@ -18,7 +18,7 @@ from rtcf_shared.enums import word
 
 from rtcfd.access import caller
 from rtcfd.catalog.catalog import Catalog
-from rtcfd.common.aside import Aside
+from rtcfd.common.background import WorkerThreads
 from rtcfd.common.event_log import EventLog
 from rtcfd.common.limits import Limits
 from rtcfd.common.refusals import Refusal, Unavailable
@@ -65,7 +65,7 @@ class Surroundings:
     )
     rules: wire.AccessRules = field(default_factory=wire.AccessRules)  # for executors
     name_of: Callable[[int], Awaitable[str]] = _number  # returns the name of a uid
-    folders: Aside = field(default_factory=lambda: Aside("folders of components"))
+    folders: WorkerThreads = field(default_factory=lambda: WorkerThreads("folders of components"))
 
 
 @dataclass(eq=False)

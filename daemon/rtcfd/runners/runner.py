@@ -12,9 +12,9 @@ from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, errors_pb2, runner_pb2
 
 from rtcfd.common import runner_settings
-from rtcfd.common.numbered_log import NumberedLog
+from rtcfd.common.event_log import NumberedLog
 from rtcfd.common.refusals import InvalidArgument, Refusal
-from rtcfd.executor import opinion
+from rtcfd.executor.command import settings_error
 from rtcfd.executor.events import Events
 from rtcfd.executor.executor import Executor
 from rtcfd.executor.process import End
@@ -343,7 +343,7 @@ class Runner(RunnerCore):
         # Otherwise the next executor would reject them, and the runner would have none.
         after = runner_settings.merged(self.settings(), change)
         binary = self.shared.command.binary
-        if error := await asyncio.to_thread(opinion.of_settings, binary, after):
+        if error := await asyncio.to_thread(settings_error, binary, after):
             raise InvalidArgument(error, errors_pb2.REASON_VALUE_INVALID)
 
     async def follow_limits(self) -> None:

@@ -9,8 +9,8 @@ from rtcf.v1 import runner_pb2
 
 from rtcfd import VERSION
 from rtcfd.common import runner_settings
+from rtcfd.common.background import log_failure
 from rtcfd.common.refusals import Refusal
-from rtcfd.common.tasks import looked_at
 from rtcfd.operations.runner_core import RunnerCore
 
 _TIMEOUT_S = 2.0
@@ -40,7 +40,7 @@ async def statuses_of(
     names = {each.name for each in chosen}
     mine = [asyncio.create_task(each.status()) for each in chosen]
     others = [
-        looked_at(asyncio.create_task(each.status()), "a neighbour's status")
+        log_failure(asyncio.create_task(each.status()), "a neighbour's status")
         for each in everybody
         if each.name not in names
     ]

@@ -18,7 +18,7 @@ from rtcfd.common.names import DEFAULT_RUNNER
 from rtcfd.common.refusals import InvalidArgument
 from rtcfd.common.status_codes import abort
 from rtcfd.executor.link import Progress
-from rtcfd.operations import graph, incidents, inputs, parameters, snapshots
+from rtcfd.operations import graph, incidents, parameters, snapshots
 from rtcfd.operations.loop import stop
 from rtcfd.recovery import starting
 from rtcfd.runners.held_runners import Hold
@@ -198,7 +198,7 @@ class Control(Looking):
     def WritePort(self, request: control_pb2.WritePortRequest) -> Any:
         """Write a value to an input."""
         runner = self._runners.get(request.runner)
-        return lambda progress: inputs.write(runner, request, progress)
+        return lambda progress: parameters.write_input(runner, request, progress)
 
     @answering
     async def TakeSnapshot(self, request: control_pb2.TakeSnapshotRequest) -> Any:

@@ -45,14 +45,14 @@ class BootGraphs:
         self,
         folder: Path | None,
         applied: Mapping[str, str],
-        opinion: Callable[[runner_pb2.RunnerSettings], str] = lambda _: "",
+        settings_error: Callable[[runner_pb2.RunnerSettings], str] = lambda _: "",
     ) -> None:
         """`applied` has the digests of the previous rtcfd.
 
-        `opinion` returns why an executor would reject settings; empty = it accepts them.
+        `settings_error` returns why an executor would reject settings; empty = it accepts them.
         """
         self._folder = folder
-        self._opinion = opinion
+        self._settings_error = settings_error
         self.digests = dict(applied)  # by file
 
     def read(self) -> tuple[list[Given], list[str]]:
@@ -102,7 +102,7 @@ class BootGraphs:
         check_base_name("runner", graph.runner or DEFAULT_RUNNER)
         runner_settings.check(graph.settings)
         check_graph(graph.components)
-        if graph.settings.ListFields() and (error := self._opinion(graph.settings)):
+        if graph.settings.ListFields() and (error := self._settings_error(graph.settings)):
             raise InvalidArgument(error, errors_pb2.REASON_VALUE_INVALID)
 
     def _files(self, problems: list[str]) -> Iterator[Path]:

@@ -16,7 +16,6 @@ from rtcf.v1 import runner_pb2
 from rtcf_shared import whole_files
 
 from rtcfd.common import known_values, regular_files
-from rtcfd.common.nonsense import NONSENSE
 from rtcfd.common.refusals import Refusal
 
 log = logging.getLogger(__name__)
@@ -44,7 +43,7 @@ def read(folder: Path) -> Handover | None:
         return Handover(defaults, {str(k): str(v) for k, v in document["graphs"].items()})
     except FileNotFoundError:
         return None
-    except (OSError, *NONSENSE, Refusal):
+    except (OSError, *regular_files.PARSE_ERRORS, Refusal):
         log.warning("cannot use %s: runners stay as they are", file)
         return None
 

@@ -15,7 +15,7 @@ from typing import Any
 from google.protobuf import json_format
 from rtcf.v1 import graph_pb2
 
-from rtcfd.common.nonsense import NONSENSE
+from rtcfd.common import regular_files
 
 MOST_OF_A_COMPONENT = 200
 MOST = 4000
@@ -126,7 +126,7 @@ class History:
             self._bytes_on_disk += len(line)
             try:
                 change = _change(line)
-            except NONSENSE:
+            except regular_files.PARSE_ERRORS:
                 continue
             self._put(change)
             self._last = max(self._last, change.number)

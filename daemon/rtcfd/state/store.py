@@ -8,6 +8,7 @@ for a downgrade.
 import contextlib
 import dataclasses
 import errno
+import fcntl
 import itertools
 import json
 import logging
@@ -19,17 +20,15 @@ from pathlib import Path
 from typing import Any
 
 from google.protobuf import json_format
-from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
+from rtcf.v1 import control_pb2, errors_pb2, graph_pb2, runner_pb2
 from rtcf_shared import whole_files
 
 from rtcfd.common import known_values, regular_files
 from rtcfd.common.names import check_base_name, full_name
-from rtcfd.common.nonsense import NONSENSE
-from rtcfd.common.refusals import Refusal
+from rtcfd.common.refusals import FailedPrecondition, Refusal
 from rtcfd.state import history
 from rtcfd.state.desired import Desired, HoldTerms, LeaseTerms, this_boot
 from rtcfd.state.history import Change
-from rtcfd.state.lock import lock
 
 log = logging.getLogger(__name__)
 
@@ -84,7 +83,7 @@ class Store:
     def lock(self) -> None:
         """Lock the folder; raises FailedPrecondition if another rtcfd uses it."""
         if self._folder is not None:
-            lock(self._folder)
+            _lock(self._folder)
 
     def mark(self, runner: str) -> Path | None:
         """Return the path of a runner's mark.  Without this file its loop is not resumed, even
@@ -112,7 +111,7 @@ class Store:
                 self._set_aside(file, "unreadable", _UNREADABLE.format(error.strerror))
             except _Newer as newer:
                 self._set_aside(file, "newer", str(newer))
-            except (*NONSENSE, Refusal) as error:
+            except (*regular_files.PARSE_ERRORS, Refusal) as error:
                 reason = " ".join(str(error).split())
                 self._set_aside(file, "corrupt", f"it is corrupt ({reason})")
             else:
@@ -299,6 +298,49 @@ class Store:
     def _report(self, problem: str) -> None:
         log.error("%s", problem)
         self.problems.append(problem)
+
+
+def _lock(folder: Path) -> None:
+    """Lock a folder until this process ends; raises FailedPrecondition if another rtcfd has it.
+
+    Two rtcfds would overwrite each other's states.  Locks the folder itself, which works on a full
+    or read-only disk.  If the file system has no locks, only logs a warning.  Blocks.
+    """
+    try:
+        descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    except OSError:
+        return  # the reader of the folder reports it
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        holder = _holder(descriptor)
+        os.close(descriptor)
+        raise FailedPrecondition(
+            f"state folder {folder} is in use by another rtcfd{holder and f' (pid {holder})'}: "
+            "end that, or choose another --state-dir",
+            errors_pb2.REASON_DAEMON_FAILED,
+        ) from None
+    except OSError as error:
+        os.close(descriptor)
+        log.warning(
+            "state folder %s cannot be locked (%s): start no other rtcfd with it",
+            folder,
+            error.strerror,
+        )
+
+
+def _holder(descriptor: int) -> str:
+    """Return the pid of the process that has locked an open file, if known (proc_locks(5))."""
+    inode = f":{os.fstat(descriptor).st_ino}"
+    try:
+        lines = Path("/proc/locks").read_text().splitlines()
+    except OSError:
+        return ""
+    for line in lines:
+        fields = line.split()
+        if "FLOCK" in fields and fields[-3].endswith(inode) and fields[-4].isdigit():
+            return fields[-4]
+    return ""
 
 
 def _is_mark(mark: Path) -> bool:

@@ -34,8 +34,14 @@ from google.protobuf import json_format
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, graph_pb2, ports_pb2, runner_pb2
 from rtcfd import VERSION
-from rtcfd.executor import frames
-from rtcfd.executor.link import ACCESS_PROTOCOL, LIMITS_PROTOCOL, PORTS_PROTOCOL, PROTOCOL
+from rtcfd.executor.link import (
+    ACCESS_PROTOCOL,
+    LIMITS_PROTOCOL,
+    PORTS_PROTOCOL,
+    PROTOCOL,
+    pack_message,
+    read_message,
+)
 
 POLL_S = 0.005
 CHATTER = 100  # records per burst
@@ -117,7 +123,7 @@ class Peer:
     async def serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
         self.writer = writer
         self.connections += 1
-        while (message := await frames.read(reader)) is not None:
+        while (message := await read_message(reader)) is not None:
             task = asyncio.create_task(self.answer(wire.Request.FromString(message)))
             self.tasks.add(task)
             task.add_done_callback(self.tasks.discard)
@@ -127,7 +133,7 @@ class Peer:
             self.end.set()
 
     def send(self, response: wire.Response) -> None:
-        self.writer.write(frames.pack(response.SerializeToString()))
+        self.writer.write(pack_message(response.SerializeToString()))
 
     async def answer(self, request: wire.Request) -> None:
         kind = request.WhichOneof("kind")
@@ -139,11 +145,11 @@ class Peer:
             code, text = refused.args
             response = wire.Response(error=wire.Error(code=code, message=text))
         response.id = request.id
-        answer = frames.pack(response.SerializeToString())
+        answer = pack_message(response.SerializeToString())
         if kind == "start" and is_held("brief"):
             self.running = False
             event = wire.Event(kind=wire.Event.KIND_LOOP_ENDED, message="ended by a fault")
-            answer += frames.pack(wire.Response(event=event).SerializeToString())
+            answer += pack_message(wire.Response(event=event).SerializeToString())
         self.writer.write(answer)
         if kind == "exit":
             await self.writer.drain()

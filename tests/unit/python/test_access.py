@@ -1,14 +1,42 @@
-"""Access rights of calls: rules, and the texts of errors."""
+"""Access rights of calls, and rules for setting parameters: users, parameters, rates of change."""
 
 import os
+from pathlib import Path
 
 import pytest
+import rtcf
+from daemon_under_test import wait_for
 from rtcf.v1 import control_pb2, runner_pb2
 from rtcf_shared.enums import choices
 from rtcfd.access import calls, rights
 from rtcfd.access.peer import Peer
-from rtcfd.access.rights import Access, Level
-from rtcfd.common.refusals import PermissionDenied
+from rtcfd.access.rights import Access, Level, Rule, require_pace
+from rtcfd.common.refusals import FailedPrecondition, PermissionDenied, Refusal
+from rtcfd.configuration import settings_file
+from strangers import open_to_strangers, root_only, stranger
+
+SET = """
+import sys, rtcf
+with rtcf.Client(sys.argv[1]) as client:
+    for setting in sys.argv[2:]:
+        try:
+            client.set_parameters("pid", [rtcf.parse_parameter(setting)])
+            print("set", flush=True)
+        except rtcf.RtcfError as error:
+            print(error, flush=True)
+"""
+TEXT = """
+[access]
+default = "none"
+observe = ["ann"]
+tune = ["tom"]
+operate = ["bob"]
+[[access.parameters]]
+who = ["ann", "tom", "bob", "@lab"]
+runner = "arm"
+names = ["/pid\\\\.k.*"]
+most_per_s = 0.5
+"""
 
 
 def named(name: str, groups: set[str], uid: int = 4711, known: bool = True) -> Peer:
@@ -84,3 +112,103 @@ def test_an_error_explains_how_the_right_is_granted() -> None:
         RULES.check(named("ann", set()), "Load")
     assert "user ann has only the right to observe" in str(refused.value)
     assert 'admin = ["ann"] under [access]' in str(refused.value)
+
+
+def peer(user: str, *groups: str) -> Peer:
+    return Peer(1, 4711, user, frozenset(groups))
+
+
+@pytest.fixture
+def access(tmp_path: Path) -> rights.Access:
+    file = tmp_path / "rtcfd.toml"
+    file.write_text(TEXT)
+    return settings_file.read(file).access
+
+
+def test_a_named_user_may_set_only_the_named_parameters(access: rights.Access) -> None:
+    access.check(peer("ann"), "SetParameters")
+    tuning = access.tuning(peer("ann"))
+    assert tuning is not None
+    assert tuning.rule("arm", "/pid.kp").most_per_s == 0.5
+    for runner, name in (("arm", "/pid.limit"), ("leg", "/pid.kp"), ("arm", "/other/pid.kp")):
+        with pytest.raises(PermissionDenied, match=f"user ann may not set {name} of runner"):
+            tuning.rule(runner, name)
+    with pytest.raises(PermissionDenied):
+        access.check(peer("ann"), "Stop")
+
+
+def test_rules_apply_to_tune_and_not_to_operate(access: rights.Access) -> None:
+    assert access.tuning(peer("tom")) is not None
+    assert access.tuning(peer("bob")) is None
+    access.check(peer("bob"), "SetParameters")
+
+
+def test_a_rule_grants_nothing_without_the_right_to_observe(access: rights.Access) -> None:
+    assert access.level(peer("x", "lab")) == Level.NONE
+    with pytest.raises(PermissionDenied):
+        access.check(peer("x", "lab"), "SetParameters")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "pause_s", "fits"),
+    [
+        (1.0, 1.5, None, True),
+        (1.0, 1.6, None, False),
+        (1.0, 0.4, 1.0, False),
+        (1.0, 3.0, 4.0, True),
+        (1.0, 7.0, 3600.0, False),  # a long pause permits no large step
+        (1.0, float("nan"), 1.0, False),
+        (1, 2, 1.0, False),
+        ("a", "b", 0.0, True),
+        (True, False, 0.0, True),
+    ],
+)
+def test_a_number_changes_no_faster_than_its_rule_allows(
+    old: object, new: object, pause_s: float | None, fits: bool
+) -> None:
+    rule = Rule(frozenset({"ann"}), most_per_s=0.5)
+    last = None if pause_s is None else 100.0
+    now = 100.0 + (pause_s or 0.0)
+    if fits:
+        require_pace(rule, "/pid.kp", old, new, last, now)
+        return
+    with pytest.raises(FailedPrecondition, match="/pid.kp may change by 0.5 a second"):
+        require_pace(rule, "/pid.kp", old, new, last, now)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("who = 'ann'", "who must be a list of users and @groups"),
+        ("who = ['a b']", "who must be a list of users and @groups"),
+        ("who = ['a']\nnames = ['(']", "'(' is not a regular expression"),
+        ("who = ['a']\nmost_per_s = 0", "most_per_s must be above 0"),
+        ("who = ['a']\npace = 1", "unknown key"),
+    ],
+)
+def test_a_bad_rule_is_rejected(tmp_path: Path, text: str, said: str) -> None:
+    file = tmp_path / "rtcfd.toml"
+    file.write_text(f"[[access.parameters]]\n{text}\n")
+    with pytest.raises(Refusal) as refused:
+        settings_file.read(file)
+    assert said in str(refused.value)
+
+
+@root_only
+def test_an_observer_may_set_a_rules_parameters_at_its_rate() -> None:
+    rules = (
+        "[access]\nobserve = ['nobody']\n"
+        "[[access.parameters]]\nwho = ['nobody']\nnames = ['/pid.kp']\nmost_per_s = 0.001\n"
+    )
+    with open_to_strangers(rules) as daemon:
+        daemon.package("demo", types={"Fine": "fine"})
+        with daemon.client() as client:
+            client.load(rtcf.component("demo", "Fine", name="pid", parameters=["kp:=1.0"]))
+        words = ("kp:=1.0001", "kp:=9.0", "ki:=1.0")
+        with stranger(SET, str(daemon.socket), *words, user="nobody") as process:
+            assert process.stdout is not None
+            said = [process.stdout.readline() for _ in words]
+        assert said[0] == "set\n"
+        assert "/pid.kp may change by 0.001 a second" in said[1]
+        assert "user nobody may not set /pid.ki" in said[2]
+        wait_for(lambda: "/pid: kp = 1.0001 set by nobody" in daemon.log(), "the log")

@@ -11,14 +11,14 @@ import rtcf
 from daemon_under_test import DaemonUnderTest, wait_for
 from rtcf.v1 import control_pb2
 from rtcf_shared.naming import suggestion
-from rtcfd.access import lengths, peer
+from rtcfd.access import calls, peer
 from rtcfd.access.calls import Level
 from rtcfd.access.peer import Credentials, Directory, Peer
 from rtcfd.access.usage import Usage
-from rtcfd.common.aside import Aside
+from rtcfd.common.background import WorkerThreads
 from rtcfd.common.refusals import InvalidArgument, ResourceExhausted, Unavailable
 from rtcfd.common.status_codes import bounded
-from rtcfd.log_thread import LogThread
+from rtcfd.journal import LogThread
 from strangers import STRANGER, open_to_strangers, root_only, stranger
 
 
@@ -52,15 +52,15 @@ def test_only_short_names_are_processed(daemon: DaemonUnderTest) -> None:
 
 def test_texts_have_their_own_limits() -> None:
     spec = rtcf.component("pkg", "T", name="n", remaps=["a:=" + "b" * 1000])
-    lengths.check(control_pb2.LoadRequest(component=spec))
+    calls.check_texts(control_pb2.LoadRequest(component=spec))
     for field in ("name", "ns", "package", "type"):
         long = control_pb2.LoadRequest(component=spec)
         setattr(long.component, field, "ä" * 256)
         with pytest.raises(InvalidArgument, match=f"{field} of 256 characters is too long"):
-            lengths.check(long)
+            calls.check_texts(long)
     names = control_pb2.UnloadRequest(components=["short", "x" * 256])
     with pytest.raises(InvalidArgument, match="components of 256 characters"):
-        lengths.check(names)
+        calls.check_texts(names)
 
 
 def test_an_error_fits_into_metadata_and_keeps_its_advice() -> None:
@@ -172,16 +172,16 @@ def test_hanging_work_times_out_and_keeps_its_thread() -> None:
     gate = threading.Event()
 
     async def work() -> None:
-        aside = Aside("museum", threads=1)
-        assert await aside.run(lambda: 7, 60) == 7
+        threads = WorkerThreads("museum", threads=1)
+        assert await threads.run(lambda: 7, 60) == 7
         with pytest.raises(Unavailable, match="no answer from the museum within 0.05 s"):
-            await aside.run(lambda: gate.wait(60), 0.05)
+            await threads.run(lambda: gate.wait(60), 0.05)
         with pytest.raises(Unavailable):
-            await aside.run(lambda: 7, 0.05)  # its only thread still hangs
+            await threads.run(lambda: 7, 0.05)  # its only thread still hangs
         gate.set()
-        assert await aside.run(lambda: 8, 60) == 8
+        assert await threads.run(lambda: 8, 60) == 8
         with pytest.raises(ZeroDivisionError):
-            await aside.run(lambda: 1 // 0, 60)
+            await threads.run(lambda: 1 // 0, 60)
 
     asyncio.run(work())
 

@@ -11,15 +11,13 @@ from pathlib import Path
 
 import pytest
 from daemon_under_test import DEADLINE_S, wait_for
-from rtcfd.journal import JournalHandler
-from rtcfd.log_thread import LogThread
+from rtcfd.journal import JournalHandler, LogThread
 
 # A process that logs more than the journal's socket holds.
 _LOGGING = """
 import logging, sys
 sys.path[:] = {path!r}
-from rtcfd.journal import JournalHandler
-from rtcfd.log_thread import LogThread
+from rtcfd.journal import JournalHandler, LogThread
 logging.getLogger().addHandler(LogThread(JournalHandler({address!r})))
 for number in range(2000):
     logging.getLogger().warning("record %d", number)

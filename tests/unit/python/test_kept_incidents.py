@@ -14,7 +14,7 @@ from daemon_under_test import DEADLINE_S
 from rtcf.v1 import control_pb2
 from rtcf_shared.mcap_writer import McapWriter
 from rtcfd.common.limits import Limits
-from rtcfd.incidents import copying, frame_file, frame_layout, head, incidents
+from rtcfd.incidents import frame_file, frame_memory, head, incidents
 from rtcfd.incidents.incidents import Incidents
 from rtcfd.operations.incidents import keep
 from rtcfd_in_process import Rtcfd, until
@@ -51,14 +51,14 @@ def test_frames_are_copied_while_the_file_of_another_incident_is_written(
         try:
             await until(writing.is_set, "the first file")
             copies = threading.Event()
-            copied = copying.copied
+            copied = frame_memory.copied
 
             def copy(descriptor: int) -> int:
                 frozen = copied(descriptor)
                 copies.set()
                 return frozen
 
-            monkeypatch.setattr(copying, "copied", copy)
+            monkeypatch.setattr(frame_memory, "copied", copy)
             second = asyncio.create_task(kept.keep(os.dup(frames), facts("two")))
             await until(copies.is_set, "the copy of the second one's frames")
             os.pwrite(frames, b"behind", 0)
@@ -144,39 +144,39 @@ def test_a_runner_is_removed_while_its_incident_is_written(
 
 def _memory(rings: int, frames: int) -> int:
     """Return rings of frames without values, all complete."""
-    words = frame_layout.HEAD_WORDS
-    bytes_of_ring = frames * words * frame_layout.WORD.size
-    begin = frame_layout.entry_at(frame_layout.ENTRIES)
+    words = frame_memory.HEAD_WORDS
+    bytes_of_ring = frames * words * frame_memory.WORD.size
+    begin = frame_memory.entry_at(frame_memory.ENTRIES)
     memory = bytearray(begin + rings * bytes_of_ring)
-    frame_layout.HEAD.pack_into(memory, 0, frame_layout.MAGIC, frame_layout.VERSION)
+    frame_memory.HEAD.pack_into(memory, 0, frame_memory.MAGIC, frame_memory.VERSION)
     for ring in range(rings):
         offset = begin + ring * bytes_of_ring
         entry = (ring + 1, offset, frames, words, 0, 0)
-        frame_layout.ENTRY.pack_into(memory, frame_layout.entry_at(ring), *entry)
+        frame_memory.ENTRY.pack_into(memory, frame_memory.entry_at(ring), *entry)
         for number in range(frames):
-            at = offset + number * words * frame_layout.WORD.size
+            at = offset + number * words * frame_memory.WORD.size
             struct.pack_into("<6Q", memory, at, 2 * number + 2, number, 0, 0, 0, 0)
     return _frames(bytes(memory))
 
 
 def test_frames_overwritten_during_the_copy_are_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     live = _memory(rings=2, frames=8)
-    copy_all = copying._copy
+    copy_all = frame_memory._copy
 
     def copy_and_write_on(own: int, copy: int, size: int) -> None:
         copy_all(own, copy, size)
         first, second = (
-            frame_layout.ENTRY.unpack(os.pread(live, 48, frame_layout.entry_at(i))) for i in (0, 1)
+            frame_memory.ENTRY.unpack(os.pread(live, 48, frame_memory.entry_at(i))) for i in (0, 1)
         )
         # The first ring is being reused; in the second, frame 0 has been replaced by frame 8, and
         # frame 1 is being written.
-        os.pwrite(live, struct.pack("<Q", 3), frame_layout.entry_at(0))
+        os.pwrite(live, struct.pack("<Q", 3), frame_memory.entry_at(0))
         assert first[0] == 1
         for place, mark in ((0, 2 * 8 + 2), (1, 2 * 9 + 1)):
             os.pwrite(live, struct.pack("<Q", mark), second[1] + place * 48)
 
-    monkeypatch.setattr(copying, "_copy", copy_and_write_on)
-    copy = copying.copied(live)
+    monkeypatch.setattr(frame_memory, "_copy", copy_and_write_on)
+    copy = frame_memory.copied(live)
     (ring,) = frame_file.read(copy)
     os.close(copy)
     os.close(live)

@@ -8,8 +8,7 @@ import pytest
 from daemon_under_test import DEADLINE_S
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcfd.common import refusals
-from rtcfd.executor import frames
-from rtcfd.executor.link import PROTOCOL, Link
+from rtcfd.executor.link import MAX_MESSAGE, PROTOCOL, Link, pack_message, read_message
 
 Peer = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
 
@@ -33,7 +32,7 @@ def against(tmp_path: Path, peer: Peer, test: Callable[[Link], Awaitable[None]])
 
 
 async def received(reader: asyncio.StreamReader) -> wire.Request:
-    message = await frames.read(reader)
+    message = await read_message(reader)
     assert message is not None
     request = wire.Request()
     request.ParseFromString(message)
@@ -46,7 +45,7 @@ def test_answers_are_matched_to_requests_in_any_order(tmp_path: Path) -> None:
         for request in reversed(requests):
             response = wire.Response(id=request.id)
             response.component.full_name = request.get_component.component
-            writer.write(frames.pack(response.SerializeToString()))
+            writer.write(pack_message(response.SerializeToString()))
 
     async def test(link: Link) -> None:
         async def ask(name: str) -> str:
@@ -76,8 +75,8 @@ def test_a_timeout_is_unavailable(tmp_path: Path) -> None:
     [
         b"",
         b"\x01\x00",
-        (frames.MAX_FRAME + 1).to_bytes(4, "little"),
-        frames.pack(b"\xff\xff\xff"),
+        (MAX_MESSAGE + 1).to_bytes(4, "little"),
+        pack_message(b"\xff\xff\xff"),
     ],
     ids=["end of stream", "half a length", "too long", "no message"],
 )
@@ -102,7 +101,7 @@ def test_both_sides_send_their_protocol_version(tmp_path: Path) -> None:
         request = await received(reader)
         answer = wire.HelloResult(protocol=request.hello.protocol + 7)
         response = wire.Response(id=request.id, hello=answer)
-        writer.write(frames.pack(response.SerializeToString()))
+        writer.write(pack_message(response.SerializeToString()))
 
     async def test(link: Link) -> None:
         assert (await link.hello(DEADLINE_S)).protocol == PROTOCOL + 7

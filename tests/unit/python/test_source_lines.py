@@ -5,7 +5,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from rtcfd.common.aside import Aside
+from rtcfd.common.background import WorkerThreads
 from rtcfd.executor import source_lines
 from rtcfd.executor.flight_recorder import Trace
 
@@ -51,7 +51,9 @@ def trace_of(library: Path, mapped: str, functions: tuple[str, ...]) -> Trace:
 
 def find(trace: Trace, *libraries: Path) -> source_lines.Found:
     async def run() -> source_lines.Found:
-        return await source_lines.find(trace, map(str, libraries), PROGRAM, Aside("folders"))
+        return await source_lines.find(
+            trace, map(str, libraries), PROGRAM, WorkerThreads("folders")
+        )
 
     return asyncio.run(run())
 

@@ -1,15 +1,16 @@
-"""Runs blocking work in threads: the user database, folders that may be remote, files.
+"""Work beside the caller: blocking work in threads, and tasks that nobody awaits.
 
-The threads are daemon threads: one that hangs for ever delays neither the event loop
-nor the end of rtcfd.  Each kind of work has its own, so that one that hangs does not
-block the others.
+Blocking work is that of the user database, of folders that may be remote, and of files.  Its
+threads are daemon threads: one that hangs for ever delays neither the event loop nor the end of
+rtcfd.  Each kind of work has its own, so that one that hangs does not block the others.
 """
 
 import asyncio
 import contextlib
+import logging
 import threading
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from rtcf.v1 import errors_pb2
 
@@ -17,8 +18,10 @@ from rtcfd.common.refusals import Unavailable
 
 Result = TypeVar("Result")
 
+log = logging.getLogger("rtcfd")
 
-class Aside:
+
+class WorkerThreads:
     """A limited number of threads for one kind of work; `name` names it in errors."""
 
     def __init__(self, name: str, threads: int = 2) -> None:
@@ -66,3 +69,14 @@ class Aside:
                 f"no answer from the {self._name} within {timeout_s:g} s",
                 errors_pb2.REASON_MACHINE_SILENT,
             ) from None
+
+
+def log_failure(task: "asyncio.Task[Any]", name: str) -> "asyncio.Task[Any]":
+    """Return the task; if it fails, its exception goes to the log under `name`."""
+
+    def look(done: "asyncio.Task[Any]") -> None:
+        if not done.cancelled() and (error := done.exception()):
+            log.error("internal error: %s ended", name, exc_info=error)
+
+    task.add_done_callback(look)
+    return task

@@ -1,13 +1,26 @@
-"""Copies the memory of an executor's frames while its loop continues to write them.
+"""The memory of an executor's frames: its layout, as defined in executor.proto, and a copy of it.
 
-Runs in a thread of rtcfd, so it uses little memory, and no NumPy.
+The copy is made while the loop continues to write, in a thread of rtcfd: so with little memory,
+and without NumPy.
 """
 
 import os
+import struct
 
-from rtcfd.incidents import frame_layout as layout
+MAGIC = 0x42435452
+VERSION = 1
+HEAD = struct.Struct("<II")
+ENTRY = struct.Struct("<6Q")  # sequence, offset, frames, words of a frame, layout's offset, bytes
+ENTRIES = 8
+WORD = struct.Struct("<Q")
+HEAD_WORDS = 6  # of a frame: mark, iteration, stamp, latency, duration, last of its loop
 
 _PIECE = 1024 * 1024
+
+
+def entry_at(index: int) -> int:
+    """Return the offset of an entry of the directory."""
+    return HEAD.size + index * ENTRY.size
 
 
 def copied(descriptor: int) -> int:
@@ -50,19 +63,19 @@ def _leave_out_torn(own: int, copy: int) -> None:
 
     The executor changes the mark of a frame, and the entry of a ring, before the rest of it.
     """
-    for index in range(layout.ENTRIES):
-        at = layout.entry_at(index)
-        then = os.pread(copy, layout.ENTRY.size, at)
-        if len(then) != layout.ENTRY.size:
+    for index in range(ENTRIES):
+        at = entry_at(index)
+        then = os.pread(copy, ENTRY.size, at)
+        if len(then) != ENTRY.size:
             return  # this is not a memory of frames
-        if then != os.pread(own, layout.ENTRY.size, at):
-            os.pwrite(copy, bytes(layout.ENTRY.size), at)
+        if then != os.pread(own, ENTRY.size, at):
+            os.pwrite(copy, bytes(ENTRY.size), at)
             continue
-        sequence, offset, frames, words, _, _ = layout.ENTRY.unpack(then)
+        sequence, offset, frames, words, _, _ = ENTRY.unpack(then)
         if not sequence:
             continue
-        stride = words * layout.WORD.size
+        stride = words * WORD.size
         for mark_at in range(offset, offset + frames * stride, stride):
-            mark = os.pread(copy, layout.WORD.size, mark_at)
-            if mark != os.pread(own, layout.WORD.size, mark_at):
-                os.pwrite(copy, bytes(layout.WORD.size), mark_at)
+            mark = os.pread(copy, WORD.size, mark_at)
+            if mark != os.pread(own, WORD.size, mark_at):
+                os.pwrite(copy, bytes(WORD.size), mark_at)
