@@ -27,9 +27,18 @@ _MASTER_POLL_S = 0.5
 
 
 async def load(
+    runner: RunnerCore, request: control_pb2.LoadRequest, progress: Progress
+) -> control_pb2.ChangeResult:
+    """Load a component; with `wait`, if its hooks need a ROS master and there is none, wait for
+    one."""
+    if request.wait:
+        return await when_master(lambda: _load(runner, request.component, progress), progress)
+    return await _load(runner, request.component, progress)
+
+
+async def _load(
     runner: RunnerCore, spec: graph_pb2.ComponentSpec, progress: Progress
 ) -> control_pb2.ChangeResult:
-    """Load a component."""
     library = await runner.catalog.find(spec.package, spec.type)
     note = library.note(spec)
     acting = caller.current()
@@ -53,13 +62,6 @@ async def load(
     return result
 
 
-async def load_when_master(
-    runner: RunnerCore, spec: graph_pb2.ComponentSpec, progress: Progress
-) -> control_pb2.ChangeResult:
-    """Load a component; if its hooks need a ROS master and there is none, wait for one."""
-    return await when_master(lambda: load(runner, spec, progress), progress)
-
-
 async def when_master(
     attempt: Callable[[], Awaitable[control_pb2.ChangeResult]], progress: Progress
 ) -> control_pb2.ChangeResult:
@@ -77,24 +79,24 @@ async def when_master(
 
 
 async def unload(
-    runner: RunnerCore, names: list[str], progress: Progress
+    runner: RunnerCore, request: control_pb2.UnloadRequest, progress: Progress
 ) -> control_pb2.ChangeResult:
     """Unload components.
 
     If a component is left out, or its executor is down, only the saved graph changes.
     So a component that crashes its executor can be removed.
     """
-    if not names:
+    if not request.components:
         raise InvalidArgument(
             "name the components to unload", errors_pb2.REASON_NAME_MISSING, field="components"
         )
-    full_names = [absolute(name) for name in names]
+    full_names = [absolute(name) for name in request.components]
 
     async def work() -> control_pb2.ChangeResult:
         live = [name for name in full_names if name not in runner.left_out]
         if runner.up and live:
-            request = wire.Request(unload=control_pb2.UnloadRequest(components=live))
-            result = (await runner.ask(request, progress)).change
+            asked = wire.Request(unload=control_pb2.UnloadRequest(components=live))
+            result = (await runner.ask(asked, progress)).change
         else:
             _check_known(runner, full_names)
             result = control_pb2.ChangeResult(notes=["removed from the saved graph only"])
@@ -171,14 +173,14 @@ async def replace(
 
 
 async def release(
-    runner: RunnerCore, names: list[str], progress: Progress
+    runner: RunnerCore, request: control_pb2.ReleaseRequest, progress: Progress
 ) -> control_pb2.ChangeResult:
     """Load components again that are left out of the loop, or are marked as faulted in it."""
-    if not names:
+    if not request.components:
         raise InvalidArgument(
             "name the components to release", errors_pb2.REASON_NAME_MISSING, field="components"
         )
-    full_names = [absolute(name) for name in names]
+    full_names = [absolute(name) for name in request.components]
     listed = ", ".join(full_names)
 
     async def work() -> control_pb2.ChangeResult:
@@ -189,15 +191,15 @@ async def release(
         specs = [runner.desired.components[name] for name in full_names]
         if len(specs) == 1 and not marked:
             (load,) = await loads(runner.catalog, specs)
-            request = wire.Request(load=load)
+            asked = wire.Request(load=load)
         else:
             every = [spec for name, spec in runner.desired.components.items()
                      if name not in runner.left_out or name in full_names]  # fmt: skip
             apply = wire.Apply(components=await loads(runner.catalog, every))
             for load in apply.components:
                 load.anew = full_name(load.component) in marked
-            request = wire.Request(apply=apply)
-        result = (await runner.ask(request, progress)).change
+            asked = wire.Request(apply=apply)
+        result = (await runner.ask(asked, progress)).change
         for name in full_names:
             runner.left_out.pop(name, None)
             runner.desired.quarantined.pop(name, None)

@@ -27,7 +27,7 @@ async def take(runner: RunnerCore) -> control_pb2.TakeSnapshotResponse:
 
 
 async def restore(
-    runner: RunnerCore, snapshot: bytes, progress: Progress
+    runner: RunnerCore, request: control_pb2.RestoreSnapshotRequest, progress: Progress
 ) -> control_pb2.ChangeResult:
     """Restore a snapshot at a cycle boundary; a loop that does not run is paused then."""
     asked = asked_now(runner)
@@ -36,8 +36,8 @@ async def restore(
     async def work() -> control_pb2.ChangeResult:
         require_no_stop(runner, asked)
         before = await _parameters(runner)
-        request = wire.Request(restore_snapshot=wire.RestoreSnapshot(snapshot=snapshot))
-        result = (await runner.ask(request, progress)).change
+        restored = wire.RestoreSnapshot(snapshot=request.snapshot)
+        result = (await runner.ask(wire.Request(restore_snapshot=restored), progress)).change
         for component, now in (await _parameters(runner)).items():
             old = before.get(component, {})
             changes = [each for name, each in now.items() if old.get(name) != each]

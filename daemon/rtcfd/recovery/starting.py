@@ -44,7 +44,9 @@ async def start(
     return await runner.change("the start", work, runs_cycles=True)
 
 
-async def step(runner: RunnerCore, cycles: int, progress: Progress) -> control_pb2.ChangeResult:
+async def step(
+    runner: RunnerCore, request: control_pb2.StepRequest, progress: Progress
+) -> control_pb2.ChangeResult:
     """Run cycles of a stopped loop on a simulated clock.
 
     Without timeout; ends at a cycle boundary if its caller disconnects.
@@ -55,10 +57,10 @@ async def step(runner: RunnerCore, cycles: int, progress: Progress) -> control_p
     async def work() -> control_pb2.ChangeResult:
         await _need_executor(runner, progress)
         require_no_stop(runner, asked)
-        request = wire.Request(step=control_pb2.StepRequest(cycles=cycles))
-        ending = asyncio.create_task(_end_step(runner, request, left))
+        step = wire.Request(step=control_pb2.StepRequest(cycles=request.cycles))
+        ending = asyncio.create_task(_end_step(runner, step, left))
         try:
-            result = (await runner.ask(request, progress)).change
+            result = (await runner.ask(step, progress)).change
         finally:
             ending.cancel()
         runner.log.info("%d cycles stepped", result.cycles)

@@ -239,7 +239,8 @@ class Leases:
         self._loading.update(names)  # settle() skips them
         try:
             if names:
-                await graph.unload(runner, names, lambda _: None)
+                request = control_pb2.UnloadRequest(components=names)
+                await graph.unload(runner, request, lambda _: None)
         except Refusal as refusal:
             runner.log.error("%s", refusal)
         finally:
@@ -329,7 +330,8 @@ class Leases:
         try:
             names = [name for name in group if name in runner.desired.components]
             if names and not runner.closing:
-                await graph.unload(runner, names, lambda _: None)
+                request = control_pb2.UnloadRequest(components=names)
+                await graph.unload(runner, request, lambda _: None)
         except Refusal as refusal:
             # It has no holder now; the list of components shows it.
             runner.log.error("%s stays loaded: %s", ", ".join(group), refusal)

@@ -70,9 +70,10 @@ def _allowed(runner: RunnerCore, call: wire.ServiceCall) -> str:
 async def _change(runner: RunnerCore, call: wire.ServiceCall) -> control_pb2.ChangeResult:
     kind = call.WhichOneof("kind")
     if kind == "load":
-        return await graph.load(runner, call.load, _ignore)
+        return await graph.load(runner, control_pb2.LoadRequest(component=call.load), _ignore)
     if kind == "unload":
-        return await graph.unload(runner, [call.unload], _ignore)
+        request = control_pb2.UnloadRequest(components=[call.unload])
+        return await graph.unload(runner, request, _ignore)
     if kind == "start":
         return await start(runner, control_pb2.StartRequest(), _ignore)
     return await stop(runner, _ignore)

@@ -80,9 +80,6 @@ async def _with_word_of_waiting(lines: "asyncio.Queue[str | None]") -> AsyncIter
         yield line
 
 
-changing = lasting(control_pb2.ChangeResponse, "result")
-
-
 class Tenancy(Protocol):
     """The lease of a call, on a runner or a component."""
 
