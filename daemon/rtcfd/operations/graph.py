@@ -1,10 +1,10 @@
-"""Changes of a runner's graph: the executor adopts a change, then rtcfd notes and saves it.
+"""Changes of a runner's graph.
 
-Functions on a RunnerCore; each is one transaction of its executor.
+Functions on a RunnerCore; each is one Change, and one transaction of its executor.
 """
 
 import asyncio
-from collections.abc import Awaitable, Callable, Iterable
+from collections.abc import Awaitable, Callable, Iterable, Mapping
 
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, errors_pb2, graph_pb2
@@ -19,10 +19,9 @@ from rtcfd.common.names import absolute, check_graph, full_name
 from rtcfd.common.refusals import InvalidArgument, NoMaster, NotFound, Refusal
 from rtcfd.executor.link import Progress
 from rtcfd.operations import parameters, tuned
-from rtcfd.operations.runner_core import RunnerCore
+from rtcfd.operations.runner_core import Change, RunnerCore
 from rtcfd.state.desired import replacement
 
-_Event = control_pb2.Event
 _MASTER_POLL_S = 0.5
 
 
@@ -39,23 +38,29 @@ async def load(
 async def _load(
     runner: RunnerCore, spec: graph_pb2.ComponentSpec, progress: Progress
 ) -> control_pb2.ChangeResult:
-    library = await runner.catalog.find(spec.package, spec.type)
+    library = await runner.shared.catalog.find(spec.package, spec.type)
     note = library.note(spec)
     acting = caller.current()
+    desired, code = runner.desired, f"{spec.package}/{spec.type}"
 
-    async def work() -> control_pb2.ChangeResult:
-        runner.limits.check_components(len(runner.desired.components) + 1)
-        request = wire.Request(load=library.load(spec))
-        result = (await runner.ask(request, progress)).change
-        runner.left_out.pop(result.component, None)
-        runner.desired.put(result.component, spec)
-        runner.happened(_Event.KIND_GRAPH, f"{result.component} loaded ({code})", result.component)
+    async def request() -> wire.Request:
+        runner.shared.limits.check_components(len(desired.components) + 1)
+        return wire.Request(load=library.load(spec))
+
+    def commit(result: control_pb2.ChangeResult) -> None:
+        desired.left_out.pop(result.component, None)
+        desired.put(result.component, spec)
         parameters.note(runner, result.component, spec.parameters, {}, acting, "load")
-        return await _saved(runner, result)
 
-    code = f"{spec.package}/{spec.type}"
-    result = await runner.change(f"the load of {code}", work)
-    runner.log.info("%s loaded (%s)", result.component, code)
+    result = await runner.make(
+        Change(
+            name=f"the load of {code}",
+            request=request,
+            event=lambda result: f"{result.component} loaded ({code})",
+            commit=commit,
+        ),
+        progress,
+    )
     if note:
         runner.log.warning(note)
         result.notes.append(note)
@@ -90,27 +95,26 @@ async def unload(
         raise InvalidArgument(
             "name the components to unload", errors_pb2.REASON_NAME_MISSING, field="components"
         )
-    full_names = [absolute(name) for name in request.components]
+    names = [absolute(name) for name in request.components]
+    listed = ", ".join(names)
 
-    async def work() -> control_pb2.ChangeResult:
-        live = [name for name in full_names if name not in runner.left_out]
+    async def unload_request() -> wire.Request | control_pb2.ChangeResult:
+        live = [name for name in names if name not in runner.desired.left_out]
         if runner.up and live:
-            asked = wire.Request(unload=control_pb2.UnloadRequest(components=live))
-            result = (await runner.ask(asked, progress)).change
-        else:
-            _check_known(runner, full_names)
-            result = control_pb2.ChangeResult(notes=["removed from the saved graph only"])
-        for name in full_names:
-            runner.left_out.pop(name, None)
-        runner.desired.drop(full_names)
-        one = full_names[0] if len(full_names) == 1 else ""
-        runner.happened(_Event.KIND_GRAPH, f"{listed} unloaded", one)
-        return await _saved(runner, result)
+            return wire.Request(unload=control_pb2.UnloadRequest(components=live))
+        _check_known(runner, names)
+        return control_pb2.ChangeResult(notes=["removed from the saved graph only"])
 
-    listed = ", ".join(full_names)
-    result = await runner.change(f"the unload of {listed}", work)
-    runner.log.info("%s unloaded", listed)
-    return result
+    return await runner.make(
+        Change(
+            name=f"the unload of {listed}",
+            request=unload_request,
+            event=lambda _: f"{listed} unloaded",
+            commit=lambda _: runner.desired.drop(names),
+            component=_single(names),
+        ),
+        progress,
+    )
 
 
 async def replace(
@@ -125,51 +129,55 @@ async def replace(
     before = runner.desired.components.get(old)
     package = given.package or (before.package if before else "")
     type_name = given.type or (before.type if before else "")
-    library = await runner.catalog.find(package, type_name)
+    library = await runner.shared.catalog.find(package, type_name)
     acting = caller.current()
+    code = f"{package}/{type_name}"
+    spec = graph_pb2.ComponentSpec()
+    kept: tuned.Tuned | None = None
 
-    async def work() -> control_pb2.ChangeResult:
-        spec = replacement(runner.desired.components.get(old), given)
-        kept = None
+    async def replace_request() -> wire.Request:
+        nonlocal kept
+        spec.CopyFrom(replacement(runner.desired.components.get(old), given))
         if request.HasField("given_before"):
             kept = await tuned.keep(runner, old, spec, request.given_before)
         reset = request.reset_parameters or kept is not None
-        if old in runner.left_out:  # the executor does not have it
+        if old in runner.desired.left_out:  # the executor does not have it
             load = library.load(spec)
             if not reset:
                 load.inherited.extend(runner.desired.components[old].parameters)
-            asked = wire.Request(load=load)
-        else:
-            change = wire.Replace(
+            return wire.Request(load=load)
+        return wire.Request(
+            replace=wire.Replace(
                 component=old,
                 replacement=spec,
                 library=library.path,
                 owner=library.owner,
                 reset_parameters=reset,
             )
-            asked = wire.Request(replace=change)
-        result = (await runner.ask(asked, progress)).change
+        )
+
+    def commit(result: control_pb2.ChangeResult) -> None:
         known = runner.desired.components.get(old, graph_pb2.ComponentSpec()).parameters
         values = {each.name: each.value for each in known}
         set_now = list(spec.parameters)
         spec.parameters.extend(result.kept)
-        runner.left_out.pop(old, None)
         runner.desired.drop([old])
         runner.desired.put(result.component, spec)
-        runner.happened(
-            _Event.KIND_GRAPH, f"{old} replaced by {result.component} ({code})", result.component
-        )
         if kept is None:
             parameters.note(runner, result.component, set_now, values, acting, "replace")
         else:
             kept.note(runner, result.component, acting, "replace")
             kept.tell(result)
-        return await _saved(runner, result)
 
-    code = f"{package}/{type_name}"
-    result = await runner.change(f"the replacement of {old} by {code}", work)
-    runner.log.info("%s replaced by %s (%s)", old, result.component, code)
-    return result
+    return await runner.make(
+        Change(
+            name=f"the replacement of {old} by {code}",
+            request=replace_request,
+            event=lambda result: f"{old} replaced by {result.component} ({code})",
+            commit=commit,
+        ),
+        progress,
+    )
 
 
 async def release(
@@ -180,36 +188,40 @@ async def release(
         raise InvalidArgument(
             "name the components to release", errors_pb2.REASON_NAME_MISSING, field="components"
         )
-    full_names = [absolute(name) for name in request.components]
-    listed = ", ".join(full_names)
+    names = [absolute(name) for name in request.components]
+    listed = ", ".join(names)
 
-    async def work() -> control_pb2.ChangeResult:
-        _check_known(runner, full_names)
-        marked = [name for name in full_names if name not in runner.left_out]
+    async def release_request() -> wire.Request:
+        _check_known(runner, names)
+        marked = [name for name in names if name not in runner.desired.left_out]
         if marked:
             await _require_faulted(runner, marked)
-        specs = [runner.desired.components[name] for name in full_names]
+        specs = [runner.desired.components[name] for name in names]
         if len(specs) == 1 and not marked:
-            (load,) = await loads(runner.catalog, specs)
-            asked = wire.Request(load=load)
-        else:
-            every = [spec for name, spec in runner.desired.components.items()
-                     if name not in runner.left_out or name in full_names]  # fmt: skip
-            apply = wire.Apply(components=await loads(runner.catalog, every))
-            for load in apply.components:
-                load.anew = full_name(load.component) in marked
-            asked = wire.Request(apply=apply)
-        result = (await runner.ask(asked, progress)).change
-        for name in full_names:
-            runner.left_out.pop(name, None)
-            runner.desired.quarantined.pop(name, None)
-        one = full_names[0] if len(full_names) == 1 else ""
-        runner.happened(_Event.KIND_GRAPH, f"{listed} released", one)
-        return await _saved(runner, result)
+            (load,) = await loads(runner.shared.catalog, specs)
+            return wire.Request(load=load)
+        every = [spec for name, spec in runner.desired.components.items()
+                 if name not in runner.desired.left_out or name in names]  # fmt: skip
+        apply = wire.Apply(components=await loads(runner.shared.catalog, every))
+        for load in apply.components:
+            load.anew = full_name(load.component) in marked
+        return wire.Request(apply=apply)
 
-    result = await runner.change(f"the release of {listed}", work)
-    runner.log.info("%s released", listed)
-    return result
+    def commit(_: control_pb2.ChangeResult) -> None:
+        for name in names:
+            runner.desired.left_out.pop(name, None)
+            runner.desired.quarantined.pop(name, None)
+
+    return await runner.make(
+        Change(
+            name=f"the release of {listed}",
+            request=release_request,
+            event=lambda _: f"{listed} released",
+            commit=commit,
+            component=_single(names),
+        ),
+        progress,
+    )
 
 
 async def _require_faulted(runner: RunnerCore, names: list[str]) -> None:
@@ -235,68 +247,88 @@ async def apply(
     """Change the graph, and the given settings, to those of a request."""
     check_graph(request.components)
     runner_settings.check(request.settings)
-    runner.limits.check_components(len(request.components))
+    runner.shared.limits.check_components(len(request.components))
     acting = caller.current()
     specs = list(request.components)
+    kept: dict[str, tuned.Tuned] = {}
 
-    async def work() -> control_pb2.ChangeResult:
-        before = runner.settings()
-        changes = runner_settings.differences(before, request.settings)
-        kept: dict[str, tuned.Tuned] = {}
+    async def result_of_apply() -> control_pb2.ChangeResult:
         if request.given_before:
-            kept = await tuned.keep_all(runner, specs, request.given_before)
-        apply = wire.Apply(components=await loads(runner.catalog, specs), dry_run=True)
-        rebuilt = await runner.code.changed()
-        for load in apply.components:
-            load.anew = request.rebuilt and full_name(load.component) in rebuilt
-        if not request.dry_run and (changes or not request.runner):
-            # A dry run first, so that a rejected graph does not change the settings, not even for
-            # a moment.
-            would = (await runner.ask(wire.Request(apply=apply), progress)).change
-            if not request.runner:
-                _require_no_unload(runner, would)
-        if changes and not request.dry_run:
-            effect = runner.desired.effect(request.settings, runner.defaults)
-            await runner.ask(wire.Request(configure=effect))
-        apply.dry_run = request.dry_run
-        try:
-            result = (await runner.ask(wire.Request(apply=apply), progress)).change
-        except Refusal:
-            if changes and not request.dry_run and runner.up:
-                await runner.ask(wire.Request(configure=before))
-            raise
-        for text in changes:
-            kind = control_pb2.Difference.KIND_SETTINGS
-            result.differences.append(control_pb2.Difference(kind=kind, detail=text))
-        for name, each in kept.items():
-            result.notes.extend(each.notes)
-            if each.kept:
-                words = ", ".join(f"{one.name} = {parameters.word(one.value)}" for one in each.kept)
-                result.notes.append(f"{name} keeps {words}, set since")
-        stale = sorted({full_name(each) for each in request.components} & rebuilt.keys())
-        if stale and not request.rebuilt:
-            result.notes.append(
-                f"the library of {', '.join(stale)} has changed since it was loaded: "
-                "--rebuilt loads the new one"
-            )
-        if request.dry_run:
-            return result
-        _note_parameters(runner, (each for each in specs if full_name(each) not in kept), acting)
-        for name, each in kept.items():
-            each.note(runner, name, acting, "apply")
-        runner.desired.become(specs)
-        runner.left_out.clear()
-        runner.desired.choose(request.settings)
-        count, differed = len(request.components), len(result.differences)
-        runner.happened(
-            _Event.KIND_GRAPH, f"graph of {count} components applied: {differed} differences"
-        )
-        return await _saved(runner, result)
+            kept.update(await tuned.keep_all(runner, specs, request.given_before))
+        result = await _ask_to_apply(runner, request, specs, kept, progress)
+        if not request.dry_run:
+            changed = (each for each in specs if full_name(each) not in kept)
+            _note_parameters(runner, changed, acting)
+            for name, each in kept.items():
+                each.note(runner, name, acting, "apply")
+        return result
 
-    result = await runner.change("the application of a graph", work)
-    if not request.dry_run:
-        runner.log.info("graph of %d components applied: %d differences",
-                        len(request.components), len(result.differences))  # fmt: skip
+    def commit(_: control_pb2.ChangeResult) -> None:
+        runner.desired.become(specs)
+        runner.desired.left_out.clear()
+        runner.desired.choose(request.settings)
+
+    name = "the application of a graph"
+    if request.dry_run:
+        return await runner.change(name, result_of_apply)
+    return await runner.make(
+        Change(
+            name=name,
+            request=result_of_apply,
+            event=lambda result: (
+                f"graph of {len(specs)} components applied: {len(result.differences)} differences"
+            ),
+            commit=commit,
+            component="",
+        ),
+        progress,
+    )
+
+
+async def _ask_to_apply(
+    runner: RunnerCore,
+    request: control_pb2.ApplyRequest,
+    specs: list[graph_pb2.ComponentSpec],
+    kept: Mapping[str, tuned.Tuned],
+    progress: Progress,
+) -> control_pb2.ChangeResult:
+    """Make the executor apply a graph and settings, or none of both."""
+    before = runner.settings()
+    changes = runner_settings.differences(before, request.settings)
+    apply = wire.Apply(components=await loads(runner.shared.catalog, specs), dry_run=True)
+    rebuilt = await runner.code.changed()
+    for load in apply.components:
+        load.anew = request.rebuilt and full_name(load.component) in rebuilt
+    if not request.dry_run and (changes or not request.runner):
+        # A dry run first, so that a rejected graph does not change the settings, not even for
+        # a moment.
+        would = (await runner.ask(wire.Request(apply=apply), progress)).change
+        if not request.runner:
+            _require_no_unload(runner, would)
+    if changes and not request.dry_run:
+        effect = runner.desired.effect(request.settings, runner.shared.defaults)
+        await runner.ask(wire.Request(configure=effect))
+    apply.dry_run = request.dry_run
+    try:
+        result = (await runner.ask(wire.Request(apply=apply), progress)).change
+    except Refusal:
+        if changes and not request.dry_run and runner.up:
+            await runner.ask(wire.Request(configure=before))
+        raise
+    for text in changes:
+        kind = control_pb2.Difference.KIND_SETTINGS
+        result.differences.append(control_pb2.Difference(kind=kind, detail=text))
+    for name, each in kept.items():
+        result.notes.extend(each.notes)
+        if each.kept:
+            words = ", ".join(f"{one.name} = {parameters.word(one.value)}" for one in each.kept)
+            result.notes.append(f"{name} keeps {words}, set since")
+    stale = sorted({full_name(each) for each in request.components} & rebuilt.keys())
+    if stale and not request.rebuilt:
+        result.notes.append(
+            f"the library of {', '.join(stale)} has changed since it was loaded: "
+            "--rebuilt loads the new one"
+        )
     return result
 
 
@@ -323,7 +355,7 @@ def left_out(runner: RunnerCore) -> list[graph_pb2.ComponentInfo]:
             state=graph_pb2.COMPONENT_STATE_LEFT_OUT,
             fault=reason,
         )
-        for name, reason in sorted(runner.left_out.items())
+        for name, reason in sorted(runner.desired.left_out.items())
     ]
 
 
@@ -331,18 +363,18 @@ async def set_breaks(
     runner: RunnerCore, request: control_pb2.SetBreaksRequest, progress: Progress
 ) -> control_pb2.ChangeResult:
     """Set or remove loop breaks."""
-
-    async def work() -> control_pb2.ChangeResult:
-        result = (await runner.ask(wire.Request(set_breaks=request), progress)).change
-        runner.desired.set_breaks(request.ports, request.broken)
-        runner.happened(_Event.KIND_GRAPH, text)
-        return await _saved(runner, result)
-
     ports = ", ".join(f"{absolute(port.component)}.{port.port}" for port in request.ports)
     text = f"{ports}: loop break {'set' if request.broken else 'removed'}"
-    result = await runner.change("a change of loop breaks", work)
-    runner.log.info("%s", text)
-    return result
+    return await runner.make(
+        Change(
+            name="a change of loop breaks",
+            request=wire.Request(set_breaks=request),
+            event=lambda _: text,
+            commit=lambda _: runner.desired.set_breaks(request.ports, request.broken),
+            component="",
+        ),
+        progress,
+    )
 
 
 def _note_parameters(
@@ -367,15 +399,16 @@ async def reset_state(
 ) -> control_pb2.ChangeResult:
     """Reset the state of one component to its initial values."""
     name = absolute(request.component)
-
-    async def work() -> control_pb2.ChangeResult:
-        result = (await runner.ask(wire.Request(reset_state=request), progress)).change
-        runner.happened(_Event.KIND_PARAMETERS, f"{name}: state reset", name)
-        return result
-
-    result = await runner.change(f"a reset of {name}", work)
-    runner.log.info("%s: state reset", name)
-    return result
+    return await runner.make(
+        Change(
+            name=f"a reset of {name}",
+            request=wire.Request(reset_state=request),
+            event=lambda _: f"{name}: state reset",
+            kind=control_pb2.Event.KIND_PARAMETERS,
+            component=name,
+        ),
+        progress,
+    )
 
 
 async def set_state(
@@ -383,19 +416,21 @@ async def set_state(
 ) -> control_pb2.ChangeResult:
     """Set state values of one component while the loop does not run."""
     name = absolute(request.component)
+    states = ", ".join(each.name for each in request.states)
+    return await runner.make(
+        Change(
+            name=f"a change of the state of {name}",
+            request=wire.Request(set_state=request),
+            event=lambda _: f"{name}: state {states} set by {caller.name()}",
+            kind=None,
+        ),
+        progress,
+    )
 
-    async def work() -> control_pb2.ChangeResult:
-        return (await runner.ask(wire.Request(set_state=request), progress)).change
 
-    result = await runner.change(f"a change of the state of {name}", work)
-    names = ", ".join(each.name for each in request.states)
-    runner.log.info("%s: state %s set by %s", name, names, caller.name())
-    return result
-
-
-async def _saved(runner: RunnerCore, result: control_pb2.ChangeResult) -> control_pb2.ChangeResult:
-    result.notes.extend(await runner.save())
-    return result
+def _single(names: list[str]) -> str:
+    """Return the name of the only component of a change; empty = there are several."""
+    return names[0] if len(names) == 1 else ""
 
 
 def _check_known(runner: RunnerCore, full_names: list[str]) -> None:

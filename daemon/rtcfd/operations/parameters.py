@@ -19,8 +19,8 @@ from rtcfd.common import declared_values, ros_value
 from rtcfd.common.names import absolute
 from rtcfd.common.refusals import FailedPrecondition, InvalidArgument, NotFound
 from rtcfd.executor.link import Progress
-from rtcfd.operations.runner_core import Asked, RunnerCore
-from rtcfd.state.history import UNANSWERED, Change
+from rtcfd.operations.runner_core import Asked, Change, RunnerCore
+from rtcfd.state.history import UNANSWERED, ParameterChange
 
 _LONGEST_WORD = 60  # characters of a value in a message
 _MOST_CHANGES = 500  # in one response
@@ -76,7 +76,7 @@ async def write_input(
     name = absolute(request.component)
     port = {"component": name, "port": request.port}
 
-    async def work() -> control_pb2.ChangeResult:
+    async def write_request() -> wire.Request:
         asked = await runner.ask(wire.Request(describe_input=wire.DescribeInput(**port)))
         found = asked.input_type
         try:
@@ -88,12 +88,17 @@ async def write_input(
                 errors_pb2.REASON_VALUE_INVALID,
                 field="value",
             ) from None
-        written = wire.WriteInput(message=message, **port)
-        return (await runner.ask(wire.Request(write_input=written), progress)).change
+        return wire.Request(write_input=wire.WriteInput(message=message, **port))
 
-    result = await runner.change(f"a value of {name}.{request.port}", work)
-    runner.log.info("%s: input %s written by %s", name, request.port, caller.name())
-    return result
+    return await runner.make(
+        Change(
+            name=f"a value of {name}.{request.port}",
+            request=write_request,
+            event=lambda _: f"{name}: input {request.port} written by {caller.name()}",
+            kind=None,
+        ),
+        progress,
+    )
 
 
 def history(
@@ -114,7 +119,7 @@ def history(
     return control_pb2.GetHistoryResponse(changes=reversed(changes))
 
 
-def told(change: Change) -> control_pb2.ParameterChange:
+def told(change: ParameterChange) -> control_pb2.ParameterChange:
     """Return a change as the client protocol has it."""
     return control_pb2.ParameterChange(
         component=change.component,
@@ -207,7 +212,7 @@ async def _set(
     before = await _values(runner, name)
     if acting is not None and acting.tuning is not None:
         _require_tuning(runner, name, settings, before, acting)
-    if name in runner.left_out:
+    if name in runner.desired.left_out:
         result = await _check_left_out(runner, name, settings)
     else:
         result = await _ask(runner, Asked(name, settings, before, acting), progress)
@@ -243,7 +248,7 @@ async def _check_left_out(
 
 
 def _taken_back(
-    runner: RunnerCore, change: Change, now: Mapping[str, graph_pb2.ParameterValue]
+    runner: RunnerCore, change: ParameterChange, now: Mapping[str, graph_pb2.ParameterValue]
 ) -> graph_pb2.ParameterSetting:
     """Return the setting that undoes a change.
 
@@ -312,11 +317,11 @@ async def live_components(runner: RunnerCore) -> dict[str, graph_pb2.ComponentIn
 async def _declared(runner: RunnerCore, name: str) -> list[graph_pb2.ParameterInfo]:
     """Return the parameters that the type of a left-out component declares."""
     spec = runner.desired.components[name]
-    return list((await runner.catalog.find(spec.package, spec.type)).parameters)
+    return list((await runner.shared.catalog.find(spec.package, spec.type)).parameters)
 
 
 async def _values(runner: RunnerCore, name: str) -> dict[str, graph_pb2.ParameterValue]:
-    if name in runner.left_out:
+    if name in runner.desired.left_out:
         return _last_values(runner, name, await _declared(runner, name))
     found = await live_component(runner, name)
     return {each.name: each.value for each in found.parameters}

@@ -78,6 +78,21 @@ class Asked:
     acting: caller.Caller | None
 
 
+@dataclass(frozen=True)
+class Change:
+    """A change of a runner, made by RunnerCore.make() in its turn."""
+
+    name: str  # for messages: "the load of demo/Fine"
+    # What to ask the executor, or a function that returns it when the turn has come.  A function
+    # may also ask by itself, and return the result.
+    request: wire.Request | Callable[[], Awaitable[wire.Request | control_pb2.ChangeResult]]
+    event: Callable[[control_pb2.ChangeResult], str]  # returns the line for the event and the log
+    # Notes the adopted change in the desired state, which is then saved; None: it does not change.
+    commit: Callable[[control_pb2.ChangeResult], None] | None = None
+    kind: "control_pb2.Event.Kind | None" = control_pb2.Event.KIND_GRAPH  # None: only the log
+    component: str | None = None  # of the event; None: that of the result
+
+
 class RunnerCore(ABC):
     """A runner without its client-facing part."""
 
@@ -174,30 +189,6 @@ class RunnerCore(ABC):
         """The executor, if there is one; callers must only read it."""
         return self._executor
 
-    @property
-    def left_out(self) -> dict[str, str]:
-        """The components that are desired but not loaded, each with the reason."""
-        return self.desired.left_out
-
-    @left_out.setter
-    def left_out(self, names: dict[str, str]) -> None:
-        self.desired.left_out = names
-
-    @property
-    def limits(self) -> Limits:
-        """The limits on this runner."""
-        return self.shared.limits
-
-    @property
-    def catalog(self) -> Catalog:
-        """The catalog of component types."""
-        return self.shared.catalog
-
-    @property
-    def defaults(self) -> runner_pb2.RunnerSettings:
-        """The settings that apply unless set for this runner."""
-        return self.shared.defaults
-
     def settings(self) -> runner_pb2.RunnerSettings:
         """Return all settings."""
         return self.desired.complete(self.shared.defaults)
@@ -269,7 +260,7 @@ class RunnerCore(ABC):
     async def limit(self) -> None:
         """Send the limits and the access rules to the executor."""
         if self._executor is not None:
-            await self._executor.limit(self.limits)
+            await self._executor.limit(self.shared.limits)
             await self._executor.grant(self.shared.rules)
 
     async def query(self, request: wire.Request) -> wire.Response:
@@ -364,6 +355,27 @@ class RunnerCore(ABC):
         self.executor_ended(executor, end, ours)
 
     # -- changes ------------------------------------------------------------------
+
+    async def make(self, change: Change, progress: Progress) -> control_pb2.ChangeResult:
+        """Make a change in its turn: ask the executor, then add the event, commit and save."""
+
+        async def work() -> tuple[control_pb2.ChangeResult, str]:
+            request = change.request
+            result = request if isinstance(request, wire.Request) else await request()
+            if isinstance(result, wire.Request):
+                result = (await self.ask(result, progress)).change
+            line = change.event(result)
+            if change.kind is not None:
+                component = result.component if change.component is None else change.component
+                self.happened(change.kind, line, component)
+            if change.commit is not None:
+                change.commit(result)
+                result.notes.extend(await self.save())
+            return result, line
+
+        result, line = await self.change(change.name, work)
+        self.log.info("%s", line)
+        return result
 
     async def change(
         self,

@@ -50,9 +50,9 @@ async def keep_all(
     live = await parameters.live_components(runner)
     for spec in specs:
         name = full_name(spec)
-        if name in earlier and (name in live or name in runner.left_out):
+        if name in earlier and (name in live or name in runner.desired.left_out):
             values = _values(runner, name, live.get(name), earlier[name])
-            found[name] = await _keep(runner.catalog, spec, earlier[name], values)
+            found[name] = await _keep(runner.shared.catalog, spec, earlier[name], values)
     return found
 
 
@@ -63,9 +63,9 @@ async def keep(
     given_before: graph_pb2.ComponentSpec,
 ) -> Tuned:
     """Put tuned values of the component `old` into its replacement."""
-    info = None if old in runner.left_out else await parameters.live_component(runner, old)
+    info = None if old in runner.desired.left_out else await parameters.live_component(runner, old)
     values = _values(runner, old, info, given_before)
-    return await _keep(runner.catalog, spec, given_before, values)
+    return await _keep(runner.shared.catalog, spec, given_before, values)
 
 
 @dataclass

@@ -35,7 +35,7 @@ async def bring_up(runner: RunnerCore, only_left_over: bool = False, boot: bool 
     The loop is held; at `boot`, `on_boot` decides.  Returns whether there is an executor.
     """
     asked, stopped_at_ns = runner.loop.stops, runner.loop.stopped_at_ns
-    agreed = set(runner.left_out) if runner.loop.wanted else set()
+    agreed = set(runner.desired.left_out) if runner.loop.wanted else set()
     adopted = await runner.take_executor(only_left_over)
     if adopted is None:
         return False
@@ -74,10 +74,10 @@ async def _follow(runner: RunnerCore, asked: int) -> None:
         "adopted: loop %s, iteration %d", _WORDS.get(status.state, "in an unknown state"),
         status.iteration,
     )  # fmt: skip
-    lines = follow_settings(runner.desired, runner.defaults, status.settings)
+    lines = follow_settings(runner.desired, runner.shared.defaults, status.settings)
     leases_ended = _follow_leased(runner, listed.components.components)
     fresh = status.state == runner_pb2.RUNNER_STATE_STOPPED and not status.iteration
-    more, runner.left_out = follow_components(
+    more, runner.desired.left_out = follow_components(
         runner.desired, listed.components.components, restored=not fresh
     )
     for line in lines + more:
@@ -85,7 +85,8 @@ async def _follow(runner: RunnerCore, asked: int) -> None:
     if not runner.loop.running and was_running and not fresh:
         runner.loop.want(False)
     if status.state == runner_pb2.RUNNER_STATE_STOPPED:
-        missing = [name for name in runner.left_out if name not in runner.desired.quarantined]
+        desired = runner.desired
+        missing = [name for name in desired.left_out if name not in desired.quarantined]
         await _load_each(runner, missing)
     if lines or more or leases_ended or runner.loop.wanted != was_running:
         await runner.save()
@@ -114,14 +115,15 @@ def _follow_leased(runner: RunnerCore, found: Iterable[graph_pb2.ComponentInfo])
 
 async def _restore(runner: RunnerCore) -> None:
     """Load the desired components into a new executor; those that fail are left out and logged."""
-    runner.left_out = dict(runner.desired.quarantined)
-    wanted = [name for name in runner.desired.components if name not in runner.left_out]
+    desired = runner.desired
+    desired.left_out = dict(desired.quarantined)
+    wanted = [name for name in desired.components if name not in desired.left_out]
     if not wanted:
         return
     runner.trouble = restoring = f"its components are being restored: {len(wanted)}"
     try:
         # All at once, for speed; one by one if that fails.
-        every = await loads(runner.catalog, [runner.desired.components[name] for name in wanted])
+        every = await loads(runner.shared.catalog, [desired.components[name] for name in wanted])
         await runner.ask(wire.Request(apply=wire.Apply(components=every)))
     except Refusal:
         if runner.up:
@@ -130,9 +132,9 @@ async def _restore(runner: RunnerCore) -> None:
         if runner.trouble == restoring:  # else the executor has died meanwhile
             runner.trouble = ""
     if runner.up:
-        count = len(runner.desired.components) - len(runner.left_out)
+        count = len(desired.components) - len(desired.left_out)
         runner.log.info("%d of its components restored, held", count)
-    if runner.left_out:
+    if desired.left_out:
         await runner.save()
 
 
@@ -177,7 +179,7 @@ async def recover(runner: RunnerCore, verdict: Verdict, crashes: Crashes, troubl
         if crashes.recent >= MOST_ATTEMPTS:
             _give_up(runner, f"{trouble}, the last of {crashes.recent} in {WINDOW_S:g} s")
             return
-        agreed = {*runner.left_out, verdict.culprit}
+        agreed = {*runner.desired.left_out, verdict.culprit}
         await bring_up(runner)
         if not runner.up:
             return  # the new executor died too, and its own recovery follows
@@ -211,8 +213,9 @@ def require_whole(runner: RunnerCore, agreed: Container[str]) -> None:
     first = missing[0]
     words = " ".join(f"--without {name}" for name in missing)
     raise FailedPrecondition(
-        f"runner {runner.name}: left out of its loop: {listing(missing)} ({first}: "
-        f"{runner.left_out[first]}): `rtcfctl -r {runner.name} release {first}` loads it again, "
+        f"runner {runner.name}: left out of its loop: {listing(missing)} "
+        f"({first}: {runner.desired.left_out[first]}): "
+        f"`rtcfctl -r {runner.name} release {first}` loads it again, "
         f"`rtcfctl -r {runner.name} start {words}` goes on without",
         errors_pb2.REASON_COMPONENT_LEFT_OUT,
         component=first,
@@ -223,7 +226,7 @@ def _missing(runner: RunnerCore, agreed: Container[str]) -> list[str]:
     components = runner.desired.components
     return [
         name
-        for name in sorted(runner.left_out)
+        for name in sorted(runner.desired.left_out)
         if name in components and not components[name].optional and name not in agreed
     ]
 
@@ -279,13 +282,13 @@ async def _load_each(runner: RunnerCore, names: Iterable[str]) -> None:
     """Load components one by one; those that fail are left out and logged."""
     for name in names:
         try:
-            (load,) = await loads(runner.catalog, [runner.desired.components[name]])
+            (load,) = await loads(runner.shared.catalog, [runner.desired.components[name]])
             await runner.ask(wire.Request(load=load))
-            runner.left_out.pop(name, None)
+            runner.desired.left_out.pop(name, None)
         except Refusal as refusal:
             if not runner.up:
                 return  # the executor died, and its recovery loads the rest
-            runner.left_out[name] = str(refusal)
+            runner.desired.left_out[name] = str(refusal)
             runner.log.error("%s is left out of the loop: %s", name, refusal)
-    if runner.left_out:
-        runner.log.warning("left out of its loop: %s", listing(runner.left_out))
+    if runner.desired.left_out:
+        runner.log.warning("left out of its loop: %s", listing(runner.desired.left_out))

@@ -35,7 +35,7 @@ async def name_source(runner: RunnerCore, trace: Trace, verdict: Verdict) -> Non
     extra = {"runner": runner.name, "component": verdict.culprit}
     runner.log.logger.error("%s", text, extra=extra)
     runner.happened(control_pb2.Event.KIND_EXECUTOR_FAULT, text, verdict.culprit)
-    for known in (runner.left_out, runner.desired.quarantined):
+    for known in (runner.desired.left_out, runner.desired.quarantined):
         if known.get(verdict.culprit) == str(verdict):
             known[verdict.culprit] = f"{verdict}: {place}"
     if not runner.closing:

@@ -37,7 +37,7 @@ async def start(
             _require_complete(runner, request)
         result = await start_in_turn(runner, asked, progress)
         runner.log.info("loop started")
-        for name, reason in sorted(runner.left_out.items()):
+        for name, reason in sorted(runner.desired.left_out.items()):
             result.notes.append(f"without {name}: {reason}")
         return result
 
@@ -105,11 +105,11 @@ async def replay(
 def _require_complete(runner: RunnerCore, request: control_pb2.StartRequest) -> None:
     """Raise an error if a component is left out, unless the request allows its absence."""
     without = {absolute(name) for name in request.without}
-    if unknown := sorted(without - runner.left_out.keys()):
+    if unknown := sorted(without - runner.desired.left_out.keys()):
         raise NotFound(
             f"{unknown[0]} is not left out of runner {runner.name} "
-            f"(left out: {listing(runner.left_out)}): `rtcfctl -r {runner.name} unload` removes a "
-            "component",
+            f"(left out: {listing(runner.desired.left_out)}): "
+            f"`rtcfctl -r {runner.name} unload` removes a component",
             errors_pb2.REASON_COMPONENT_NOT_LEFT_OUT,
             component=unknown[0],
         )

@@ -82,7 +82,7 @@ class Leases:
     ) -> control_pb2.ChangeResult:
         """Load a component for a holder."""
         runner, spec = self._runner, request.component
-        library = await runner.catalog.find(spec.package, spec.type)
+        library = await runner.shared.catalog.find(spec.package, spec.type)
         note = library.note(spec)
         name = full_name(spec)
         if leaving := self._leaving.get(name):
@@ -97,7 +97,7 @@ class Leases:
                     component=name,
                 )
             self._check_hold(request.hold)
-            runner.limits.check_components(len(runner.desired.components) + 1)
+            runner.shared.limits.check_components(len(runner.desired.components) + 1)
             if name in runner.desired.components:
                 raise AlreadyExists(
                     f"component {name} exists already in runner {runner.name}: "
@@ -225,8 +225,8 @@ class Leases:
             if name not in self._terms:
                 outbox.end(_Ended.WHY_UNLOADED, f"{name} was unloaded by another client")
                 del self._outboxes[name]
-            elif runner.up and name in runner.left_out:
-                self.failed(name, runner.left_out[name])
+            elif runner.up and name in runner.desired.left_out:
+                self.failed(name, runner.desired.left_out[name])
 
     async def unload_all(self) -> None:
         """Unload all leased components, while their holders still receive log records."""

@@ -47,7 +47,7 @@ class Runner(RunnerCore):
         self.releasing = False  # its holder has ended, and cannot reconnect
         self._crashes = Crashes()
         self._changed_by_ros: dict[str, set[str]] = {}  # by component, parameters not noted yet
-        self._events = Events(self.name, self, lambda: self.limits)
+        self._events = Events(self.name, self, lambda: self.shared.limits)
 
     # -- life ---------------------------------------------------------------
 
@@ -239,7 +239,7 @@ class Runner(RunnerCore):
         super().tell()
         self.leases.settle()
         if self.hold_outbox is not None:
-            loaded = sum(name not in self.left_out for name in self.desired.components)
+            loaded = sum(name not in self.desired.left_out for name in self.desired.components)
             self.hold_outbox.report(
                 control_pb2.HoldReport(
                     components=loaded if self.up else 0,
@@ -328,7 +328,7 @@ class Runner(RunnerCore):
 
         async def work() -> None:
             if self.up:
-                effect = self.desired.effect(change, self.defaults)
+                effect = self.desired.effect(change, self.shared.defaults)
                 await self.ask(wire.Request(configure=effect))
             else:
                 await self._require_acceptable(change)

@@ -30,7 +30,7 @@ Value = graph_pb2.ParameterValue
 
 
 @dataclass(frozen=True)
-class Change:
+class ParameterChange:
     """A change of one parameter.  Changes at one cycle boundary have the same number."""
 
     number: int
@@ -49,12 +49,12 @@ class History:
     """The changes, oldest first."""
 
     def __init__(self) -> None:
-        self._changes: dict[str, deque[Change]] = {}  # by component
+        self._changes: dict[str, deque[ParameterChange]] = {}  # by component
         self._count = 0
         self._bytes: dict[str, int] = {}  # by component
         self._bytes_on_disk = 0
         self._last = 0  # number of the newest change
-        self._new: list[Change] = []  # not on disk yet
+        self._new: list[ParameterChange] = []  # not on disk yet
         self._on_disk = 0  # lines in the file
 
     def note(
@@ -69,11 +69,13 @@ class History:
         self._last += 1
         now = time.time_ns()
         for name, before, value in changes:
-            change = Change(self._last, now, component, name, before, value, who, how, takes_back)
+            change = ParameterChange(
+                self._last, now, component, name, before, value, who, how, takes_back
+            )
             self._put(change)
             self._new.append(change)
 
-    def of(self, component: str = "", parameter: str = "") -> list[Change]:
+    def of(self, component: str = "", parameter: str = "") -> list[ParameterChange]:
         """Return the changes of a component, or of all, and of a parameter, or of all."""
         chosen = [
             each
@@ -83,7 +85,7 @@ class History:
         ]
         return sorted(chosen, key=lambda each: each.number)
 
-    def to_take_back(self, component: str) -> list[Change]:
+    def to_take_back(self, component: str) -> list[ParameterChange]:
         """Return the last change of a component that is not undone, with all its parameters.
 
         Empty if there is none.
@@ -97,7 +99,7 @@ class History:
         ]
         return [each for each in changes if numbers and each.number == numbers[-1]]
 
-    def to_write(self) -> tuple[list[Change], bool]:
+    def to_write(self) -> tuple[list[ParameterChange], bool]:
         """Return the changes to write, and whether they replace the file instead of being appended.
 
         From then on they count as written.
@@ -131,7 +133,7 @@ class History:
             self._put(change)
             self._last = max(self._last, change.number)
 
-    def _put(self, change: Change) -> None:
+    def _put(self, change: ParameterChange) -> None:
         name = change.component
         changes = self._changes.setdefault(name, deque())
         changes.append(change)
@@ -167,18 +169,18 @@ class History:
             del self._changes[component], self._bytes[component]
 
 
-def text(changes: Iterable[Change]) -> str:
+def text(changes: Iterable[ParameterChange]) -> str:
     """Return changes as text for read().  On any thread."""
     return "".join(_line(each) for each in changes)
 
 
-def _size(change: Change) -> int:
+def _size(change: ParameterChange) -> int:
     before = 0 if change.before is None else int(change.before.ByteSize())
     # 200: names, time and numbers.
     return 200 + len(change.component) + before + int(change.value.ByteSize())
 
 
-def _line(change: Change) -> str:
+def _line(change: ParameterChange) -> str:
     fields: dict[str, Any] = dict(vars(change))
     for name in ("before", "value"):
         if fields[name] is not None:
@@ -186,12 +188,12 @@ def _line(change: Change) -> str:
     return json.dumps(fields) + "\n"
 
 
-def _change(line: str) -> Change:
+def _change(line: str) -> ParameterChange:
     fields = json.loads(line)
     for name in ("before", "value"):
         if fields[name] is not None:
             fields[name] = json_format.ParseDict(fields[name], Value())
-    change = Change(**fields)
+    change = ParameterChange(**fields)
     if type(change.number) is not int or not isinstance(change.component, str):
         raise ValueError("not a change")
     return change

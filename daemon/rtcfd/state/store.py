@@ -28,7 +28,7 @@ from rtcfd.common.names import check_base_name, full_name
 from rtcfd.common.refusals import FailedPrecondition, Refusal
 from rtcfd.state import history
 from rtcfd.state.desired import Desired, HoldTerms, LeaseTerms, this_boot
-from rtcfd.state.history import Change
+from rtcfd.state.history import ParameterChange
 
 log = logging.getLogger(__name__)
 
@@ -203,7 +203,7 @@ class Store:
             whole_files.replace(mark, b"", sync=False)
         whole_files.sync_folder(self._folder)
 
-    def save_history(self, runner: str, changes: Sequence[Change], anew: bool) -> None:
+    def save_history(self, runner: str, changes: Sequence[ParameterChange], anew: bool) -> None:
         """Write the result of History.to_write(); raises OSError.  May run on any thread.
 
         Without fsync: the history is informative, and may lose its last lines in a power cut.
