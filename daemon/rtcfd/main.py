@@ -39,7 +39,7 @@ from rtcfd.service.control import Control
 from rtcfd.state import handover
 from rtcfd.state.boot_graphs import BootGraphs
 from rtcfd.state.desired import Desired
-from rtcfd.state.disk import Disk
+from rtcfd.state.saver import Disk
 from rtcfd.state.store import Store
 
 log = logging.getLogger("rtcfd")

@@ -16,10 +16,10 @@ from rtcf.v1 import errors_pb2
 
 from rtcfd.access import calls
 from rtcfd.access.caller import ASKED_KEY, Caller, enter
-from rtcfd.access.calls import Level
+from rtcfd.access.calls import Call, Level
 from rtcfd.access.clients import Client, Clients
 from rtcfd.access.peer import Peer
-from rtcfd.access.rights import Access, needed
+from rtcfd.access.rights import Access
 from rtcfd.common import known_values
 from rtcfd.common.budget import Budget
 from rtcfd.common.refusals import InvalidArgument, Refusal, ResourceExhausted
@@ -56,6 +56,7 @@ class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
         if handler is None:
             return None
         method = details.method.rpartition("/")[2]
+        requirements = calls.of(method)
         kind = f"{'stream' if handler.request_streaming else 'unary'}_" + (
             "stream" if handler.response_streaming else "unary"
         )
@@ -63,26 +64,26 @@ class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
         wrap = self._stream if handler.response_streaming else self._unary
         make = getattr(grpc, f"{kind}_rpc_method_handler")
         return make(
-            wrap(method, inner),
-            request_deserializer=_forgiving(method, handler.request_deserializer),
+            wrap(method, requirements, inner),
+            request_deserializer=_forgiving(method, requirements, handler.request_deserializer),
             response_serializer=handler.response_serializer,
         )
 
-    def _unary(self, method: str, inner: Callable[..., Any]) -> Any:
+    def _unary(self, method: str, requirements: Call, inner: Callable[..., Any]) -> Any:
         async def call(request: Any, context: Any) -> Any:
             async with self._admitted(method, request, context) as peer:
-                with self._noted(method, request, context, peer):
+                with self._noted(method, requirements, request, context, peer):
                     return await inner(request, context)
 
         return call
 
-    def _stream(self, method: str, inner: Callable[..., Any]) -> Any:
+    def _stream(self, method: str, requirements: Call, inner: Callable[..., Any]) -> Any:
         async def call(request: Any, context: Any) -> AsyncIterator[Any]:
             async with self._admitted(method, request, context) as peer:
                 if isinstance(request, AsyncIterator):
                     request = self._formed(method, request, peer)
-                watches = needed(method) <= Level.OBSERVE
-                with self._noted(method, request, context, peer) as but:
+                watches = requirements.right <= Level.OBSERVE
+                with self._noted(method, requirements, request, context, peer) as but:
                     async with contextlib.aclosing(inner(request, context)) as responses:
                         async for response in responses:
                             if watches:
@@ -104,8 +105,8 @@ class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
                 await client.usage.turn(client.level)
                 assert client.peer is not None
                 self.access.check(client.peer, method)
-                _require_formed(method, request)
                 tuning = self.access.tuning(client.peer)
+                _require_formed(request)
                 enter(Caller(client.peer, client.level, tuning, _asked_ns(context)))
             except Refusal as refusal:
                 known = None if client is None else client.peer
@@ -125,7 +126,7 @@ class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
         """Check each message of a request stream: the caller may lose its right meanwhile."""
         async for request in requests:
             self.access.check(peer, method)
-            _require_formed(method, request)
+            _require_formed(request)
             yield request
 
     async def _refuse(
@@ -137,10 +138,12 @@ class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
         await abort(context, refusal, request)
 
     @contextlib.contextmanager
-    def _noted(self, method: str, request: Any, context: Any, peer: Peer) -> Iterator[list[str]]:
+    def _noted(
+        self, method: str, requirements: Call, request: Any, context: Any, peer: Peer
+    ) -> Iterator[list[str]]:
         """Log the result of a change.  The caller adds the rejected parts to the yielded list."""
         but: list[str] = []
-        if needed(method) <= Level.OBSERVE:
+        if requirements.right <= Level.OBSERVE:
             yield but
             return
         runner = _runner(request)
@@ -185,7 +188,7 @@ def _runner(request: Any) -> str:
     return str(getattr(request, "runner", ""))[: calls.LONGEST_NAME]
 
 
-def _require_formed(method: str, request: Any) -> None:
+def _require_formed(request: Any) -> None:
     if isinstance(request, _Malformed):
         raise request.problem
     if hasattr(request, "DESCRIPTOR"):
@@ -193,12 +196,14 @@ def _require_formed(method: str, request: Any) -> None:
         known_values.check(request)
 
 
-def _forgiving(method: str, deserialize: Callable[[bytes], Any]) -> Callable[[bytes], Any]:
+def _forgiving(
+    method: str, requirements: Call, deserialize: Callable[[bytes], Any]
+) -> Callable[[bytes], Any]:
     """Make a deserializer that returns _Malformed for a request that is too large or malformed.
 
     An exception would leave a traceback in the log.
     """
-    largest = calls.of(method).largest
+    largest = requirements.largest
 
     def forgiving(data: bytes) -> Any:
         if len(data) > largest:

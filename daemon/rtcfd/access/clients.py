@@ -24,7 +24,6 @@ from rtcf.v1 import errors_pb2
 
 from rtcfd.access.calls import Level
 from rtcfd.access.peer import Credentials, Directory, Peer, credentials, user_of
-from rtcfd.access.usage import TRUSTED, Usage
 from rtcfd.common.budget import Budget
 from rtcfd.common.limits import Limits
 from rtcfd.common.refusals import Refusal, ResourceExhausted
@@ -47,6 +46,13 @@ _LOOK_S = 5.0  # interval of the search for overdue clients, and of warnings
 _LINGER_S = 5.0  # grace period for dropped clients
 _OUT_OF_DESCRIPTORS_S = 0.1  # pause before the next attempt to accept
 _SHOWN_PREFIX = "unix-abstract:"  # how grpcio marks an abstract socket name
+# Users with this right or more are not limited, and some connections are reserved for them.
+TRUSTED = Level.OPERATE
+_CALLS_AT_A_TIME = 64
+_WATCHES_AT_A_TIME = 8
+_CALLS_PER_S = 100.0
+_BYTES_PER_S = 1024 * 1024.0
+_SAVED_S = 0.5  # seconds of unused rate that a burst may use
 
 
 @dataclass(frozen=True)
@@ -55,6 +61,70 @@ class Doors:
 
     trusted: Path
     others: Path  # accepts only small messages and few streams
+
+
+class Pace:
+    """A rate limit that delays instead of rejecting."""
+
+    def __init__(self, per_s: float) -> None:
+        self._per_s = per_s
+        self._due = time.monotonic()
+
+    def take(self, amount: float = 1.0) -> float:
+        """Account for `amount`; return how many seconds to wait before using it."""
+        now = time.monotonic()
+        self._due = max(self._due, now - _SAVED_S) + amount / self._per_s
+        return max(self._due - now, 0.0)
+
+
+class Usage:
+    """The use that one user makes of rtcfd: connections, running calls, calls per second.
+
+    Users that may stop loops are not limited: a flood of calls by another user must never delay a
+    stop.
+    """
+
+    def __init__(self) -> None:
+        self.connections = 0
+        self._calls = 0
+        self._watches = 0
+        self._pace = Pace(_CALLS_PER_S)
+        self.bytes = Pace(_BYTES_PER_S)
+
+    @property
+    def idle(self) -> bool:
+        """Whether the user has neither connections nor running calls."""
+        return not (self.connections or self._calls)
+
+    @contextmanager
+    def calling(self, method: str, peer: Peer, level: Level) -> Iterator[None]:
+        """Count a running call; raises ResourceExhausted above the limits of
+        untrusted users."""
+        watches = method.startswith("Watch")
+        if level < TRUSTED:
+            for number, most, kind in (
+                (self._calls, _CALLS_AT_A_TIME, "running calls"),
+                (self._watches if watches else 0, _WATCHES_AT_A_TIME, "open streams"),
+            ):
+                if number >= most:
+                    raise ResourceExhausted(
+                        f"user {peer.user} has {number} {kind}, the limit of a user that may only "
+                        f"{level.word}: end some",
+                        errors_pb2.REASON_TOO_MANY_CALLS,
+                        user=peer.user,
+                    )
+        self._calls += 1
+        self._watches += watches
+        try:
+            yield
+        finally:
+            self._calls -= 1
+            self._watches -= watches
+
+    async def turn(self, level: Level) -> None:
+        """Wait until the rate limit allows the next call."""
+        if level < TRUSTED and (wait_s := self._pace.take()):
+            await asyncio.sleep(wait_s)
 
 
 @dataclass(eq=False)

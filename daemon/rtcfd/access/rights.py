@@ -24,18 +24,13 @@ from rtcfd.access.calls import WORDS, Level
 from rtcfd.access.peer import Peer
 from rtcfd.common.refusals import FailedPrecondition, PermissionDenied
 
-__all__ = ["WORDS", "Access", "Level", "Rule", "Tuning", "needed", "require_pace", "rules"]
+__all__ = ["WORDS", "Access", "Level", "Rule", "Tuning", "require_pace", "rules"]
 
 log = logging.getLogger(__name__)
 
 # The allowed step grows with the time since the last change, up to this time.
 LONGEST_PAUSE_S = 10.0
 _FIRST_PAUSE_S = 1.0  # assumed before the first change
-
-
-def needed(method: str) -> Level:
-    """Return the right that a method of rtcf.v1.Control requires."""
-    return calls.of(method).right
 
 
 @dataclass(frozen=True)
@@ -110,7 +105,7 @@ class Access:
 
     def check(self, peer: Peer, method: str) -> None:
         """Raise PermissionDenied if a peer may not make a call."""
-        has, wants = self.level(peer), needed(method)
+        has, wants = self.level(peer), calls.of(method).right
         if has >= wants:
             return
         if wants == Level.TUNE and has == Level.OBSERVE and self.tuning(peer) is not None:

@@ -33,8 +33,7 @@ from rtcfd.operations.loaded_code import LoadedCode
 from rtcfd.operations.loop_state import LoopState
 from rtcfd.operations.operations import Operations
 from rtcfd.state.desired import Desired
-from rtcfd.state.disk import Disk
-from rtcfd.state.saver import Saver
+from rtcfd.state.saver import Disk, Saver
 
 CHANGE_TIMEOUT_S = 60.0  # for one change, including the wait for those before it
 _LAST_WORDS_S = 2.0  # from the loss of a link to the end of its executor
@@ -183,6 +182,12 @@ class RunnerCore(ABC):
         if self.loop.fault or self.loop.held:
             return runner_pb2.RUNNER_STATE_FAULTED
         return runner_pb2.RUNNER_STATE_STOPPED
+
+    def summary(self) -> str:
+        """Return one word on the loop."""
+        if not self.up:
+            return "down"
+        return "running" if self.loop.running else "stopped"
 
     @property
     def executor(self) -> Executor | None:

@@ -309,12 +309,6 @@ class Runner(RunnerCore):
 
     # -- queries ------------------------------------------------------------
 
-    def summary(self) -> str:
-        """Return one word on the loop."""
-        if not self.up:
-            return "down"
-        return "running" if self.loop.running else "stopped"
-
     async def status(self) -> runner_pb2.RunnerStatus:
         """Return the status, in any state."""
         return await status_of(self)

@@ -1,23 +1,69 @@
-"""Saves the desired state of one runner to disk; owned by its RunnerCore.
+"""Saves the desired states of runners to disk, in threads.
 
-On rtcfd's one thread; other threads write to the disk.  A save waits at most PATIENCE_S: a
-hanging disk is reported, and written when it answers.  Saves that wait are merged into one.
+A disk may hang for ever.  The event loop never waits for it: each work is a task, and the caller
+decides how long to wait for it.
 """
 
 import asyncio
 import logging
+from collections.abc import Awaitable, Callable
+from concurrent.futures import ThreadPoolExecutor
 
 from rtcfd.state.desired import Desired
-from rtcfd.state.disk import Disk
+from rtcfd.state.store import Store
 
 PATIENCE_S = 0.3  # longest wait for the disk before the response has _NOT_YET
 _NOT_YET = "not saved yet: the disk of the state folder does not answer"
 
+_THREADS = 4
+
 Log = logging.Logger | logging.LoggerAdapter[logging.Logger]
 
 
+class Disk:
+    """Runs the work of a store in threads, in order for each runner; shared by all runners."""
+
+    def __init__(self, store: Store) -> None:
+        self.store = store
+        self._threads = ThreadPoolExecutor(_THREADS, "rtcfd-store")
+        # Stops are noted on another file system, which may answer if that of the state hangs.
+        self._notes = ThreadPoolExecutor(1, "rtcfd-stops")
+        self._last: dict[str, asyncio.Task[str]] = {}  # by runner
+
+    def in_turn(self, runner: str, work: Callable[[], Awaitable[str]]) -> "asyncio.Task[str]":
+        """Begin `work` when all earlier work on this runner is done."""
+        before = self._last.get(runner)
+
+        async def turn() -> str:
+            if before is not None:
+                await asyncio.wait({before})
+            return await work()
+
+        task = self._last[runner] = asyncio.create_task(turn())
+
+        def forget(done: "asyncio.Task[str]") -> None:
+            if self._last.get(runner) is done:
+                del self._last[runner]
+
+        task.add_done_callback(forget)
+        return task
+
+    async def do(self, work: Callable[..., None], *arguments: object) -> None:
+        """Run a function of the store in a thread; raises OSError."""
+        await asyncio.get_running_loop().run_in_executor(self._threads, work, *arguments)
+
+    async def note_stop(self, runner: str) -> None:
+        """Note a stop outside of the state folder; see Store.note_stop().  Raises no OSError."""
+        loop = asyncio.get_running_loop()
+        await loop.run_in_executor(self._notes, self.store.note_stop, runner)
+
+
 class Saver:
-    """Saves `desired`, the newest state last."""
+    """Saves `desired`, the state of one runner; owned by its RunnerCore.
+
+    On rtcfd's one thread.  A save waits at most PATIENCE_S: a hanging disk is reported, and written
+    when it answers.  Saves that wait are merged into one.
+    """
 
     def __init__(self, desired: Desired, disk: Disk, log: Log) -> None:
         self.problem = ""  # why the disk has an older state

@@ -37,7 +37,7 @@ from rtcfd.runners.held_runners import await_holder
 from rtcfd.runners.runners import Runners
 from rtcfd.service.control import Control
 from rtcfd.state.desired import Desired
-from rtcfd.state.disk import Disk
+from rtcfd.state.saver import Disk
 from rtcfd.state.store import Store
 
 

@@ -77,11 +77,11 @@ def test_group_members_may_do_everything_by_default() -> None:
 
 def test_only_administrators_load_code() -> None:
     for method in ("Load", "Replace", "Apply", "AddRunner", "SetRunner", "Reload"):
-        assert rights.needed(method) == Level.ADMIN
+        assert calls.of(method).right == Level.ADMIN
 
 
 def test_an_unknown_method_requires_an_administrator() -> None:
-    assert rights.needed("SomethingNew") == Level.ADMIN
+    assert calls.of("SomethingNew").right == Level.ADMIN
 
 
 def test_the_table_has_exactly_the_calls() -> None:

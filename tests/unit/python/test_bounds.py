@@ -13,8 +13,8 @@ from rtcf.v1 import control_pb2
 from rtcf_shared.naming import suggestion
 from rtcfd.access import calls, peer
 from rtcfd.access.calls import Level
+from rtcfd.access.clients import Usage
 from rtcfd.access.peer import Credentials, Directory, Peer
-from rtcfd.access.usage import Usage
 from rtcfd.common.background import WorkerThreads
 from rtcfd.common.refusals import InvalidArgument, ResourceExhausted, Unavailable
 from rtcfd.common.status_codes import bounded

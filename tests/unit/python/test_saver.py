@@ -12,8 +12,7 @@ from typing import Any
 import pytest
 from daemon_under_test import DEADLINE_S
 from rtcfd.state.desired import Desired
-from rtcfd.state.disk import Disk
-from rtcfd.state.saver import Saver
+from rtcfd.state.saver import Disk, Saver
 from rtcfd.state.store import Store
 
 log = logging.getLogger("test")
