@@ -17,20 +17,20 @@ from rtcf.v1 import control_pb2, control_pb2_grpc, errors_pb2
 
 from rtcfd import VERSION, journal
 from rtcfd.access.admission import Admission
-from rtcfd.access.clients import Clients, Doors
+from rtcfd.access.clients import Clients, GrpcSockets
 from rtcfd.access.endpoint import Endpoint
 from rtcfd.catalog.catalog import Catalog
 from rtcfd.catalog.describe import Describer
 from rtcfd.common.background import WorkerThreads
+from rtcfd.common.errors import FailedPrecondition, RequestError, Unavailable
 from rtcfd.common.names import DEFAULT_RUNNER
-from rtcfd.common.refusals import FailedPrecondition, Refusal, Unavailable
 from rtcfd.configuration import options
 from rtcfd.executor import left_over
 from rtcfd.executor.command import ExecutorCommand, claims_folder_of_user
 from rtcfd.executor.link import MAX_MESSAGE
 from rtcfd.incidents.incidents import Incidents
 from rtcfd.notify import Notify, machine_goes_down
-from rtcfd.operations.runner_core import Surroundings
+from rtcfd.operations.runner_core import SharedContext
 from rtcfd.reload import Reloads
 from rtcfd.runners import ros_services
 from rtcfd.runners.held_runners import await_holder
@@ -77,12 +77,12 @@ class Daemon:
         )
         self._endpoint = Endpoint(given.socket, private=given.foreground)
         folder = self._command.folder
-        self._doors = Doors(folder / "control", folder / "control-others")
+        self._sockets = GrpcSockets(folder / "control", folder / "control-others")
         self._admission = admission = Admission(given.access)
-        self._clients = Clients(self._doors, given.limits, admission.level)
+        self._clients = Clients(self._sockets, given.limits, admission.level)
         admission.clients = self._clients
         catalog = Catalog(given.folders, Describer(given.executor))
-        self._shared = shared = Surroundings(
+        self._shared = shared = SharedContext(
             command=self._command,
             catalog=catalog,
             disk=Disk(self._store),
@@ -109,10 +109,10 @@ class Daemon:
         )
         # One server per private socket, because gRPC's own limits cannot differ between clients.
         self._servers = {
-            self._doors.trusted: grpc.aio.server(
+            self._sockets.trusted: grpc.aio.server(
                 options=_server_options(given.limits.message_kb), interceptors=[admission]
             ),
-            self._doors.others: grpc.aio.server(
+            self._sockets.others: grpc.aio.server(
                 options=[
                     *_server_options(min(given.limits.message_kb, _OTHERS_MESSAGE_KB)),
                     ("grpc.max_concurrent_streams", _OTHERS_STREAMS),
@@ -213,9 +213,9 @@ class Daemon:
             await WorkerThreads("settings file").run(self._read_options, _LAST_LOOK_S)
         except Unavailable as silence:
             log.error("cannot check the settings for the next rtcfd: %s", silence)
-        except Refusal as refusal:
-            log.error("the next rtcfd will use the last good settings: %s", refusal)
-        self._clients.close_door()
+        except RequestError as error:
+            log.error("the next rtcfd will use the last good settings: %s", error)
+        self._clients.stop_accepting()
         serving = asyncio.create_task(self._end_servers(_GRACE_S))
         await self._runners.leave()
         done, _ = await asyncio.wait({serving}, timeout=_LAST_ANSWERS_S)
@@ -238,14 +238,14 @@ class Daemon:
 
     def _serve_privately(self) -> None:
         """Bind the gRPC servers to sockets in our folder of mode 0700: only we can connect."""
-        for door, server in self._servers.items():
+        for socket_path, server in self._servers.items():
             try:
-                bound = server.add_insecure_port(f"unix:{door}")
+                bound = server.add_insecure_port(f"unix:{socket_path}")
             except RuntimeError:
                 bound = 0
             if not bound:
                 raise FailedPrecondition(
-                    f"cannot listen on {door}: check that rtcfd may write to its folder",
+                    f"cannot listen on {socket_path}: check that rtcfd may write to its folder",
                     errors_pb2.REASON_DAEMON_FAILED,
                 )
 
@@ -355,8 +355,8 @@ def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None)
         if given.settings.problem:
             log.error("%s", given.settings.problem)
         asyncio.run(_run(given, lambda: options.parse(arguments, build_tree)))
-    except Refusal as refusal:
-        print(f"rtcfd: {refusal}", file=sys.stderr)
+    except RequestError as error:
+        print(f"rtcfd: {error}", file=sys.stderr)
         return REFUSED
     except Exception:
         traceback.print_exc()  # the caller then ends the process by end(), as always

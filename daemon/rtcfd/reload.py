@@ -18,12 +18,12 @@ from rtcfd.access.clients import Clients
 from rtcfd.catalog.catalog import Catalog
 from rtcfd.common import runner_settings
 from rtcfd.common.background import WorkerThreads
-from rtcfd.common.refusals import Refusal, Unavailable
+from rtcfd.common.errors import RequestError, Unavailable
 from rtcfd.configuration.options import Options
-from rtcfd.operations.runner_core import Surroundings
+from rtcfd.operations.runner_core import SharedContext
 from rtcfd.runners.runners import Runners
 from rtcfd.state import handover
-from rtcfd.state.boot_graphs import BootGraphs, Given, become
+from rtcfd.state.boot_graphs import BootGraph, BootGraphs, become
 from rtcfd.state.desired import Desired
 from rtcfd.state.handover import Handover
 from rtcfd.state.store import Store
@@ -44,7 +44,7 @@ class Reloads:
         self,
         given: Options,
         read_options: Callable[[], Options],
-        shared: Surroundings,
+        shared: SharedContext,
         catalog: Catalog,
         runners: Runners,
         clients: Clients,
@@ -65,7 +65,9 @@ class Reloads:
         self._copying = WorkerThreads("state folder")
         self._left: Handover | None = None  # from the previous rtcfd
         self._graphs = BootGraphs(given.graphs_dir, {}, self._settings_error)
-        self._late: list[Given] = []  # changed graphs of runners whose executors are adopted first
+        self._late: list[
+            BootGraph
+        ] = []  # changed graphs of runners whose executors are adopted first
         self._graph_problems: list[str] = []
         self._refused = ""  # the error of the last reload; empty = it succeeded
         self._files = (Path(__file__), given.executor)
@@ -114,7 +116,7 @@ class Reloads:
             return await self._asking_users.run(
                 lambda: access.for_executors(self._given.socket), _USERS_TIMEOUT_S
             )
-        except (Refusal, OSError) as problem:
+        except (RequestError, OSError) as problem:
             log.error("executors accept direct stops only from root and rtcfd's user: %s", problem)
             return wire.AccessRules()
 
@@ -139,8 +141,8 @@ class Reloads:
     async def reload(self) -> list[str]:
         """Reload settings and graphs.d; return a line for each change.
 
-        Raises Refusal, without any change, if the settings are not valid.  One reload at a time;
-        it goes on if its caller disconnects.
+        Raises RequestError, without any change, if the settings are not valid.  One reload at a
+        time; it goes on if its caller disconnects.
         """
         return await self._runners.operations.take_turn("a reload", self._reload, None)
 
@@ -148,8 +150,8 @@ class Reloads:
         self._shared.command.close_folders()
         try:
             lines = await self._read_again()
-        except Refusal as refusal:
-            self._refused = f"settings not reloaded: {refusal}"
+        except RequestError as error:
+            self._refused = f"settings not reloaded: {error}"
             raise
         self._refused = ""
         return lines
@@ -206,7 +208,7 @@ class Reloads:
             lines += await runner.follow_defaults(before)
         return lines
 
-    async def _apply(self, graphs: Iterable[Given]) -> list[str]:
+    async def _apply(self, graphs: Iterable[BootGraph]) -> list[str]:
         lines: list[str] = []
         for given in graphs:
             request = control_pb2.ApplyRequest(
@@ -217,8 +219,8 @@ class Reloads:
             try:
                 result = await self._runners.apply(request, lambda line: None)
                 lines.append(f"{given.file}: {len(result.differences)} differences applied")
-            except Refusal as refusal:
-                problem = f"{given.file}: {refusal}"
+            except RequestError as error:
+                problem = f"{given.file}: {error}"
                 self._graph_problems.append(problem)
                 self._graphs.forget(given.file)  # so that the next reload tries again
                 log.error("%s", problem)

@@ -20,21 +20,21 @@ from rtcfd.access.calls import Call, Level
 from rtcfd.access.clients import Client, Clients
 from rtcfd.access.peer import Peer
 from rtcfd.access.rights import Access
-from rtcfd.common import known_values
+from rtcfd.common import enumerators
 from rtcfd.common.budget import Budget
-from rtcfd.common.refusals import InvalidArgument, Refusal, ResourceExhausted
+from rtcfd.common.errors import InvalidArgument, RequestError, ResourceExhausted
 from rtcfd.common.status_codes import abort, bounded
 
 log = logging.getLogger("rtcfd.access")
 
 # Log lines about rejected calls, per second: a client that retries all day must not fill the disk.
-_REFUSALS_PER_S = 20
+_REJECTIONS_PER_S = 20
 
 
 class _Malformed:
     """Stands for a request that is too large to be parsed, or could not be parsed."""
 
-    def __init__(self, problem: Refusal) -> None:
+    def __init__(self, problem: RequestError) -> None:
         self.problem = problem
 
 
@@ -44,7 +44,7 @@ class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
     def __init__(self, access: Access) -> None:
         self.access = access
         self.clients: Clients | None = None  # set by the daemon, which owns both
-        self._budget = Budget(_REFUSALS_PER_S)
+        self._budget = Budget(_REJECTIONS_PER_S)
 
     def level(self, peer: Peer) -> Level:
         """Return the right of a peer."""
@@ -89,7 +89,7 @@ class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
                             if watches:
                                 await self._check_again(method, request, context, peer)
                             else:
-                                but[:] = _refused(response)
+                                but[:] = _rejected_parts(response)
                             yield response
 
         return call
@@ -108,17 +108,17 @@ class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
                 tuning = self.access.tuning(client.peer)
                 _require_formed(request)
                 enter(Caller(client.peer, client.level, tuning, _asked_ns(context)))
-            except Refusal as refusal:
+            except RequestError as error:
                 known = None if client is None else client.peer
-                await self._refuse(refusal, method, request, context, known)
+                await self._reject(error, method, request, context, known)
             yield client.peer
 
     async def _check_again(self, method: str, request: Any, context: Any, peer: Peer) -> None:
         """Abort a stream whose caller has lost its right since it began."""
         try:
             self.access.check(peer, method)
-        except Refusal as refusal:
-            await self._refuse(refusal, method, request, context, peer)
+        except RequestError as error:
+            await self._reject(error, method, request, context, peer)
 
     async def _formed(
         self, method: str, requests: AsyncIterator[Any], peer: Peer
@@ -129,13 +129,13 @@ class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
             _require_formed(request)
             yield request
 
-    async def _refuse(
-        self, refusal: Refusal, method: str, request: Any, context: Any, peer: Peer | None
+    async def _reject(
+        self, error: RequestError, method: str, request: Any, context: Any, peer: Peer | None
     ) -> NoReturn:
         if peer is not None:
-            text = f"{method} by {peer}: refused: {bounded(refusal)}"
+            text = f"{method} by {peer}: refused: {bounded(error)}"
             self._log(logging.WARNING, text, peer, request)
-        await abort(context, refusal, request)
+        await abort(context, error, request)
 
     @contextlib.contextmanager
     def _noted(
@@ -168,7 +168,7 @@ class Admission(grpc.aio.ServerInterceptor):  # type: ignore[misc]
         log.log(level, "%s", text, extra={"runner": _runner(request), "peer": peer})
 
 
-def _refused(response: Any) -> list[str]:
+def _rejected_parts(response: Any) -> list[str]:
     """Return the rejected parts of a change from its response, a line each."""
     result = getattr(response, "result", None)
     return [str(line) for line in getattr(result, "refused", ())]
@@ -193,7 +193,7 @@ def _require_formed(request: Any) -> None:
         raise request.problem
     if hasattr(request, "DESCRIPTOR"):
         calls.check_texts(request)
-        known_values.check(request)
+        enumerators.check(request)
 
 
 def _forgiving(

@@ -10,7 +10,7 @@ from typing import Any
 
 from rtcf.v1 import errors_pb2, runner_pb2
 
-from rtcfd.common.refusals import InvalidArgument
+from rtcfd.common.errors import InvalidArgument
 
 
 class Level(enum.IntEnum):

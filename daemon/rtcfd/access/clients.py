@@ -25,8 +25,8 @@ from rtcf.v1 import errors_pb2
 from rtcfd.access.calls import Level
 from rtcfd.access.peer import Credentials, Directory, Peer, credentials, user_of
 from rtcfd.common.budget import Budget
+from rtcfd.common.errors import RequestError, ResourceExhausted
 from rtcfd.common.limits import Limits
-from rtcfd.common.refusals import Refusal, ResourceExhausted
 
 log = logging.getLogger(__name__)
 
@@ -38,8 +38,8 @@ _AT_ONCE = 4096
 _ARRIVALS_PER_S = 20.0
 _MOST_USERS = 4096
 # Connections above the limit that receive an error message; further ones are closed at once.
-_MOST_REFUSED = 64
-_MOST_REFUSED_OF_A_USER = 8
+_MOST_REJECTED = 64
+_MOST_REJECTED_OF_A_USER = 8
 _FIRST_CALL_S = 20.0  # longest time from the connection to the first call
 _IDLE_S = 900.0  # longest time between calls; gRPC clients reconnect by themselves
 _LOOK_S = 5.0  # interval of the search for overdue clients, and of warnings
@@ -56,7 +56,7 @@ _SAVED_S = 0.5  # seconds of unused rate that a burst may use
 
 
 @dataclass(frozen=True)
-class Doors:
+class GrpcSockets:
     """The private sockets of the gRPC servers."""
 
     trusted: Path
@@ -137,7 +137,7 @@ class Client:
     usage: Usage
     peer: Peer | None = None  # None: its names are not known yet
     level: Level = Level.NONE
-    refused: bool = False  # above the limit: its calls fail until there is room
+    rejected: bool = False  # above the limit: its calls fail until there is room
     calls: int = 0  # running
     last_call: float = 0.0  # 0 = none yet
     name: str = field(default_factory=lambda: f"rtcfd-client-{secrets.token_hex(16)}")
@@ -162,9 +162,11 @@ class Clients:
     `level_of` returns the right of a peer under the current rules.
     """
 
-    def __init__(self, doors: Doors, limits: Limits, level_of: Callable[[Peer], Level]) -> None:
+    def __init__(
+        self, servers: GrpcSockets, limits: Limits, level_of: Callable[[Peer], Level]
+    ) -> None:
         self.limits = limits
-        self._doors = doors
+        self._servers = servers
         self._level_of = level_of
         self._directory = Directory()
         self._clients: dict[str, Client] = {}
@@ -184,7 +186,7 @@ class Clients:
         self._listener = listener
         asyncio.get_running_loop().add_reader(listener, self._accept)
 
-    def close_door(self) -> None:
+    def stop_accepting(self) -> None:
         """Stop accepting clients.  At systemd's socket, new clients wait for the next rtcfd."""
         if self._listener is not None:
             asyncio.get_running_loop().remove_reader(self._listener)
@@ -198,7 +200,7 @@ class Clients:
 
     def close(self) -> None:
         """Stop accepting clients, and disconnect the present ones."""
-        self.close_door()
+        self.stop_accepting()
         for relay in self._relays:
             relay.cancel()
 
@@ -210,14 +212,14 @@ class Clients:
         """
         client = self._clients.get(shown.removeprefix(_SHOWN_PREFIX))
         if client is None or client.peer is None:
-            raise Refusal(
+            raise RequestError(
                 "this call did not arrive by the control socket", errors_pb2.REASON_INTERNAL
             )
         client.level = self._level_of(client.peer)
         client.last_call = time.monotonic()
-        if client.refused and not self._full(client):
-            client.refused = False
-        if client.refused:
+        if client.rejected and not self._full(client):
+            client.rejected = False
+        if client.rejected:
             raise ResourceExhausted(
                 f"rtcfd serves {self.limits.clients} clients already: end some, or raise clients "
                 "under [limits] in its settings"
@@ -276,10 +278,10 @@ class Clients:
         if known is not None:
             client.peer, client.level = known, self._level_of(known)
         if self._full(client):
-            client.refused = True
-            refused = [each for each in self._clients.values() if each.refused]
-            of_user = sum(each.found.uid == found.uid for each in refused)
-            if len(refused) >= _MOST_REFUSED or of_user >= _MOST_REFUSED_OF_A_USER:
+            client.rejected = True
+            rejected = [each for each in self._clients.values() if each.rejected]
+            of_user = sum(each.found.uid == found.uid for each in rejected)
+            if len(rejected) >= _MOST_REJECTED or of_user >= _MOST_REJECTED_OF_A_USER:
                 connection.close()
                 return
             self._warn("too many clients: rejecting some of uid %d", found.uid)
@@ -300,7 +302,7 @@ class Clients:
     def _full(self, client: Client) -> bool:
         """Return whether the limits leave no room for this client."""
         served = [
-            each for each in self._clients.values() if not each.refused and each is not client
+            each for each in self._clients.values() if not each.rejected and each is not client
         ]
         if client.trusted:
             return len(served) >= self.limits.clients
@@ -317,8 +319,8 @@ class Clients:
             if client.peer is None:
                 client.peer = await self._directory.peer(client.found)
                 client.level = self._level_of(client.peer)
-                if client.refused and client.trusted:
-                    client.refused = self._full(client)
+                if client.rejected and client.trusted:
+                    client.rejected = self._full(client)
             await self._relay(client)
         except OSError as error:
             self._warn("a client's connection failed: %s", error.strerror or error)
@@ -330,13 +332,13 @@ class Clients:
                 self._usage.pop(client.found.uid, None)
 
     async def _relay(self, client: Client) -> None:
-        door = self._doors.trusted if client.trusted else self._doors.others
+        server = self._servers.trusted if client.trusted else self._servers.others
         # Sockets, not asyncio streams: closing one takes effect at once, even if the other side
         # has unread data.
         with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as inner:
             inner.setblocking(False)
             inner.bind("\0" + client.name)
-            await asyncio.get_running_loop().sock_connect(inner, str(door))
+            await asyncio.get_running_loop().sock_connect(inner, str(server))
             # When one side closes, close the other too: gRPC never closes a single direction.
             there = asyncio.create_task(_pump(client.connection, inner, client))
             back = asyncio.create_task(_pump(inner, client.connection))

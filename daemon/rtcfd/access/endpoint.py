@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rtcf.v1 import errors_pb2
 
-from rtcfd.common.refusals import FailedPrecondition
+from rtcfd.common.errors import FailedPrecondition
 from rtcfd.executor.command import MAX_SOCKET_PATH
 
 # The complement of 0660: owner and group may connect.

@@ -9,7 +9,7 @@ import time
 from dataclasses import dataclass
 
 from rtcfd.common.background import WorkerThreads
-from rtcfd.common.refusals import Refusal
+from rtcfd.common.errors import RequestError
 
 _CREDENTIALS = struct.Struct("3i")  # struct ucred, unix(7)
 _SO_PEERGROUPS = 59  # asm-generic/socket.h; unknown to Python's socket
@@ -87,7 +87,7 @@ class Directory:
         """Return a peer with its names; not `known` if the user database does not answer."""
         try:
             user, groups = await self._threads.run(lambda: _names(found), _TIMEOUT_S)
-        except (Refusal, OSError):
+        except (RequestError, OSError):
             return Peer(found.pid, found.uid, f"#{found.uid}", frozenset(), known=False)
         if len(self._kept) >= _MOST_KEPT:
             self._kept.clear()
@@ -100,7 +100,7 @@ class Directory:
             if uid in self._sure:
                 return self._sure[uid]
             return await self._threads.run(lambda: user_name(uid), _TIMEOUT_S)
-        except (Refusal, OSError):
+        except (RequestError, OSError):
             return f"#{uid}"
 
 

@@ -22,7 +22,7 @@ from rtcf.v1 import errors_pb2
 from rtcfd.access import calls
 from rtcfd.access.calls import WORDS, Level
 from rtcfd.access.peer import Peer
-from rtcfd.common.refusals import FailedPrecondition, PermissionDenied
+from rtcfd.common.errors import FailedPrecondition, PermissionDenied
 
 __all__ = ["WORDS", "Access", "Level", "Rule", "Tuning", "require_pace", "rules"]
 
@@ -128,8 +128,8 @@ class Access:
             user=peer.user,
         )
 
-    def for_executors(self, door: Path) -> wire.AccessRules:
-        """Return the rules with uids and gids, and the permissions of the control socket `door`.
+    def for_executors(self, control_socket: Path) -> wire.AccessRules:
+        """Return the rules with uids and gids, and the permissions of the control socket.
 
         May block: asks the user database.  Rules with unknown names are left out.
         """
@@ -145,7 +145,7 @@ class Access:
             except KeyError:
                 log.warning("[access] names the unknown group %s", name)
         try:
-            there = door.stat()
+            there = control_socket.stat()
         except OSError:
             return found
         if there.st_mode & stat.S_IWGRP:

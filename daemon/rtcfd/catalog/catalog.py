@@ -18,8 +18,8 @@ from rtcf_shared.naming import closest, listing, suggestion
 
 from rtcfd.catalog.describe import Describer
 from rtcfd.common.background import WorkerThreads
+from rtcfd.common.errors import FailedPrecondition, NotFound
 from rtcfd.common.names import check_base_name
-from rtcfd.common.refusals import FailedPrecondition, NotFound
 
 _FOLDERS_TIMEOUT_S = 10.0
 
@@ -42,7 +42,7 @@ class Folder:
 
 
 @dataclass(frozen=True)
-class Found:
+class Library:
     """A library that provides a type."""
 
     path: str
@@ -88,7 +88,7 @@ class Catalog:
         """Forget the cached failures of libraries."""
         self._describer.forget_failures()
 
-    async def find(self, package: str, type_name: str) -> Found:
+    async def find(self, package: str, type_name: str) -> Library:
         """Return the library of a type; raises NotFound or FailedPrecondition."""
         check_base_name("package", package)
         check_base_name("type", type_name)
@@ -104,7 +104,7 @@ class Catalog:
         contents = await self._contents(package, libraries)
         found = contents.types.get(type_name)
         if found is not None:
-            return Found(
+            return Library(
                 str(found.library),
                 self._owner(Path(found.library)),
                 tuple(contents.others.get(type_name, ())),
@@ -198,7 +198,7 @@ class Catalog:
 
 async def loads(catalog: Catalog, specs: Iterable[graph_pb2.ComponentSpec]) -> list[wire.Load]:
     """Return the requests to load components; each type is looked up once."""
-    libraries: dict[tuple[str, str], Found] = {}
+    libraries: dict[tuple[str, str], Library] = {}
     result = []
     for spec in specs:
         key = (spec.package, spec.type)

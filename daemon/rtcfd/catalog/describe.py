@@ -17,7 +17,7 @@ from rtcf.executor.v1 import executor_pb2 as wire
 
 from rtcfd.common import regular_files
 from rtcfd.common.background import WorkerThreads
-from rtcfd.common.refusals import Refusal
+from rtcfd.common.errors import RequestError
 from rtcfd.executor.command import ExecutorCommand
 from rtcfd.executor.process import describe_exit
 
@@ -27,7 +27,7 @@ _AT_ONCE = 2
 _MAX_STDERR_LINE = 300
 # Bytes of the output of a process that describes.
 _LONGEST_ANSWER = 4 * 1024 * 1024
-_LONGEST_COMPLAINT = 64 * 1024
+_LONGEST_STDERR = 64 * 1024
 _CHUNK = 64 * 1024
 _OOM_SCORE = "500"  # proc(5): if memory runs out, the kernel kills this process before a loop
 
@@ -102,8 +102,8 @@ class Describer:
             regular_files.require_regular(library, found)
         except OSError as error:
             return _problem(f"cannot read it: {error.strerror}")
-        except Refusal as refusal:
-            return _problem(str(refusal))
+        except RequestError as error:
+            return _problem(str(error))
         file = (str(library), owner)
         identity = (
             *(found.st_ino, found.st_mtime_ns, found.st_size),
@@ -155,18 +155,18 @@ class Describer:
             Path(f"/proc/{process.pid}/oom_score_adj").write_text(_OOM_SCORE)
         reading = asyncio.gather(
             _until_end(process, process.stdout, _LONGEST_ANSWER),
-            _until_end(process, process.stderr, _LONGEST_COMPLAINT),
+            _until_end(process, process.stderr, _LONGEST_STDERR),
         )
         try:
             async with asyncio.timeout(TIMEOUT_S):
-                output, complaint = await asyncio.shield(reading)
+                output, stderr = await asyncio.shield(reading)
                 await process.wait()
         except TimeoutError:
             raise _Failed(f"loading it did not end within {TIMEOUT_S:g} s") from None
         finally:
             _end(process)
             await process.wait()
-        if len(output) > _LONGEST_ANSWER or len(complaint) > _LONGEST_COMPLAINT:
+        if len(output) > _LONGEST_ANSWER or len(stderr) > _LONGEST_STDERR:
             raise _Failed("the process that loaded it wrote without end", own=True)
         status = process.returncode or 0
         if status < 0:
@@ -178,9 +178,7 @@ class Describer:
         except DecodeError:
             raise _Failed("the process that loaded it wrote no valid description") from None
         if status and not description.problem:
-            raise _Failed(
-                f"the process that loaded it {describe_exit(status)}{_last_line(complaint)}"
-            )
+            raise _Failed(f"the process that loaded it {describe_exit(status)}{_last_line(stderr)}")
         return description
 
 

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 from rtcf.v1 import errors_pb2
 
-from rtcfd.common.refusals import Unavailable
+from rtcfd.common.errors import Unavailable
 
 Result = TypeVar("Result")
 

@@ -11,7 +11,7 @@ from rtcf.v1 import errors_pb2, graph_pb2
 from rtcf_shared.graph_writer import same_value
 from rtcf_shared.naming import closest, listing, suggestion
 
-from rtcfd.common.refusals import InvalidArgument, NotFound
+from rtcfd.common.errors import InvalidArgument, NotFound
 
 _KINDS = {
     "bool_value": "a bool",

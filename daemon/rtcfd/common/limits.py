@@ -4,7 +4,7 @@ from dataclasses import dataclass, fields
 
 from rtcf.v1 import errors_pb2
 
-from rtcfd.common.refusals import ResourceExhausted
+from rtcfd.common.errors import ResourceExhausted
 
 
 @dataclass(frozen=True)

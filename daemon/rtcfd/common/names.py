@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from rtcf.v1 import errors_pb2, graph_pb2
 
-from rtcfd.common.refusals import InvalidArgument
+from rtcfd.common.errors import InvalidArgument
 
 DEFAULT_RUNNER = "rt_runner"
 

@@ -15,7 +15,7 @@ from rtcf_shared import quantities
 from rtcf_shared.enums import word
 from rtcf_shared.quantities import Quantity
 
-from rtcfd.common.refusals import InvalidArgument
+from rtcfd.common.errors import InvalidArgument
 
 Settings = TypeVar("Settings", runner_pb2.RunnerSettings, runner_pb2.RosSettings)
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from rtcf_shared import whole_files
 
 from rtcfd.common import regular_files
-from rtcfd.common.refusals import Refusal
+from rtcfd.common.errors import RequestError
 from rtcfd.configuration import settings_file
 
 log = logging.getLogger(__name__)
@@ -38,7 +38,7 @@ class Settings:
     ) -> "Settings":
         """Read `file`, unless it is None; the copy is in `folder`.
 
-        `settings_error` is for settings_file.read.  Raises Refusal for a bad file; with
+        `settings_error` is for settings_file.read.  Raises RequestError for a bad file; with
         `last_good`, only if there is no good copy either.
         """
         copy = folder / _NAME if folder else None
@@ -46,11 +46,11 @@ class Settings:
             return Settings()
         try:
             return Settings(settings_file.read(file, settings_error), _copy=copy)
-        except Refusal as refusal:
+        except RequestError as error:
             if not last_good or copy is None or not _is_there(copy):
                 raise
             return Settings(
-                settings_file.read(copy), f"{refusal}; the last good settings are used instead"
+                settings_file.read(copy), f"{error}; the last good settings are used instead"
             )
 
     def keep(self) -> None:

@@ -60,7 +60,7 @@ class Options:
 def parse(
     arguments: Sequence[str] | None, build_tree: Path | None, *, last_good: bool = False
 ) -> Options:
-    """Return the options; raises Refusal for a bad file, exits with 2 on bad usage.
+    """Return the options; raises RequestError for a bad file, exits with 2 on bad usage.
 
     With `last_good`, the service uses the last good settings instead of bad ones.
     """

@@ -27,8 +27,8 @@ from rtcf_shared.naming import listing, suggestion
 from rtcfd.access import rights
 from rtcfd.access.rights import Access, Level, Rule
 from rtcfd.common import regular_files, runner_settings
+from rtcfd.common.errors import InvalidArgument, RequestError
 from rtcfd.common.limits import RANGES, Limits
-from rtcfd.common.refusals import InvalidArgument, Refusal
 
 DEFAULT_FILE = Path("/etc/rtcfd/rtcfd.toml")
 
@@ -75,7 +75,7 @@ class _Wrong(InvalidArgument):
 
 
 def read(file: Path, settings_error: SettingsError = lambda _: "") -> Config:
-    """Read a configuration file; raises Refusal with the file, the line and the error.
+    """Read a configuration file; raises RequestError with the file, the line and the error.
 
     `settings_error` asks an executor whether it accepts the settings of runners.
     """
@@ -286,8 +286,8 @@ def _key(error: str) -> str:
 def _check_alone(key: str, settings: runner_pb2.RunnerSettings) -> None:
     try:
         runner_settings.check(settings)
-    except Refusal as refusal:
-        raise _Wrong(key, str(refusal)) from None
+    except RequestError as error:
+        raise _Wrong(key, str(error)) from None
 
 
 def _enumerator(name: str, enum_type: Any, value: Any) -> int:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from rtcf.v1 import errors_pb2, runner_pb2
 
-from rtcfd.common.refusals import FailedPrecondition
+from rtcfd.common.errors import FailedPrecondition
 
 # Variables for rtcfd alone: an executor that used them would report to systemd in the
 # daemon's name.

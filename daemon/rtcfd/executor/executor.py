@@ -19,17 +19,17 @@ from rtcf.v1 import errors_pb2, ports_pb2
 
 from rtcfd import VERSION
 from rtcfd.common.background import log_failure
+from rtcfd.common.errors import FailedPrecondition, RequestError, Silent, Unavailable
 from rtcfd.common.limits import Limits
-from rtcfd.common.refusals import FailedPrecondition, Refusal, Silent, Unavailable
 from rtcfd.executor import left_over
 from rtcfd.executor.command import ExecutorCommand
 from rtcfd.executor.flight_recorder import FlightRecorder, Note, Trace
 from rtcfd.executor.link import (
     ACCESS_PROTOCOL,
-    FIGURES_PROTOCOL,
     LIMITS_PROTOCOL,
     PORTS_PROTOCOL,
     PROTOCOL,
+    STATISTICS_PROTOCOL,
     Link,
     OnAnswer,
     OnPorts,
@@ -224,7 +224,7 @@ class Executor:
 
         If not, rtcfd subtracts the earlier counts.
         """
-        return self._protocol >= FIGURES_PROTOCOL
+        return self._protocol >= STATISTICS_PROTOCOL
 
     async def limit(self, limits: Limits) -> None:
         """Send the limits of its graph.  An old executor without this request has no limits."""
@@ -255,8 +255,8 @@ class Executor:
                 raise Unavailable(frozen, errors_pb2.REASON_EXECUTOR_SILENT)
             await self.request(wire.Request(stop=wire.Stop()), STOP_TIMEOUT_S)
             await self.request(wire.Request(exit=wire.Exit()), EXIT_TIMEOUT_S)
-        except Refusal as refusal:
-            log.warning("%s: cannot end it in order: %s", self._peer, refusal)
+        except RequestError as error:
+            log.warning("%s: cannot end it in order: %s", self._peer, error)
             self._process.signal(signal.SIGTERM)
             # A frozen process receives the pending SIGTERM when it continues.
             self._process.signal(signal.SIGCONT)
@@ -352,8 +352,8 @@ class Executor:
             )
             try:
                 await self._attach()
-            except Refusal as refusal:
-                log.error("%s: ending it", refusal)
+            except RequestError as error:
+                log.error("%s: ending it", error)
                 self._process.signal(signal.SIGTERM)
                 break
         end = await ending

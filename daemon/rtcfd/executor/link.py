@@ -16,7 +16,7 @@ from google.protobuf.message import DecodeError
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import errors_pb2, ports_pb2
 
-from rtcfd.common import refusals
+from rtcfd.common import errors
 from rtcfd.common.background import log_failure
 
 # The protocol version of this rtcfd.  It increases with features that need support by the peer.
@@ -25,7 +25,7 @@ from rtcfd.common.background import log_failure
 PROTOCOL = 4
 LIMITS_PROTOCOL = 2  # since then, executors enforce [limits]
 ACCESS_PROTOCOL = 3  # since then, executors accept and report direct stops
-FIGURES_PROTOCOL = 4  # since then, one reset begins the counts of status and statistics
+STATISTICS_PROTOCOL = 4  # since then, one reset begins the counts of status and statistics
 PORTS_PROTOCOL = 4  # since then, executors send the values of ports
 MAX_MESSAGE = 16 * 1024 * 1024  # bytes, without the length before it
 _LENGTH_BYTES = 4  # little-endian, before each message
@@ -37,18 +37,18 @@ OnAnswer = Callable[[wire.Response], None]
 OnPorts = Callable[[ports_pb2.WatchPortsResponse], None]
 
 # By code: the exception, and the reason for an executor that sends none.
-_REFUSALS: dict[int, tuple[type[refusals.Refusal], errors_pb2.Reason]] = {
-    wire.Error.CODE_INVALID_ARGUMENT: (refusals.InvalidArgument, errors_pb2.REASON_VALUE_INVALID),
-    wire.Error.CODE_NOT_FOUND: (refusals.NotFound, errors_pb2.REASON_COMPONENT_NOT_FOUND),
-    wire.Error.CODE_ALREADY_EXISTS: (refusals.AlreadyExists, errors_pb2.REASON_COMPONENT_EXISTS),
+_ERRORS: dict[int, tuple[type[errors.RequestError], errors_pb2.Reason]] = {
+    wire.Error.CODE_INVALID_ARGUMENT: (errors.InvalidArgument, errors_pb2.REASON_VALUE_INVALID),
+    wire.Error.CODE_NOT_FOUND: (errors.NotFound, errors_pb2.REASON_COMPONENT_NOT_FOUND),
+    wire.Error.CODE_ALREADY_EXISTS: (errors.AlreadyExists, errors_pb2.REASON_COMPONENT_EXISTS),
     wire.Error.CODE_FAILED_PRECONDITION: (
-        refusals.FailedPrecondition,
+        errors.FailedPrecondition,
         errors_pb2.REASON_COMPONENT_REFUSED,
     ),
-    wire.Error.CODE_UNAVAILABLE: (refusals.Unavailable, errors_pb2.REASON_LOOP_STUCK),
-    wire.Error.CODE_NO_MASTER: (refusals.NoMaster, errors_pb2.REASON_NO_MASTER),
+    wire.Error.CODE_UNAVAILABLE: (errors.Unavailable, errors_pb2.REASON_LOOP_STUCK),
+    wire.Error.CODE_NO_MASTER: (errors.NoMaster, errors_pb2.REASON_NO_MASTER),
     wire.Error.CODE_RESOURCE_EXHAUSTED: (
-        refusals.ResourceExhausted,
+        errors.ResourceExhausted,
         errors_pb2.REASON_LIMIT_REACHED,
     ),
 }
@@ -110,7 +110,7 @@ class Link:
         link = cls(peer, reader, writer, on_unasked)
         if link.peer_uid not in (os.geteuid(), 0):
             await link.close()
-            raise refusals.Unavailable(
+            raise errors.Unavailable(
                 f"{path} is served by user {link.peer_uid}, not by us: remove it",
                 errors_pb2.REASON_EXECUTOR_SILENT,
             )
@@ -159,7 +159,7 @@ class Link:
         self, request: wire.Request, timeout_s: float | None, pending: _Pending
     ) -> wire.Response:
         if self.ended.is_set():
-            raise refusals.Unavailable(self._lost(), errors_pb2.REASON_EXECUTOR_SILENT)
+            raise errors.Unavailable(self._lost(), errors_pb2.REASON_EXECUTOR_SILENT)
         self._numbered(request)
         self._pending[request.id] = pending
         try:
@@ -168,21 +168,21 @@ class Link:
                 await self._writer.drain()
                 response = await pending.result
         except TimeoutError:
-            raise refusals.Unavailable(
+            raise errors.Unavailable(
                 f"{self.peer} did not answer {request.WhichOneof('kind')} within {timeout_s:g} s",
                 errors_pb2.REASON_EXECUTOR_SILENT,
             ) from None
         except MessageError as error:
-            raise refusals.InvalidArgument(
+            raise errors.InvalidArgument(
                 f"request too large: {error}", errors_pb2.REASON_REQUEST_TOO_LARGE
             ) from None
         except ConnectionError:
-            raise refusals.Unavailable(self._lost(), errors_pb2.REASON_EXECUTOR_SILENT) from None
+            raise errors.Unavailable(self._lost(), errors_pb2.REASON_EXECUTOR_SILENT) from None
         finally:
             del self._pending[request.id]
             pending.result.cancel()
         if response.WhichOneof("kind") == "error":
-            raise _refusal(response.error)
+            raise _error_of(response.error)
         return response
 
     async def close(self) -> None:
@@ -227,16 +227,16 @@ class Link:
         for pending in self._pending.values():
             if not pending.result.done():
                 pending.result.set_exception(
-                    refusals.Unavailable(self._lost(), errors_pb2.REASON_EXECUTOR_SILENT)
+                    errors.Unavailable(self._lost(), errors_pb2.REASON_EXECUTOR_SILENT)
                 )
 
     def _lost(self) -> str:
         return self.problem or f"{self.peer} closed its connection"
 
 
-def _refusal(error: wire.Error) -> refusals.Refusal:
-    kind, reason = _REFUSALS.get(
-        error.code, (refusals.FailedPrecondition, errors_pb2.REASON_COMPONENT_REFUSED)
+def _error_of(error: wire.Error) -> errors.RequestError:
+    kind, reason = _ERRORS.get(
+        error.code, (errors.FailedPrecondition, errors_pb2.REASON_COMPONENT_REFUSED)
     )
     return kind(error.message, error.reason or reason)
 

@@ -22,8 +22,8 @@ from google.protobuf import json_format
 from rtcf.v1 import errors_pb2, incidents_pb2
 
 import rtcfd
+from rtcfd.common.errors import FailedPrecondition, NotFound, Unavailable
 from rtcfd.common.limits import Limits
-from rtcfd.common.refusals import FailedPrecondition, NotFound, Unavailable
 from rtcfd.incidents import frame_memory, head
 
 log = logging.getLogger(__name__)

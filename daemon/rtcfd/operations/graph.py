@@ -15,8 +15,8 @@ from rtcfd.access import caller
 from rtcfd.access.caller import Caller
 from rtcfd.catalog.catalog import loads
 from rtcfd.common import runner_settings
+from rtcfd.common.errors import InvalidArgument, NoMaster, NotFound, RequestError
 from rtcfd.common.names import absolute, check_graph, full_name
-from rtcfd.common.refusals import InvalidArgument, NoMaster, NotFound, Refusal
 from rtcfd.executor.link import Progress
 from rtcfd.operations import parameters, tuned
 from rtcfd.operations.runner_core import Change, RunnerCore
@@ -75,9 +75,9 @@ async def when_master(
     while True:
         try:
             return await attempt()
-        except NoMaster as refusal:
-            if str(refusal) != said:
-                said = str(refusal)
+        except NoMaster as error:
+            if str(error) != said:
+                said = str(error)
                 progress(f"waiting for a ROS master: {said}")
         # Outside of the turn, so that other changes can take theirs.
         await asyncio.sleep(_MASTER_POLL_S)
@@ -311,7 +311,7 @@ async def _ask_to_apply(
     apply.dry_run = request.dry_run
     try:
         result = (await runner.ask(wire.Request(apply=apply), progress)).change
-    except Refusal:
+    except RequestError:
         if changes and not request.dry_run and runner.up:
             await runner.ask(wire.Request(configure=before))
         raise

@@ -11,7 +11,7 @@ from rtcf.v1 import errors_pb2, incidents_pb2
 
 from rtcfd import VERSION
 from rtcfd.access import caller
-from rtcfd.common.refusals import FailedPrecondition
+from rtcfd.common.errors import FailedPrecondition
 from rtcfd.executor.executor import Executor
 from rtcfd.operations import parameters
 from rtcfd.operations.runner_core import RunnerCore

@@ -16,8 +16,8 @@ from rtcf_shared import whole_files
 
 from rtcfd.common import regular_files
 from rtcfd.common.background import WorkerThreads
+from rtcfd.common.errors import Unavailable
 from rtcfd.common.names import absolute, full_name
-from rtcfd.common.refusals import Unavailable
 
 _Kinds = control_pb2.Difference
 _Identity = tuple[int, int, int]  # inode, modification time, size

@@ -11,7 +11,7 @@ from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, errors_pb2
 
 from rtcfd.access import caller
-from rtcfd.common.refusals import FailedPrecondition, Refusal, Unavailable
+from rtcfd.common.errors import FailedPrecondition, RequestError, Unavailable
 from rtcfd.executor.executor import Executor
 from rtcfd.executor.link import Progress
 from rtcfd.operations.runner_core import RunnerCore
@@ -42,7 +42,7 @@ async def start_in_turn(
     """Start the loop, in a turn; `asked` is the stop count at the time of the request."""
     require_no_stop(runner, asked)
     if not runner.loop.running:
-        await runner.begin_figures(reset=True)
+        await runner.begin_counting(reset=True)
         require_no_stop(runner, asked)
     request = wire.Request(start=wire.Start())
     response = await runner.ask(request, progress, lambda _: runner.loop.told(True, asked))
@@ -78,7 +78,7 @@ async def stop(runner: RunnerCore, progress: Progress) -> control_pb2.ChangeResu
                 result = await _stop_at(runner, runner.alive(), progress)
                 runner.log.info("loop stopped")
             else:
-                result = control_pb2.ChangeResult(notes=[f"no loop to stop: {runner.trouble}"])
+                result = control_pb2.ChangeResult(notes=[f"no loop to stop: {runner.down_reason}"])
         finally:
             notes = await saving
             runner.tell()
@@ -92,8 +92,8 @@ async def stop_quietly(runner: RunnerCore) -> None:
     """Stop the loop after the loss of a client; log an error."""
     try:
         await stop(runner, lambda _: None)
-    except Refusal as refusal:
-        runner.log.error("%s", refusal)
+    except RequestError as error:
+        runner.log.error("%s", error)
 
 
 async def _stop_at(
@@ -108,12 +108,12 @@ async def _stop_at(
         # A frozen executor handles the request when it continues.
         patience_s = _FROZEN_S if executor.frozen else STOP_TIMEOUT_S
         return await _ask_to_stop(runner, progress, patience_s)
-    except Unavailable as refusal:
+    except Unavailable as error:
         if frozen := executor.frozen:
             raise Unavailable(frozen, errors_pb2.REASON_EXECUTOR_SILENT) from None
         if not executor.ended.is_set() or not executor.safe:
             raise
-        return control_pb2.ChangeResult(notes=[f"the loop has ended with its executor: {refusal}"])
+        return control_pb2.ChangeResult(notes=[f"the loop has ended with its executor: {error}"])
 
 
 async def _ask_to_stop(

@@ -17,7 +17,7 @@ from typing import Any, Generic, TypeVar
 
 from rtcf.v1 import errors_pb2
 
-from rtcfd.common.refusals import FailedPrecondition, Refusal, Unavailable
+from rtcfd.common.errors import FailedPrecondition, RequestError, Unavailable
 
 Result = TypeVar("Result")
 Log = logging.Logger | logging.LoggerAdapter[logging.Logger]
@@ -97,8 +97,8 @@ class Operations:
         async def run() -> None:
             try:
                 await work
-            except Refusal as refusal:
-                self._log.error("%s: %s", name, refusal)
+            except RequestError as error:
+                self._log.error("%s: %s", name, error)
             except Exception:
                 self._log.exception("%s failed", name)
 
@@ -174,7 +174,7 @@ class Operations:
             error = done.exception()
             if error is None:
                 self._log.info("%s is done; its caller had disconnected", operation.name)
-            elif isinstance(error, Refusal):
+            elif isinstance(error, RequestError):
                 self._log.warning(
                     "%s failed after its caller had disconnected: %s", operation.name, error
                 )

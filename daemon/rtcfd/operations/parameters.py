@@ -16,10 +16,10 @@ from rtcfd.access import caller
 from rtcfd.access.caller import Caller
 from rtcfd.access.rights import require_pace
 from rtcfd.common import declared_values, ros_value
+from rtcfd.common.errors import FailedPrecondition, InvalidArgument, NotFound
 from rtcfd.common.names import absolute
-from rtcfd.common.refusals import FailedPrecondition, InvalidArgument, NotFound
 from rtcfd.executor.link import Progress
-from rtcfd.operations.runner_core import Asked, Change, RunnerCore
+from rtcfd.operations.runner_core import Change, PendingParameters, RunnerCore
 from rtcfd.state.history import UNANSWERED, ParameterChange
 
 _LONGEST_WORD = 60  # characters of a value in a message
@@ -150,8 +150,8 @@ async def follow_ros(runner: RunnerCore, changed: Mapping[str, set[str]]) -> Non
 
 def note_unanswered(runner: RunnerCore) -> None:
     """Note the `set` that was running when an executor died: it may be the cause."""
-    asked, runner.asked_parameters = runner.asked_parameters, []
-    for each in asked:
+    pending, runner.pending_parameters = runner.pending_parameters, []
+    for each in pending:
         note(runner, each.component, each.settings, each.before, each.acting, UNANSWERED)
 
 
@@ -215,21 +215,25 @@ async def _set(
     if name in runner.desired.left_out:
         result = await _check_left_out(runner, name, settings)
     else:
-        result = await _ask(runner, Asked(name, settings, before, acting), progress)
+        result = await _ask(runner, PendingParameters(name, settings, before, acting), progress)
     runner.desired.set_parameters(name, settings)
     note(runner, name, settings, before, acting, "undo" if takes_back else "set", "", takes_back)
     result.notes.extend(await runner.save())
     return result
 
 
-async def _ask(runner: RunnerCore, asked: Asked, progress: Progress) -> control_pb2.ChangeResult:
-    request = control_pb2.SetParametersRequest(component=asked.component, parameters=asked.settings)
-    runner.asked_parameters.append(asked)
+async def _ask(
+    runner: RunnerCore, pending: PendingParameters, progress: Progress
+) -> control_pb2.ChangeResult:
+    request = control_pb2.SetParametersRequest(
+        component=pending.component, parameters=pending.settings
+    )
+    runner.pending_parameters.append(pending)
     try:
         return (await runner.ask(wire.Request(set_parameters=request), progress)).change
     finally:
-        if asked in runner.asked_parameters:
-            runner.asked_parameters.remove(asked)
+        if pending in runner.pending_parameters:
+            runner.pending_parameters.remove(pending)
 
 
 async def _check_left_out(

@@ -19,17 +19,17 @@ from rtcf_shared.enums import word
 from rtcfd.access import caller
 from rtcfd.catalog.catalog import Catalog
 from rtcfd.common.background import WorkerThreads
+from rtcfd.common.errors import RequestError, Unavailable
 from rtcfd.common.event_log import EventLog
 from rtcfd.common.limits import Limits
-from rtcfd.common.refusals import Refusal, Unavailable
 from rtcfd.executor.command import ExecutorCommand
-from rtcfd.executor.events import logger_of
 from rtcfd.executor.executor import CONNECT_TIMEOUT_S, QUERY_TIMEOUT_S, Executor
 from rtcfd.executor.link import OnAnswer, OnPorts, Progress
+from rtcfd.executor.notifications import logger_of
 from rtcfd.executor.process import End
 from rtcfd.incidents.incidents import Incidents
-from rtcfd.operations.figures import Figures
 from rtcfd.operations.loaded_code import LoadedCode
+from rtcfd.operations.loop_counters import LoopCounters
 from rtcfd.operations.loop_state import LoopState
 from rtcfd.operations.operations import Operations
 from rtcfd.state.desired import Desired
@@ -46,7 +46,7 @@ async def _number(uid: int) -> str:
 
 
 @dataclass
-class Surroundings:
+class SharedContext:
     """The objects that all runners share; a reload of rtcfd changes some."""
 
     command: ExecutorCommand
@@ -68,7 +68,7 @@ class Surroundings:
 
 
 @dataclass(eq=False)
-class Asked:
+class PendingParameters:
     """A request to set parameters that the executor has not answered yet."""
 
     component: str  # full name
@@ -95,23 +95,23 @@ class Change:
 class RunnerCore(ABC):
     """A runner without its client-facing part."""
 
-    def __init__(self, desired: Desired, surroundings: Surroundings) -> None:
+    def __init__(self, desired: Desired, shared: SharedContext) -> None:
         self.name = desired.runner
         self.desired = desired
         self.log = logger_of(self.name)
         self.loop = LoopState(desired)
         self.operations = Operations(f"runner {self.name}", self.log)
-        self.shared = surroundings
-        self.trouble = "its executor is not started"  # why there is no executor
+        self.shared = shared
+        self.down_reason = "its executor is not started"  # why there is no executor
         self.tuned: dict[str, float] = {}  # by rate-limited parameter, the time it was last set
-        self.asked_parameters: list[Asked] = []
+        self.pending_parameters: list[PendingParameters] = []
         self.closing = False
         self.leaving = False  # rtcfd ends, but the loop goes on
-        self.saver = Saver(desired, surroundings.disk, self.log)
-        self.code = LoadedCode(surroundings.folders)
-        self.figures = Figures()
+        self.saver = Saver(desired, shared.disk, self.log)
+        self.code = LoadedCode(shared.folders)
+        self.counters = LoopCounters()
         self.incident = ""  # the name of the newest incident
-        self._code_file = surroundings.command.folder / f"{self.name}.libraries"
+        self._code_file = shared.command.folder / f"{self.name}.libraries"
         self._executor: Executor | None = None
         self._changing_executor = asyncio.Lock()
         self._settled = asyncio.Event()  # not set while an executor is being started
@@ -140,7 +140,7 @@ class RunnerCore(ABC):
             text = f"held by {holder}" if holder else f"given back by {before[1]}"
             self.happened(control_pb2.Event.KIND_RUNNER_SETTINGS, text)
         if self.state != before[0]:
-            why = self.loop.fault or self.loop.held or (self.trouble if not self.up else "")
+            why = self.loop.fault or self.loop.held or (self.down_reason if not self.up else "")
             text = word(runner_pb2.RunnerState.DESCRIPTOR, self.state) + (why and f": {why}")
             self.happened(control_pb2.Event.KIND_RUNNER_STATE, text)
 
@@ -207,14 +207,14 @@ class RunnerCore(ABC):
         being ended.
         """
         self._settled.clear()
-        self.trouble = "its executor is starting"
+        self.down_reason = "its executor is starting"
         command = self.shared.command
         try:
             async with self._changing_executor:
                 executor = await Executor.adopt(self.name, command, self.take_unasked, self._ended)
                 adopted = executor is not None
                 if not adopted and only_left_over:
-                    self.trouble = "it has no executor"
+                    self.down_reason = "it has no executor"
                     return None
                 if executor is None and (self.leaving or not self.closing):
                     executor = await self._launch()
@@ -224,27 +224,27 @@ class RunnerCore(ABC):
                     ending = f"runner {self.name} is being ended"
                     raise Unavailable(ending, errors_pb2.REASON_RUNNER_ENDING)
                 self._executor = executor
-                self.figures = Figures()
+                self.counters = LoopCounters()
                 if adopted:
                     self.code.restore(self._code_file)
                 else:
                     self.code.clear()
-        except Refusal as refusal:
-            self.trouble = str(refusal)
+        except RequestError as error:
+            self.down_reason = str(error)
             raise
         except Exception as error:
-            self.trouble = f"its executor does not start: {type(error).__name__}: {error}"
+            self.down_reason = f"its executor does not start: {type(error).__name__}: {error}"
             raise
         finally:
             self._settled.set()
-        self.trouble = ""
+        self.down_reason = ""
         return adopted
 
-    async def end_executor(self, trouble: str) -> None:
-        """Stop the loop in order and end the executor, even a busy one; `trouble` is the reason."""
+    async def end_executor(self, reason: str) -> None:
+        """Stop the loop in order and end the executor, even a busy one."""
         executor, self._executor = self._executor, None
         if executor is not None:
-            self.trouble = executor.verdict = trouble
+            self.down_reason = executor.verdict = reason
             async with self._changing_executor:
                 await executor.shut_down()
         self.loop.gone()
@@ -313,22 +313,22 @@ class RunnerCore(ABC):
                 f"runner {self.name}: {executor.verdict}", errors_pb2.REASON_EXECUTOR_DOWN
             ) from None
 
-    async def begin_figures(self, reset: bool) -> None:
+    async def begin_counting(self, reset: bool) -> None:
         """Count from now on (`reset`), or from the begin of the executor's statistics."""
         if reset:
             await self.ask(wire.Request(reset_statistics=wire.ResetStatistics()))
-        self.figures.begin()
+        self.counters.begin()
         if self.alive().resets_all_at_once:
             return
         status = (await self.ask(wire.Request(get_status=wire.GetStatus()))).status
         counted = await self.ask(wire.Request(get_statistics=wire.GetStatistics()))
-        self.figures.leave_out(status, counted.statistics)
+        self.counters.leave_out(status, counted.statistics)
 
     def alive(self) -> Executor:
         """Return the executor; raises Unavailable if there is none."""
         if self._executor is None:
             raise Unavailable(
-                f"runner {self.name} is down: {self.trouble}", errors_pb2.REASON_EXECUTOR_DOWN
+                f"runner {self.name} is down: {self.down_reason}", errors_pb2.REASON_EXECUTOR_DOWN
             )
         return self._executor
 

@@ -13,8 +13,8 @@ from rtcf_shared.graph_writer import same_value
 from rtcfd.access.caller import Caller
 from rtcfd.catalog.catalog import Catalog
 from rtcfd.common import declared_values
+from rtcfd.common.errors import RequestError
 from rtcfd.common.names import full_name
-from rtcfd.common.refusals import Refusal
 from rtcfd.operations import parameters
 from rtcfd.operations.runner_core import RunnerCore
 
@@ -138,7 +138,7 @@ def _misfit(
         return "there is no such parameter any more"
     try:
         declared_values.check("", setting, declared)
-    except Refusal:
+    except RequestError:
         if setting.value.WhichOneof("kind") != found.default_value.WhichOneof("kind"):
             return f"it is of type {found.type} now"
         if found.choices:

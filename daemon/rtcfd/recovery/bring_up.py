@@ -14,7 +14,7 @@ from rtcf_shared.graph_writer import live_spec
 from rtcf_shared.naming import listing
 
 from rtcfd.catalog.catalog import loads
-from rtcfd.common.refusals import FailedPrecondition, InvalidArgument, Refusal
+from rtcfd.common.errors import FailedPrecondition, InvalidArgument, RequestError
 from rtcfd.operations.loop import start_in_turn
 from rtcfd.operations.runner_core import RunnerCore
 from rtcfd.recovery.follow import follow_components, follow_settings
@@ -69,7 +69,7 @@ async def _follow(runner: RunnerCore, asked: int) -> None:
     answer = await runner.ask(request, None, lambda answer: _told(runner, answer.status, asked))
     status = answer.status
     listed = await runner.ask(wire.Request(list_components=wire.ListComponents()))
-    await runner.begin_figures(reset=False)
+    await runner.begin_counting(reset=False)
     runner.log.info(
         "adopted: loop %s, iteration %d", _WORDS.get(status.state, "in an unknown state"),
         status.iteration,
@@ -120,17 +120,17 @@ async def _restore(runner: RunnerCore) -> None:
     wanted = [name for name in desired.components if name not in desired.left_out]
     if not wanted:
         return
-    runner.trouble = restoring = f"its components are being restored: {len(wanted)}"
+    runner.down_reason = restoring = f"its components are being restored: {len(wanted)}"
     try:
         # All at once, for speed; one by one if that fails.
         every = await loads(runner.shared.catalog, [desired.components[name] for name in wanted])
         await runner.ask(wire.Request(apply=wire.Apply(components=every)))
-    except Refusal:
+    except RequestError:
         if runner.up:
             await _load_each(runner, wanted)
     finally:
-        if runner.trouble == restoring:  # else the executor has died meanwhile
-            runner.trouble = ""
+        if runner.down_reason == restoring:  # else the executor has died meanwhile
+            runner.down_reason = ""
     if runner.up:
         count = len(desired.components) - len(desired.left_out)
         runner.log.info("%d of its components restored, held", count)
@@ -155,18 +155,18 @@ async def _start_at_boot(runner: RunnerCore, asked: int, agreed: set[str]) -> No
             await start_in_turn(runner, asked)
             runner.log.info("loop %s", word)
             return
-        except Refusal as refusal:
-            runner.loop.held = f"not {word}: {refusal}"
+        except RequestError as error:
+            runner.loop.held = f"not {word}: {error}"
             runner.log.error("%s", runner.loop.held)
     if runner.loop.wanted:
         runner.loop.want(False)
         await runner.save()
 
 
-async def recover(runner: RunnerCore, verdict: Verdict, crashes: Crashes, trouble: str) -> None:
+async def recover(runner: RunnerCore, verdict: Verdict, crashes: Crashes, cause: str) -> None:
     """Start a new executor after an unexpected end, with the graph without the culprit.
 
-    `trouble` is the cause of the end, for messages.
+    `cause` is the cause of the end, for messages.
     """
     begin = time.monotonic()
     asked = runner.loop.stops
@@ -177,7 +177,7 @@ async def recover(runner: RunnerCore, verdict: Verdict, crashes: Crashes, troubl
         if runner.up or runner.closing:
             return
         if crashes.recent >= MOST_ATTEMPTS:
-            _give_up(runner, f"{trouble}, the last of {crashes.recent} in {WINDOW_S:g} s")
+            _give_up(runner, f"{cause}, the last of {crashes.recent} in {WINDOW_S:g} s")
             return
         agreed = {*runner.desired.left_out, verdict.culprit}
         await bring_up(runner)
@@ -192,17 +192,17 @@ async def recover(runner: RunnerCore, verdict: Verdict, crashes: Crashes, troubl
         elif runner.loop.wanted:
             try:
                 await start_in_turn(runner, asked)
-            except Refusal as refusal:
-                not_resumed = f"; not resumed: {refusal}"
-        runner.loop.held = _held(runner, verdict, trouble) + not_resumed
+            except RequestError as error:
+                not_resumed = f"; not resumed: {error}"
+        runner.loop.held = _held(runner, verdict, cause) + not_resumed
         took = time.monotonic() - begin
         runner.log.warning("executor restarted in %.2f s: %s", took, runner.loop.held)
 
     try:
         await runner.change("the recovery of its executor", work)
-    except Refusal as refusal:
+    except RequestError as error:
         if not runner.up and not runner.closing:
-            _give_up(runner, f"{trouble}; not recovered: {refusal}")
+            _give_up(runner, f"{cause}; not recovered: {error}")
 
 
 def require_whole(runner: RunnerCore, agreed: Container[str]) -> None:
@@ -231,10 +231,10 @@ def _missing(runner: RunnerCore, agreed: Container[str]) -> list[str]:
     ]
 
 
-def _give_up(runner: RunnerCore, trouble: str) -> None:
+def _give_up(runner: RunnerCore, cause: str) -> None:
     """Report why there is no executor; rtcfd starts no other on its own."""
-    runner.trouble = f"{trouble}; `rtcfctl -r {runner.name} start` tries again"
-    runner.log.error("%s", runner.trouble)
+    runner.down_reason = f"{cause}; `rtcfctl -r {runner.name} start` tries again"
+    runner.log.error("%s", runner.down_reason)
     runner.tell()
 
 
@@ -249,19 +249,19 @@ def resumes(runner: RunnerCore, verdict: Verdict, crashes: Crashes) -> bool:
     )
 
 
-def _held(runner: RunnerCore, verdict: Verdict, trouble: str) -> str:
+def _held(runner: RunnerCore, verdict: Verdict, cause: str) -> str:
     """Return the text of the status after a recovery."""
     name, culprit = runner.name, verdict.culprit
     if culprit not in runner.desired.quarantined:
         loop = "its loop goes on" if runner.loop.running else f"held: `rtcfctl -r {name} start`"
-        return f"{trouble}; {loop} with all its components"
+        return f"{cause}; {loop} with all its components"
     again = f"`rtcfctl -r {name} release {culprit}` loads again"
     if runner.loop.running:
-        return f"{trouble}; its loop goes on without {culprit}, which {again}"
+        return f"{cause}; its loop goes on without {culprit}, which {again}"
     spec = runner.desired.components.get(culprit)
     agreed = "" if spec is None or spec.optional else f" --without {culprit}"
     start = f"`rtcfctl -r {name} start{agreed}`"
-    return f"{trouble}; held: {start} runs it without {culprit}, which {again}"
+    return f"{cause}; held: {start} runs it without {culprit}, which {again}"
 
 
 async def _settle(runner: RunnerCore) -> None:
@@ -274,8 +274,8 @@ async def _settle(runner: RunnerCore) -> None:
         await runner.ask(wire.Request(unload=control_pb2.UnloadRequest()))
     except InvalidArgument:
         pass
-    except Refusal as refusal:
-        runner.log.warning("%s", refusal)
+    except RequestError as error:
+        runner.log.warning("%s", error)
 
 
 async def _load_each(runner: RunnerCore, names: Iterable[str]) -> None:
@@ -285,10 +285,10 @@ async def _load_each(runner: RunnerCore, names: Iterable[str]) -> None:
             (load,) = await loads(runner.shared.catalog, [runner.desired.components[name]])
             await runner.ask(wire.Request(load=load))
             runner.desired.left_out.pop(name, None)
-        except Refusal as refusal:
+        except RequestError as error:
             if not runner.up:
                 return  # the executor died, and its recovery loads the rest
-            runner.desired.left_out[name] = str(refusal)
-            runner.log.error("%s is left out of the loop: %s", name, refusal)
+            runner.desired.left_out[name] = str(error)
+            runner.log.error("%s is left out of the loop: %s", name, error)
     if runner.desired.left_out:
         runner.log.warning("left out of its loop: %s", listing(runner.desired.left_out))

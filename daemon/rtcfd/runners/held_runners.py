@@ -13,14 +13,14 @@ from rtcf_shared.naming import listing
 
 from rtcfd.access import caller
 from rtcfd.common import runner_settings
-from rtcfd.common.names import DEFAULT_RUNNER
-from rtcfd.common.refusals import (
+from rtcfd.common.errors import (
     FailedPrecondition,
     InvalidArgument,
     NotFound,
-    Refusal,
+    RequestError,
     Unavailable,
 )
+from rtcfd.common.names import DEFAULT_RUNNER
 from rtcfd.operations.loop import stop_quietly
 from rtcfd.runners.leases import RETURN_S
 from rtcfd.runners.outbox import Outbox
@@ -177,8 +177,8 @@ async def _release(runners: Runners, runner: Runner, hold: HoldTerms) -> None:
 
     try:
         await runner.change("the end of its launch", work)
-    except Refusal as refusal:
-        runner.log.error("%s", refusal)
+    except RequestError as error:
+        runner.log.error("%s", error)
     runner.log.info("given back by %s", hold.holder)
 
 

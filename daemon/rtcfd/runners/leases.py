@@ -12,8 +12,14 @@ from typing import Any
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, errors_pb2
 
+from rtcfd.common.errors import (
+    AlreadyExists,
+    FailedPrecondition,
+    NotFound,
+    RequestError,
+    Unavailable,
+)
 from rtcfd.common.names import full_name
-from rtcfd.common.refusals import AlreadyExists, FailedPrecondition, NotFound, Refusal, Unavailable
 from rtcfd.operations import graph, parameters
 from rtcfd.operations.loop import stop_quietly
 from rtcfd.operations.runner_core import RunnerCore
@@ -241,8 +247,8 @@ class Leases:
             if names:
                 request = control_pb2.UnloadRequest(components=names)
                 await graph.unload(runner, request, lambda _: None)
-        except Refusal as refusal:
-            runner.log.error("%s", refusal)
+        except RequestError as error:
+            runner.log.error("%s", error)
         finally:
             self._loading.difference_update(names)
         if self._leaving:
@@ -332,9 +338,9 @@ class Leases:
             if names and not runner.closing:
                 request = control_pb2.UnloadRequest(components=names)
                 await graph.unload(runner, request, lambda _: None)
-        except Refusal as refusal:
+        except RequestError as error:
             # It has no holder now; the list of components shows it.
-            runner.log.error("%s stays loaded: %s", ", ".join(group), refusal)
+            runner.log.error("%s stays loaded: %s", ", ".join(group), error)
         forgotten = [self._terms.pop(name) for name in group if name in self._terms]
         if forgotten and not runner.closing:
             await runner.save()

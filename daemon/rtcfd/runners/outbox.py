@@ -63,7 +63,7 @@ class Outbox:
             self._ended = control_pb2.LeaseEnded(why=why, message=message)
             self._wake.set()
 
-    def refuse(self, error: BaseException) -> None:
+    def fail(self, error: BaseException) -> None:
         """Make the reader raise an error."""
         self._error = error
         self._wake.set()

@@ -10,12 +10,12 @@ from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, errors_pb2
 
 from rtcfd.access.calls import Level
-from rtcfd.common.refusals import FailedPrecondition, Refusal
+from rtcfd.common.errors import FailedPrecondition, RequestError
 from rtcfd.common.status_codes import bounded
 from rtcfd.operations import graph
 from rtcfd.operations.loop import stop
 from rtcfd.operations.runner_core import RunnerCore
-from rtcfd.recovery.starting import start
+from rtcfd.recovery.cycles import start
 
 _NEEDED = {
     "start": Level.OPERATE,
@@ -37,8 +37,8 @@ async def serve(runner: RunnerCore, call: wire.ServiceCall) -> wire.ServiceAnswe
         answer.success = True
         lacks = [f"degraded real time: {line}" for line in result.degraded]
         answer.message = "; ".join([*result.notes, *lacks])
-    except Refusal as refusal:
-        answer.message = bounded(refusal)
+    except RequestError as error:
+        answer.message = bounded(error)
         runner.log.warning("call of a ROS service rejected: %s", answer.message)
     except Exception as error:
         answer.message = f"internal error of rtcfd ({type(error).__name__}): see its log"

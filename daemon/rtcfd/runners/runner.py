@@ -12,17 +12,17 @@ from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, errors_pb2, runner_pb2
 
 from rtcfd.common import runner_settings
+from rtcfd.common.errors import InvalidArgument, RequestError
 from rtcfd.common.event_log import NumberedLog
-from rtcfd.common.refusals import InvalidArgument, Refusal
 from rtcfd.executor.command import settings_error
-from rtcfd.executor.events import Events
 from rtcfd.executor.executor import Executor
+from rtcfd.executor.notifications import Notifications
 from rtcfd.executor.process import End
 from rtcfd.operations.incidents import keep
 from rtcfd.operations.parameters import follow_ros, note_unanswered
-from rtcfd.operations.runner_core import RunnerCore, Surroundings
+from rtcfd.operations.runner_core import RunnerCore, SharedContext
 from rtcfd.recovery.bring_up import bring_up, recover, resumes
-from rtcfd.recovery.crash_place import name_source
+from rtcfd.recovery.crash_source import report_source
 from rtcfd.recovery.verdict import Crashes, judge
 from rtcfd.runners.leases import Leases
 from rtcfd.runners.outbox import Outbox
@@ -39,15 +39,15 @@ _Ended = control_pb2.LeaseEnded
 class Runner(RunnerCore):
     """One control loop."""
 
-    def __init__(self, desired: Desired, surroundings: Surroundings) -> None:
-        super().__init__(desired, surroundings)
+    def __init__(self, desired: Desired, shared: SharedContext) -> None:
+        super().__init__(desired, shared)
         self.leases = Leases(self, self.alarm)
         self.hold_outbox: Outbox | None = None  # of the holder, if it is connected
         self.logs = NumberedLog[wire.LogRecord]()  # of its components and its executor
         self.releasing = False  # its holder has ended, and cannot reconnect
         self._crashes = Crashes()
         self._changed_by_ros: dict[str, set[str]] = {}  # by component, parameters not noted yet
-        self._events = Events(self.name, self, lambda: self.shared.limits)
+        self._notifications = Notifications(self.name, self, lambda: self.shared.limits)
 
     # -- life ---------------------------------------------------------------
 
@@ -137,7 +137,7 @@ class Runner(RunnerCore):
 
     def take_unasked(self, response: wire.Response) -> None:
         """Handle a notification from the executor."""
-        self._events.take(response)
+        self._notifications.take(response)
 
     def adopted(self) -> None:
         """Give holders time to reconnect, after a restart of rtcfd."""
@@ -153,7 +153,7 @@ class Runner(RunnerCore):
         note_unanswered(self)
         keep(self, executor, f"executor {verdict}", verdict.culprit)
         died = f"its executor (pid {executor.pid}) {verdict} at {time.strftime('%H:%M:%S')}"
-        self.trouble = executor.verdict = died
+        self.down_reason = executor.verdict = died
         self.log.logger.error(
             "executor (pid %d) %s: its loop is down",
             executor.pid,
@@ -164,12 +164,14 @@ class Runner(RunnerCore):
         if (trace := executor.trace()) is not None:
             # Not an operation of this runner, so that its removal does not wait for it.
             self.shared.keeping.in_background(
-                "finding the source lines of a crash", name_source(self, trace, verdict)
+                "finding the source lines of a crash", report_source(self, trace, verdict)
             )
         self.shared.on_change()
         if ours and verdict.orderly:
-            self.trouble += f"; `rtcfctl -r {self.name} start` brings it back with its components"
-            self.loop_ended("", self.trouble)
+            self.down_reason += (
+                f"; `rtcfctl -r {self.name} start` brings it back with its components"
+            )
+            self.loop_ended("", self.down_reason)
         elif ours:
             self._crashes.add()
             self.desired.quarantine(verdict.culprit, str(verdict))
@@ -203,9 +205,9 @@ class Runner(RunnerCore):
         """Handle a report of late cycles: ask for their number."""
 
         async def look() -> None:
-            with contextlib.suppress(Refusal):
+            with contextlib.suppress(RequestError):
                 answer = await self.query(wire.Request(get_status=wire.GetStatus()))
-                self.figures.told_of_late_cycles(answer.status, message)
+                self.counters.told_of_late_cycles(answer.status, message)
 
         self.operations.in_background("counting late cycles", look())
 
@@ -255,7 +257,7 @@ class Runner(RunnerCore):
     async def _answer(self, call: wire.ServiceCall) -> None:
         answer = await self.shared.serve_ros(self, call)
         # If the executor has ended meanwhile, its caller has an error already.
-        with contextlib.suppress(Refusal):
+        with contextlib.suppress(RequestError):
             await self.alive().request(wire.Request(service_answer=answer))
 
     def stopped_directly(self, stop: wire.DirectStop) -> None:
@@ -303,9 +305,9 @@ class Runner(RunnerCore):
 
         try:
             await self.change("a change of parameters by ROS", work)
-        except Refusal as refusal:
+        except RequestError as error:
             self._changed_by_ros = {}
-            self.log.warning("parameters changed by ROS are not noted: %s", refusal)
+            self.log.warning("parameters changed by ROS are not noted: %s", error)
 
     # -- queries ------------------------------------------------------------
 
@@ -344,8 +346,8 @@ class Runner(RunnerCore):
         """Apply changed limits and access rules."""
         try:
             await self.change("a change of limits", self.limit)
-        except Refusal as refusal:
-            self.log.error("limits not changed: %s", refusal)
+        except RequestError as error:
+            self.log.error("limits not changed: %s", error)
 
     async def follow_defaults(self, before: runner_pb2.RunnerSettings) -> list[str]:
         """Apply changed defaults; `before` are the old ones.  Return a line for each change."""
@@ -362,6 +364,6 @@ class Runner(RunnerCore):
 
         try:
             await self.change("a change of defaults", work)
-        except Refusal as refusal:
-            return [f"{self.name}: not changed: {refusal}"]
+        except RequestError as error:
+            return [f"{self.name}: not changed: {error}"]
         return [f"{self.name}: {line}" for line in lines]

@@ -10,13 +10,13 @@ from rtcf_shared.naming import closest, listing, suggestion
 
 from rtcfd.catalog.catalog import loads
 from rtcfd.common import runner_settings
+from rtcfd.common.errors import AlreadyExists, NotFound, RequestError, Silent, Unavailable
 from rtcfd.common.names import DEFAULT_RUNNER, check_base_name, check_graph, full_name
-from rtcfd.common.refusals import AlreadyExists, NotFound, Refusal, Silent, Unavailable
 from rtcfd.executor.link import Progress
 from rtcfd.incidents.incidents import Incidents
 from rtcfd.operations import graph
 from rtcfd.operations.operations import Operations
-from rtcfd.operations.runner_core import Surroundings
+from rtcfd.operations.runner_core import SharedContext
 from rtcfd.runners.runner import LEAVE_TIMEOUT_S, Runner
 from rtcfd.state.desired import Desired
 
@@ -30,8 +30,8 @@ _LOOK_AGAIN_S = 2.0  # between attempts to adopt an executor that does not answe
 class Runners:
     """The runners by name."""
 
-    def __init__(self, surroundings: Surroundings) -> None:
-        self._shared = surroundings
+    def __init__(self, shared: SharedContext) -> None:
+        self._shared = shared
         self._runners: dict[str, Runner] = {}
         self._leaving: set[Runner] = set()  # being removed
         self.closing = asyncio.Event()
@@ -56,10 +56,10 @@ class Runners:
         async def one(runner: Runner) -> None:
             try:
                 await self._bring_up_known(runner)
-            except Silent as refusal:
-                self._keep_looking(runner, refusal, self._bring_up_known)
-            except Refusal as refusal:
-                runner.log.error("%s", refusal)
+            except Silent as error:
+                self._keep_looking(runner, error, self._bring_up_known)
+            except RequestError as error:
+                runner.log.error("%s", error)
             except Exception:  # it must not affect the other runners
                 runner.log.exception("its executor does not start")
 
@@ -75,8 +75,8 @@ class Runners:
         else:
             await runner.bring_up(boot=True)
 
-    def _keep_looking(self, runner: Runner, refusal: Silent, take: _Take) -> None:
-        runner.log.error("%s", refusal)
+    def _keep_looking(self, runner: Runner, error: Silent, take: _Take) -> None:
+        runner.log.error("%s", error)
         # Not an operation of the runner: this may end the runner, which waits for its operations.
         self.operations.in_background(
             f"the search for the executor of {runner.name}", self._look_again(runner, take)
@@ -115,8 +115,8 @@ class Runners:
         runner = self._runners[name] = Runner(Desired(name), self._shared)
         try:
             await self._bring_up_unknown(runner)
-        except Silent as refusal:
-            self._keep_looking(runner, refusal, self._bring_up_unknown)
+        except Silent as error:
+            self._keep_looking(runner, error, self._bring_up_unknown)
 
     async def _bring_up_unknown(self, runner: Runner) -> None:
         try:
@@ -126,8 +126,8 @@ class Runners:
                 return
         except Silent:
             raise
-        except Refusal as refusal:
-            runner.log.error("%s", refusal)
+        except RequestError as error:
+            runner.log.error("%s", error)
         except Exception:
             runner.log.exception("its executor cannot be adopted")
         if self._runners.get(runner.name) is runner:

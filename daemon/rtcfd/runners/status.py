@@ -10,7 +10,7 @@ from rtcf.v1 import runner_pb2
 from rtcfd import VERSION
 from rtcfd.common import runner_settings
 from rtcfd.common.background import log_failure
-from rtcfd.common.refusals import Refusal
+from rtcfd.common.errors import RequestError
 from rtcfd.operations.runner_core import RunnerCore
 
 _TIMEOUT_S = 2.0
@@ -18,7 +18,7 @@ _WORTH_SAYING_S = 2.0  # the status shows a change that takes longer
 _NEIGHBOURS_S = 0.5  # longest wait for the statuses of other runners
 
 
-class _Told(Protocol):
+class _HasStatus(Protocol):
     """An object with a status: a runner."""
 
     @property
@@ -30,7 +30,7 @@ class _Told(Protocol):
 
 
 async def statuses_of(
-    chosen: Sequence[_Told], everybody: Sequence[_Told]
+    chosen: Sequence[_HasStatus], everybody: Sequence[_HasStatus]
 ) -> list[runner_pb2.RunnerStatus]:
     """Return the statuses of the chosen runners, each with the loops that share its CPU.
 
@@ -69,19 +69,19 @@ async def status_of(runner: RunnerCore) -> runner_pb2.RunnerStatus:
     """Return the status; asks the executor if there is one."""
     status = runner_pb2.RunnerStatus(runner=runner.name, state=runner_pb2.RUNNER_STATE_DOWN)
     executor = runner.executor
-    lines = [runner.trouble]
+    lines = [runner.down_reason]
     if executor is not None:
         request = wire.Request(get_status=wire.GetStatus())
         try:
             status = (await executor.request(request, _TIMEOUT_S)).status
             lines.append(status.status)
-            runner.figures.put_into(status)
-        except Refusal as refusal:
+            runner.counters.put_into(status)
+        except RequestError as error:
             if executor is runner.executor:
                 status.state = runner_pb2.RUNNER_STATE_STUCK
-                lines.append(executor.frozen or str(refusal))
+                lines.append(executor.frozen or str(error))
             else:
-                lines.append(runner.trouble)  # it has just died
+                lines.append(runner.down_reason)  # it has just died
         status.runner = runner.name
         status.pid = executor.pid if executor is runner.executor else 0
         status.version = executor.version

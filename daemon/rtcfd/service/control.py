@@ -24,25 +24,25 @@ from rtcf_shared.naming import listing
 
 from rtcfd import VERSION
 from rtcfd.catalog.catalog import Catalog
+from rtcfd.common.errors import InvalidArgument
 from rtcfd.common.event_log import EventLog
 from rtcfd.common.names import DEFAULT_RUNNER, absolute
-from rtcfd.common.refusals import InvalidArgument
 from rtcfd.common.status_codes import abort
 from rtcfd.executor.link import Progress
 from rtcfd.operations import graph, incidents, parameters, snapshots
 from rtcfd.operations.loop import stop
-from rtcfd.recovery import starting
+from rtcfd.recovery import cycles
 from rtcfd.runners.held_runners import Hold
 from rtcfd.runners.leases import Lease
 from rtcfd.runners.outbox import Outbox
 from rtcfd.runners.runner import Runner
 from rtcfd.runners.runners import Runners
 from rtcfd.runners.status import statuses_of
-from rtcfd.service.answers import Work, answering, holding, lasting
+from rtcfd.service.log_streams import watch, watch_logs
+from rtcfd.service.methods import Work, unary, with_lease, with_progress
 from rtcfd.service.pages import page
 from rtcfd.service.ports import watch_ports
 from rtcfd.service.replay import Replay
-from rtcfd.service.watching import watch, watch_logs
 
 _WATCH_MS = 1000
 _SHORTEST_WATCH_MS = 100
@@ -65,7 +65,7 @@ class Daemon(Protocol):
 
 
 _Change = Callable[[Runner, Any, Progress], Coroutine[Any, Any, control_pb2.ChangeResult]]
-_lasting_change = lasting(control_pb2.ChangeResponse, "result")
+_change_with_progress = with_progress(control_pb2.ChangeResponse, "result")
 
 
 def _changing(change: _Change) -> Any:
@@ -74,15 +74,15 @@ def _changing(change: _Change) -> Any:
     def method(control: "Control", request: Any) -> Work:
         return partial(change, control.runners.get(request.runner), request)
 
-    return _lasting_change(method)
+    return _change_with_progress(method)
 
 
 class Control(control_pb2_grpc.ControlServicer):
     """Serves all connections; owned by the daemon."""
 
     # The changes of one runner: `change(runner, request, progress)`.
-    Start = _changing(starting.start)
-    Step = _changing(starting.step)
+    Start = _changing(cycles.start)
+    Step = _changing(cycles.step)
     Load = _changing(graph.load)
     Unload = _changing(graph.unload)
     Replace = _changing(graph.replace)
@@ -106,7 +106,7 @@ class Control(control_pb2_grpc.ControlServicer):
 
     # -- queries and streams ------------------------------------------------
 
-    @answering
+    @unary
     async def GetStatus(self, request: control_pb2.GetStatusRequest) -> Any:
         """Return the statuses of all runners, or of one."""
         chosen = [self.runners.get(request.runner)] if request.runner else self.runners.all()
@@ -118,19 +118,19 @@ class Control(control_pb2_grpc.ControlServicer):
             notes=self._daemon.notes(),
         )
 
-    @answering
+    @unary
     async def ListRunners(self, request: control_pb2.ListRunnersRequest) -> Any:
         """Return the statuses of all runners, in pages."""
         chosen, token = page(self.runners.all(), request, lambda each: str(each.name), _STATUS)
         runners = await statuses_of(chosen, self.runners.all())
         return control_pb2.ListRunnersResponse(runners=runners, next_page_token=token)
 
-    @answering
+    @unary
     async def GetHistory(self, request: control_pb2.GetHistoryRequest) -> Any:
         """Return the changes of parameters, with their authors and times."""
         return parameters.history(self.runners.get(request.runner), request)
 
-    @answering
+    @unary
     async def ListIncidents(self, request: incidents_pb2.ListIncidentsRequest) -> Any:
         """Return the incidents: files with the last cycles before faults."""
         found = await self.runners.incidents.all(request.runner)
@@ -152,7 +152,7 @@ class Control(control_pb2_grpc.ControlServicer):
         except Exception as error:
             await abort(context, error, request)
 
-    @answering
+    @unary
     async def ListComponents(self, request: control_pb2.ListComponentsRequest) -> Any:
         """Return all components in the order of the schedule, then those that are left out."""
         components = await self._components(request.runner)
@@ -165,7 +165,7 @@ class Control(control_pb2_grpc.ControlServicer):
         chosen, token = page(found, request, lambda each: str(each.full_name))
         return control_pb2.ListComponentsResponse(components=chosen, next_page_token=token)
 
-    @answering
+    @unary
     async def GetComponent(self, request: control_pb2.GetComponentRequest) -> Any:
         """Return one component, with values."""
         name = absolute(request.component)
@@ -179,7 +179,7 @@ class Control(control_pb2_grpc.ControlServicer):
         found.component.library_changed = name in rebuilt
         return control_pb2.GetComponentResponse(component=_add_holder(runner, found.component))
 
-    @answering
+    @unary
     async def GetOrder(self, request: control_pb2.GetOrderRequest) -> Any:
         """Return the names of the components in the order of the schedule."""
         components = await self._components(request.runner)
@@ -187,7 +187,7 @@ class Control(control_pb2_grpc.ControlServicer):
         chosen, token = page(names, request, str)
         return control_pb2.GetOrderResponse(components=chosen, next_page_token=token)
 
-    @answering
+    @unary
     async def ListConnections(self, request: control_pb2.ListConnectionsRequest) -> Any:
         """Return all connections, sorted by name."""
         query = wire.Request(list_connections=wire.ListConnections())
@@ -196,7 +196,7 @@ class Control(control_pb2_grpc.ControlServicer):
         chosen, token = page(found, request, lambda each: str(each.name))
         return control_pb2.ListConnectionsResponse(connections=chosen, next_page_token=token)
 
-    @answering
+    @unary
     async def ListTypes(self, request: control_pb2.ListTypesRequest) -> Any:
         """Return the component types that can be loaded."""
         types, problems = await self._catalog.types(request.package)
@@ -205,7 +205,7 @@ class Control(control_pb2_grpc.ControlServicer):
             types=chosen, problems=[] if request.page_token else problems, next_page_token=token
         )
 
-    @answering
+    @unary
     async def GetStatistics(self, request: control_pb2.GetStatisticsRequest) -> Any:
         """Return the statistics of a runner."""
         statistics = await self._statistics(request.runner, request.buckets)
@@ -257,7 +257,7 @@ class Control(control_pb2_grpc.ControlServicer):
 
     # -- changes ----------------------------------------------------------------
 
-    @lasting(control_pb2.ReloadResponse, "result")
+    @with_progress(control_pb2.ReloadResponse, "result")
     def Reload(self, request: control_pb2.ReloadRequest) -> Any:
         """Reload the settings and graphs.d."""
 
@@ -268,7 +268,7 @@ class Control(control_pb2_grpc.ControlServicer):
 
         return work
 
-    @lasting(control_pb2.RunnerResponse, "runner")
+    @with_progress(control_pb2.RunnerResponse, "runner")
     def AddRunner(self, request: control_pb2.AddRunnerRequest) -> Any:
         """Add a runner and start its executor."""
 
@@ -279,7 +279,7 @@ class Control(control_pb2_grpc.ControlServicer):
 
         return work
 
-    @lasting(control_pb2.RunnerResponse, "runner")
+    @with_progress(control_pb2.RunnerResponse, "runner")
     def SetRunner(self, request: control_pb2.SetRunnerRequest) -> Any:
         """Change the settings of a runner."""
         runner = self.runners.get(request.runner)
@@ -291,7 +291,7 @@ class Control(control_pb2_grpc.ControlServicer):
 
         return work
 
-    @lasting(control_pb2.RemoveRunnerResponse, "result")
+    @with_progress(control_pb2.RemoveRunnerResponse, "result")
     def RemoveRunner(self, request: control_pb2.RemoveRunnerRequest) -> Any:
         """Remove a runner."""
         runner = self._named(request.runner, "RemoveRunner")
@@ -303,7 +303,7 @@ class Control(control_pb2_grpc.ControlServicer):
 
         return work
 
-    @lasting(control_pb2.RunnerResponse, "runner")
+    @with_progress(control_pb2.RunnerResponse, "runner")
     def RestartRunner(self, request: control_pb2.RestartRunnerRequest) -> Any:
         """Restart the executor of a runner."""
         runner = self._named(request.runner, "RestartRunner")
@@ -315,7 +315,7 @@ class Control(control_pb2_grpc.ControlServicer):
 
         return work
 
-    @_lasting_change
+    @_change_with_progress
     def Stop(self, request: control_pb2.StopRequest) -> Any:
         """Stop the loop; if the request names no runner, the response lists the running loops."""
         runner = self.runners.get(request.runner)
@@ -346,46 +346,46 @@ class Control(control_pb2_grpc.ControlServicer):
         finally:
             replay.lost()
 
-    @_lasting_change
+    @_change_with_progress
     def Apply(self, request: control_pb2.ApplyRequest) -> Any:
         """Apply a graph."""
         return lambda progress: self.runners.apply(request, progress)
 
-    @answering
+    @unary
     async def TakeSnapshot(self, request: control_pb2.TakeSnapshotRequest) -> Any:
         """Take a snapshot of a runner."""
         return await snapshots.take(self.runners.get(request.runner))
 
-    @answering
+    @unary
     async def TakeIncident(self, request: incidents_pb2.TakeIncidentRequest) -> Any:
         """Write an incident with the last cycles now."""
         taken = await incidents.take(self.runners.get(request.runner), request.reason)
         return incidents_pb2.TakeIncidentResponse(incident=taken)
 
-    @answering
+    @unary
     async def DeleteIncidents(self, request: incidents_pb2.DeleteIncidentsRequest) -> Any:
         """Remove incident files."""
         gone = await self.runners.incidents.remove(request.names)
         return incidents_pb2.DeleteIncidentsResponse(incidents=gone)
 
-    @holding
+    @with_lease
     def HoldRunner(self, request: control_pb2.OpenHold) -> Any:
         """Hold a runner while the call lasts."""
         outbox = Outbox(control_pb2.HoldRunnerResponse)
         return outbox, Hold(self.runners, request, outbox)
 
-    @holding
+    @with_lease
     def LeaseComponent(self, request: control_pb2.OpenLease) -> Any:
         """Lease a component while the call lasts."""
         outbox = Outbox(control_pb2.LeaseComponentResponse)
         return outbox, Lease(self.runners.get(request.runner).leases, request, outbox)
 
-    @answering
+    @unary
     async def ResetStatistics(self, request: control_pb2.ResetStatisticsRequest) -> Any:
         """Reset the statistics."""
         runner = self.runners.get(request.runner)
         await runner.settle()
-        await runner.begin_figures(reset=True)
+        await runner.begin_counting(reset=True)
         return control_pb2.ResetStatisticsResponse()
 
     async def _statistics(self, name: str, buckets: bool = False) -> runner_pb2.RunnerStatistics:

@@ -11,7 +11,7 @@ from typing import Any, Protocol, TypeVar
 
 from rtcf.v1 import errors_pb2
 
-from rtcfd.common.refusals import FailedPrecondition, InvalidArgument
+from rtcfd.common.errors import FailedPrecondition, InvalidArgument
 
 LARGEST = 2 * 1024 * 1024  # bytes of one page; other gRPC clients accept 4 MiB
 _TOKEN = re.compile(r"(\d{1,9})-([0-9a-f]{8})")

@@ -6,7 +6,7 @@ from collections.abc import AsyncGenerator
 
 from rtcf.v1 import errors_pb2, ports_pb2
 
-from rtcfd.common.refusals import InvalidArgument
+from rtcfd.common.errors import InvalidArgument
 from rtcfd.runners.runner import Runner
 
 _MOST = 8 * 1024 * 1024  # bytes in the queue to the caller

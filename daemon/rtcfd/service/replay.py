@@ -2,9 +2,9 @@
 
 from rtcf.v1 import control_pb2, errors_pb2
 
-from rtcfd.common.refusals import FailedPrecondition, InvalidArgument
+from rtcfd.common.errors import FailedPrecondition, InvalidArgument
 from rtcfd.operations.loop import stop_quietly
-from rtcfd.recovery import starting
+from rtcfd.recovery import cycles
 from rtcfd.runners.runner import Runner
 from rtcfd.runners.runners import Runners
 
@@ -30,13 +30,13 @@ class Replay:
         if not request.begin:
             assert self._runner is not None
             self._require_no_stop(self._runner)
-            response = await starting.replay(self._runner, request)
+            response = await cycles.replay(self._runner, request)
             if request.end and not response.more:
                 self._runner, self._ended = None, True
             return response
         runner = self._runners.get(request.runner)
         self._stops = runner.loop.stops
-        return await starting.replay(runner, request, lambda: self._begun(runner))
+        return await cycles.replay(runner, request, lambda: self._begun(runner))
 
     def _begun(self, runner: Runner) -> None:
         """Note that the executor replays; the caller may have disconnected meanwhile."""

@@ -15,8 +15,8 @@ from rtcf_shared.errors import RtcfError
 from rtcf_shared.graph_reader import Graph, read_graphs
 
 from rtcfd.common import regular_files, runner_settings
+from rtcfd.common.errors import InvalidArgument, RequestError
 from rtcfd.common.names import DEFAULT_RUNNER, check_base_name, check_graph
-from rtcfd.common.refusals import InvalidArgument, Refusal
 from rtcfd.state.desired import Desired
 
 log = logging.getLogger(__name__)
@@ -25,7 +25,7 @@ _SUFFIXES = (".yaml", ".yml")
 
 
 @dataclass
-class Given:
+class BootGraph:
     """The graph of one runner, and its file."""
 
     file: Path
@@ -55,9 +55,9 @@ class BootGraphs:
         self._settings_error = settings_error
         self.digests = dict(applied)  # by file
 
-    def read(self) -> tuple[list[Given], list[str]]:
+    def read(self) -> tuple[list[BootGraph], list[str]]:
         """Return all graphs, and the errors, a line each."""
-        graphs: list[Given] = []
+        graphs: list[BootGraph] = []
         problems: list[str] = []
         owners: dict[str, Path] = {}
         digests: dict[str, str] = {}
@@ -76,13 +76,13 @@ class BootGraphs:
             except RtcfError as error:
                 problems.append(str(error))
                 continue
-            except Refusal as refusal:
-                problems.append(f"{file}: {refusal}")
+            except RequestError as error:
+                problems.append(f"{file}: {error}")
                 continue
             digests[str(file)] = hashlib.sha256(text.encode()).hexdigest()
             changed = self.digests.get(str(file)) != digests[str(file)]
             for graph in found:
-                given = Given(file, graph, changed)
+                given = BootGraph(file, graph, changed)
                 first = owners.setdefault(given.runner, file)
                 if first != file:
                     digests.pop(str(file), None)  # applied when the other file is gone

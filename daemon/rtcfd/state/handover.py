@@ -15,8 +15,8 @@ from google.protobuf import json_format
 from rtcf.v1 import runner_pb2
 from rtcf_shared import whole_files
 
-from rtcfd.common import known_values, regular_files
-from rtcfd.common.refusals import Refusal
+from rtcfd.common import enumerators, regular_files
+from rtcfd.common.errors import RequestError
 
 log = logging.getLogger(__name__)
 
@@ -39,11 +39,11 @@ def read(folder: Path) -> Handover | None:
         defaults = json_format.ParseDict(
             document["defaults"], runner_pb2.RunnerSettings(), ignore_unknown_fields=True
         )
-        known_values.check(defaults)
+        enumerators.check(defaults)
         return Handover(defaults, {str(k): str(v) for k, v in document["graphs"].items()})
     except FileNotFoundError:
         return None
-    except (OSError, *regular_files.PARSE_ERRORS, Refusal):
+    except (OSError, *regular_files.PARSE_ERRORS, RequestError):
         log.warning("cannot use %s: runners stay as they are", file)
         return None
 

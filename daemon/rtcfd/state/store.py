@@ -23,9 +23,9 @@ from google.protobuf import json_format
 from rtcf.v1 import control_pb2, errors_pb2, graph_pb2, runner_pb2
 from rtcf_shared import whole_files
 
-from rtcfd.common import known_values, regular_files
+from rtcfd.common import enumerators, regular_files
+from rtcfd.common.errors import FailedPrecondition, RequestError
 from rtcfd.common.names import check_base_name, full_name
-from rtcfd.common.refusals import FailedPrecondition, Refusal
 from rtcfd.state import history
 from rtcfd.state.desired import Desired, HoldTerms, LeaseTerms, this_boot
 from rtcfd.state.history import ParameterChange
@@ -111,7 +111,7 @@ class Store:
                 self._set_aside(file, "unreadable", _UNREADABLE.format(error.strerror))
             except _Newer as newer:
                 self._set_aside(file, "newer", str(newer))
-            except (*regular_files.PARSE_ERRORS, Refusal) as error:
+            except (*regular_files.PARSE_ERRORS, RequestError) as error:
                 reason = " ".join(str(error).split())
                 self._set_aside(file, "corrupt", f"it is corrupt ({reason})")
             else:
@@ -408,7 +408,7 @@ def _parse(runner: str, document: _Document) -> Desired:
     desired.ended_boot = str(document.get("ended_boot", ""))
     for name, terms in document["leased"].items():
         desired.leased[name] = LeaseTerms(**terms)
-        known_values.check_value(
+        enumerators.check_value(
             control_pb2.OnLeaseLost.DESCRIPTOR, "on_lost", desired.leased[name].on_lost
         )
     if hold := document["hold"]:
@@ -416,7 +416,7 @@ def _parse(runner: str, document: _Document) -> Desired:
         desired.chosen = json_format.ParseDict(hold["settings"], runner_pb2.RunnerSettings())
     for message in (desired.chosen, desired.hold and desired.hold.parked):
         if message is not None:
-            known_values.check(message)
+            enumerators.check(message)
     for name, reason in document["quarantined"].items():
         desired.quarantine(name, str(reason))
     for name, reason in document["left_out"].items():

@@ -32,7 +32,7 @@ from rtcfd.executor.command import ExecutorCommand
 from rtcfd.executor.link import Link
 from rtcfd.executor.process import End
 from rtcfd.incidents.incidents import Incidents
-from rtcfd.operations.runner_core import Surroundings
+from rtcfd.operations.runner_core import SharedContext
 from rtcfd.runners.held_runners import await_holder
 from rtcfd.runners.runners import Runners
 from rtcfd.service.control import Control
@@ -164,7 +164,7 @@ class Rtcfd:
             return wire.ServiceAnswer(call=call.call)
 
         self.runners = Runners(
-            Surroundings(
+            SharedContext(
                 command=ExecutorCommand(Path("/nowhere"), sockets),
                 catalog=catalog,
                 disk=Disk(self.store),

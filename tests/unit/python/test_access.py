@@ -11,7 +11,7 @@ from rtcf_shared.enums import choices
 from rtcfd.access import calls, rights
 from rtcfd.access.peer import Peer
 from rtcfd.access.rights import Access, Level, Rule, require_pace
-from rtcfd.common.refusals import FailedPrecondition, PermissionDenied, Refusal
+from rtcfd.common.errors import FailedPrecondition, PermissionDenied, RequestError
 from rtcfd.configuration import settings_file
 from strangers import open_to_strangers, root_only, stranger
 
@@ -189,7 +189,7 @@ def test_a_number_changes_no_faster_than_its_rule_allows(
 def test_a_bad_rule_is_rejected(tmp_path: Path, text: str, said: str) -> None:
     file = tmp_path / "rtcfd.toml"
     file.write_text(f"[[access.parameters]]\n{text}\n")
-    with pytest.raises(Refusal) as refused:
+    with pytest.raises(RequestError) as refused:
         settings_file.read(file)
     assert said in str(refused.value)
 

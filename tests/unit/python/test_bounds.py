@@ -16,7 +16,7 @@ from rtcfd.access.calls import Level
 from rtcfd.access.clients import Usage
 from rtcfd.access.peer import Credentials, Directory, Peer
 from rtcfd.common.background import WorkerThreads
-from rtcfd.common.refusals import InvalidArgument, ResourceExhausted, Unavailable
+from rtcfd.common.errors import InvalidArgument, ResourceExhausted, Unavailable
 from rtcfd.common.status_codes import bounded
 from rtcfd.journal import LogThread
 from strangers import STRANGER, open_to_strangers, root_only, stranger

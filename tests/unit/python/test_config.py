@@ -11,8 +11,8 @@ import pytest
 from rtcf.v1 import runner_pb2
 from rtcfd.access.rights import Access
 from rtcfd.common import runner_settings
+from rtcfd.common.errors import RequestError
 from rtcfd.common.limits import Limits
-from rtcfd.common.refusals import Refusal
 from rtcfd.configuration import options, settings_file
 
 
@@ -116,7 +116,7 @@ RULES = (
 )
 def test_a_bad_file_is_rejected_by_name(tmp_path: Path, text: str, said: str) -> None:
     file = written(tmp_path, text)
-    with pytest.raises(Refusal) as refused:
+    with pytest.raises(RequestError) as refused:
         settings_file.read(file)
     assert said in str(refused.value)
     assert str(file) in str(refused.value)
@@ -134,7 +134,7 @@ def test_a_bad_file_is_rejected_by_name(tmp_path: Path, text: str, said: str) ->
 )
 def test_an_invalid_number_is_rejected(tmp_path: Path, text: str, key: str, number: str) -> None:
     file = written(tmp_path, text + number)
-    with pytest.raises(Refusal) as refused:
+    with pytest.raises(RequestError) as refused:
         settings_file.read(file)
     value = number.replace("1e400", "inf")
     assert str(refused.value) == f"{file}:{key} must be a finite number, not {value}"
@@ -166,7 +166,7 @@ def test_an_integer_beyond_64_bits_is_rejected_with_its_line(
     tmp_path: Path, text: str, digits: int, number: str
 ) -> None:
     file = written(tmp_path, text.format(number))
-    with pytest.raises(Refusal) as refused:
+    with pytest.raises(RequestError) as refused:
         settings_file.read(file)
     said = str(refused.value)
     assert said.startswith(f"{file}:{len(text.splitlines())}: ")
@@ -177,7 +177,7 @@ def test_an_integer_beyond_64_bits_is_rejected_with_its_line(
 def test_a_file_that_is_no_text_is_rejected(tmp_path: Path) -> None:
     file = tmp_path / "rtcfd.toml"
     file.write_bytes("[runner]".encode("utf-16"))
-    with pytest.raises(Refusal) as refused:
+    with pytest.raises(RequestError) as refused:
         settings_file.read(file)
     assert str(refused.value) == f"{file}: it is not UTF-8 text"
 
@@ -191,7 +191,7 @@ def test_anything_but_a_regular_file_is_rejected(
     odd(file)
     lines: list[list[str]] = [[], ["--config", str(file)]]
     for line in lines:
-        with odd_files.deadline(), pytest.raises(Refusal) as refused:
+        with odd_files.deadline(), pytest.raises(RequestError) as refused:
             options.parse(line, None)
         assert str(refused.value).startswith(f"cannot read {file}: ")
         assert "\n" not in str(refused.value)
@@ -232,7 +232,7 @@ def test_a_byte_order_mark_is_skipped(tmp_path: Path) -> None:
 
 
 def test_a_missing_cpu_is_rejected() -> None:
-    with pytest.raises(Refusal, match="CPU 4096"):
+    with pytest.raises(RequestError, match="CPU 4096"):
         runner_settings.check(runner_pb2.RunnerSettings(cpu=4096))
     runner_settings.check(runner_pb2.RunnerSettings(cpu=max(os.sched_getaffinity(0))))
 

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given, seed, settings
 from hypothesis import strategies as st
 from rtcf.v1 import control_pb2, errors_pb2
+from rtcfd.common.errors import NotFound
 from rtcfd.common.event_log import EventLog
-from rtcfd.common.refusals import NotFound
-from rtcfd.service.watching import watch
+from rtcfd.service.log_streams import watch
 
 KIND = control_pb2.Event.KIND_GRAPH
 

@@ -10,7 +10,7 @@ import pytest
 from daemon_under_test import DEADLINE_S
 from rtcfd.access import clients
 from rtcfd.access.calls import Level
-from rtcfd.access.clients import Clients, Doors
+from rtcfd.access.clients import Clients, GrpcSockets
 from rtcfd.common.limits import Limits
 
 
@@ -26,7 +26,7 @@ class Front:
         self._folder = folder
         self._last_words = last_words
         self.clients = Clients(
-            Doors(folder / "trusted", folder / "others"), Limits(), lambda _: level
+            GrpcSockets(folder / "trusted", folder / "others"), Limits(), lambda _: level
         )
         self.shown: list[str] = []  # per connection, as gRPC sees it
         self._writers: list[asyncio.StreamWriter] = []  # Python 3.13 closes lost writers

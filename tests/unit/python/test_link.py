@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from daemon_under_test import DEADLINE_S
 from rtcf.executor.v1 import executor_pb2 as wire
-from rtcfd.common import refusals
+from rtcfd.common import errors
 from rtcfd.executor.link import MAX_MESSAGE, PROTOCOL, Link, pack_message, read_message
 
 Peer = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
@@ -64,7 +64,7 @@ def test_a_timeout_is_unavailable(tmp_path: Path) -> None:
         await reader.read()
 
     async def test(link: Link) -> None:
-        with pytest.raises(refusals.Unavailable, match=r"did not answer get_status within 0\.01 s"):
+        with pytest.raises(errors.Unavailable, match=r"did not answer get_status within 0\.01 s"):
             await link.request(wire.Request(get_status=STATUS), 0.01)
 
     against(tmp_path, peer, test)
@@ -87,10 +87,10 @@ def test_a_broken_connection_fails_waiting_requests(tmp_path: Path, reply: bytes
         writer.close()
 
     async def test(link: Link) -> None:
-        with pytest.raises(refusals.Unavailable, match="the peer"):
+        with pytest.raises(errors.Unavailable, match="the peer"):
             await link.request(wire.Request(get_status=STATUS), DEADLINE_S)
         assert link.ended.is_set()
-        with pytest.raises(refusals.Unavailable, match="the peer"):
+        with pytest.raises(errors.Unavailable, match="the peer"):
             await link.request(wire.Request(get_status=STATUS), DEADLINE_S)
 
     against(tmp_path, peer, test)

@@ -15,7 +15,7 @@ import pytest
 import rtcf
 from daemon_under_test import BUILD_TREE, DEADLINE_S, DaemonUnderTest, wait_for
 from rtcf.v1 import control_pb2, runner_pb2
-from rtcfd.common.refusals import Unavailable
+from rtcfd.common.errors import Unavailable
 from rtcfd_in_process import Machine, Rtcfd
 
 RUNNING, STOPPED = runner_pb2.RUNNER_STATE_RUNNING, runner_pb2.RUNNER_STATE_STOPPED

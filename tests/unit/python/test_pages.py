@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, seed, settings
 from hypothesis import strategies as st
 from rtcf.v1 import control_pb2, graph_pb2
-from rtcfd.common.refusals import FailedPrecondition, InvalidArgument
+from rtcfd.common.errors import FailedPrecondition, InvalidArgument
 from rtcfd.service import pages
 from rtcfd.service.pages import page
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from rtcf.v1 import ports_pb2
-from rtcfd.common.refusals import InvalidArgument
+from rtcfd.common.errors import InvalidArgument
 from rtcfd.service import ports
 
 Response = ports_pb2.WatchPortsResponse

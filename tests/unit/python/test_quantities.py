@@ -10,7 +10,7 @@ from rtcf_shared.quantities import ROS, RUNNER, Quantity
 from rtcfctl.loop.runner import settings_of
 from rtcfctl.main import parser
 from rtcfd.common import runner_settings
-from rtcfd.common.refusals import InvalidArgument
+from rtcfd.common.errors import InvalidArgument
 
 TREE = Path(__file__).parents[3]
 EVERY = [

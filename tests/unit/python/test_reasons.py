@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 from rtcf import errors, failures
 from rtcf.refusals import BY_REASON
 from rtcf.v1 import errors_pb2
-from rtcfd.common import refusals, status_codes
-from rtcfd.common.refusals import Refusal
+from rtcfd.common import errors as daemon_errors
+from rtcfd.common import status_codes
+from rtcfd.common.errors import RequestError
 
 TREE = Path(__file__).resolve().parents[3]
 REASONS = [each.name for each in errors_pb2.Reason.DESCRIPTOR.values if each.number]
@@ -25,7 +26,7 @@ ON_STANDARD_ERROR = {"REASON_DAEMON_FAILED"}
 class _Failed(grpc.RpcError):  # type: ignore[misc]
     """gRPC's exception in a client."""
 
-    def __init__(self, refusal: Refusal) -> None:
+    def __init__(self, refusal: RequestError) -> None:
         self._refusal = refusal
 
     def code(self) -> grpc.StatusCode:
@@ -54,7 +55,7 @@ def test_reason_numbers_are_dense() -> None:
 
 
 def test_a_client_gets_the_exception_of_the_reason_with_its_subject() -> None:
-    refusal = refusals.NotFound(
+    refusal = daemon_errors.NotFound(
         "no runner", errors_pb2.REASON_RUNNER_NOT_FOUND, runner="arm", suggestion="arms", field=""
     )
     found = failures.from_grpc(_Failed(refusal), "/nowhere")
@@ -72,7 +73,7 @@ def test_an_unknown_reason_of_a_newer_rtcfd_is_still_an_error() -> None:
 
 @pytest.mark.parametrize("garbage", [b"\xff\xff", b"\x1a\x04\x12\x02ab", b"\x1a"])
 def test_damaged_details_keep_the_message(garbage: bytes, monkeypatch: pytest.MonkeyPatch) -> None:
-    failed = _Failed(refusals.NotFound("no such thing", errors_pb2.REASON_PORT_NOT_FOUND))
+    failed = _Failed(daemon_errors.NotFound("no such thing", errors_pb2.REASON_PORT_NOT_FOUND))
     monkeypatch.setattr(failed, "trailing_metadata", lambda: [(status_codes.DETAILS_KEY, garbage)])
     found = failures.from_grpc(failed, "/nowhere")
     assert isinstance(found, errors.RefusedError)
@@ -89,7 +90,7 @@ def test_damaged_details_keep_the_message(garbage: bytes, monkeypatch: pytest.Mo
     ),
 )
 def test_an_error_fits_into_any_clients_metadata(text: str, about: dict[str, str]) -> None:
-    refusal = refusals.NotFound(text, errors_pb2.REASON_PORT_NOT_FOUND, **about)
+    refusal = daemon_errors.NotFound(text, errors_pb2.REASON_PORT_NOT_FOUND, **about)
     line = quote(status_codes.bounded(refusal))
     details = status_codes.details(refusal)
     assert len(line) + (len(details) + 2) // 3 * 4 < 8 * 1024 - 512  # for other headers
@@ -133,7 +134,7 @@ def _googles_messages() -> Any:
 
 
 def test_googleapis_can_read_the_details_in_the_same_process() -> None:
-    refusal = refusals.AlreadyExists(
+    refusal = daemon_errors.AlreadyExists(
         "there already", errors_pb2.REASON_COMPONENT_EXISTS, runner="arm", component="/pid"
     )
     status_type, info_type = _googles_messages()

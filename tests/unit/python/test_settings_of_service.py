@@ -13,7 +13,7 @@ import odd_files
 import pytest
 import rtcf
 from daemon_under_test import BUILD_TREE, DaemonUnderTest
-from rtcfd.common.refusals import Refusal
+from rtcfd.common.errors import RequestError
 from rtcfd.configuration import options
 from rtcfd.configuration.last_good import Settings
 from rtcfd.journal import standing_alone
@@ -158,7 +158,7 @@ def test_an_empty_copy_grants_no_rights(tmp_path: Path) -> None:
     copy = tmp_path / "rtcfd.toml.last-good"
     settings.write_text(BAD)
     copy.touch()
-    with pytest.raises(Refusal, match="frequency_hz must be a number"):
+    with pytest.raises(RequestError, match="frequency_hz must be a number"):
         Settings.read(settings, tmp_path, last_good=True)
     # A file without settings has a copy, too, which is not an empty file.
     settings.write_text("")

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 from rtcf.v1 import errors_pb2, runner_pb2
-from rtcfd.common.refusals import Silent
+from rtcfd.common.errors import Silent
 from rtcfd.executor.executor import Executor
 from rtcfd.runners import runners
 from rtcfd.state.desired import Desired, HoldTerms

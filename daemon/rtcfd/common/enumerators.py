@@ -13,7 +13,7 @@ from rtcf.v1 import errors_pb2
 from rtcf_shared.enums import choices
 from rtcf_shared.naming import listing
 
-from rtcfd.common.refusals import InvalidArgument
+from rtcfd.common.errors import InvalidArgument
 
 
 def check(message: Message) -> None:

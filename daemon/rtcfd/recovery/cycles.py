@@ -12,8 +12,8 @@ from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, errors_pb2
 from rtcf_shared.naming import listing
 
+from rtcfd.common.errors import NotFound, RequestError
 from rtcfd.common.names import absolute
-from rtcfd.common.refusals import NotFound, Refusal
 from rtcfd.executor.link import Progress
 from rtcfd.operations.loop import asked_now, require_no_stop, start_in_turn
 from rtcfd.operations.runner_core import RunnerCore
@@ -76,7 +76,7 @@ async def step(
 async def _end_step(runner: RunnerCore, step: wire.Request, left: asyncio.Event) -> None:
     """End a running step at the next cycle boundary, once its caller has disconnected."""
     await left.wait()
-    with contextlib.suppress(Refusal):
+    with contextlib.suppress(RequestError):
         await runner.ask(wire.Request(end_step=wire.EndStep(step=step.id)))
 
 

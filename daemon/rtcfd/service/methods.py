@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from rtcf.v1 import control_pb2, errors_pb2
 
-from rtcfd.common.refusals import InvalidArgument
+from rtcfd.common.errors import InvalidArgument
 from rtcfd.common.status_codes import abort
 from rtcfd.executor.link import Progress
 from rtcfd.runners.outbox import Outbox
@@ -22,7 +22,7 @@ _LONGEST_SILENCE_S = 16.0
 Work = Callable[[Progress], Coroutine[Any, Any, Any]]
 
 
-def answering(method: Callable[..., Awaitable[Any]]) -> Any:
+def unary(method: Callable[..., Awaitable[Any]]) -> Any:
     """Convert errors of a unary method into statuses."""
 
     @functools.wraps(method)
@@ -35,7 +35,7 @@ def answering(method: Callable[..., Awaitable[Any]]) -> Any:
     return wrapper
 
 
-def lasting(response: Any, last: str) -> Callable[[Callable[..., Work]], Any]:
+def with_progress(response: Any, last: str) -> Callable[[Callable[..., Work]], Any]:
     """Stream the progress of a call as `response`, then its result in the field `last`.
 
     Converts an error into a status.  The method returns the work, which reports its progress.
@@ -80,7 +80,7 @@ async def _with_word_of_waiting(lines: "asyncio.Queue[str | None]") -> AsyncIter
         yield line
 
 
-class Tenancy(Protocol):
+class CallLease(Protocol):
     """The lease of a call, on a runner or a component."""
 
     async def open(self) -> None:
@@ -93,7 +93,7 @@ class Tenancy(Protocol):
         """Handle the loss of the caller's connection."""
 
 
-def holding(method: Callable[..., tuple[Outbox, Tenancy]]) -> Any:
+def with_lease(method: Callable[..., tuple[Outbox, CallLease]]) -> Any:
     """Serve a call that holds a lease.
 
     Its first message begins the lease; the message `end`, or the loss of the connection, ends it.
@@ -102,7 +102,7 @@ def holding(method: Callable[..., tuple[Outbox, Tenancy]]) -> Any:
     @functools.wraps(method)
     async def wrapper(self: Any, requests: Any, context: Any) -> AsyncIterator[Any]:
         tasks: list[asyncio.Future[None]] = []
-        tenancy: Tenancy | None = None
+        lease: CallLease | None = None
         opening_request: Any = None
         messages = aiter(requests)
         try:
@@ -113,31 +113,31 @@ def holding(method: Callable[..., tuple[Outbox, Tenancy]]) -> Any:
                     errors_pb2.REASON_REQUEST_MALFORMED,
                 )
             opening_request = first.open
-            outbox, tenancy = method(self, opening_request)
-            opening = asyncio.ensure_future(_open(tenancy, outbox))
-            tasks = [opening, asyncio.ensure_future(_listen(messages, opening, tenancy, outbox))]
+            outbox, lease = method(self, opening_request)
+            opening = asyncio.ensure_future(_open(lease, outbox))
+            tasks = [opening, asyncio.ensure_future(_listen(messages, opening, lease, outbox))]
             async for response in outbox:
                 yield response
         except Exception as error:
             await abort(context, error, opening_request)
         finally:
-            if tenancy is not None and not outbox.ended:
-                tenancy.lost()
+            if lease is not None and not outbox.ended:
+                lease.lost()
             for task in tasks:
                 task.cancel()
 
     return wrapper
 
 
-async def _open(tenancy: Tenancy, outbox: Outbox) -> None:
+async def _open(lease: CallLease, outbox: Outbox) -> None:
     try:
-        await tenancy.open()
+        await lease.open()
     except Exception as error:
-        outbox.refuse(error)
+        outbox.fail(error)
 
 
 async def _listen(
-    messages: AsyncIterator[Any], opening: "asyncio.Future[None]", tenancy: Tenancy, outbox: Outbox
+    messages: AsyncIterator[Any], opening: "asyncio.Future[None]", lease: CallLease, outbox: Outbox
 ) -> None:
     """Wait for the caller's `end`.
 
@@ -150,11 +150,11 @@ async def _listen(
         else:
             return
     except Exception as error:  # a message was rejected
-        outbox.refuse(error)
+        outbox.fail(error)
         return
     await asyncio.wait({opening})
     try:
-        await tenancy.end()
+        await lease.end()
     except Exception as error:
-        outbox.refuse(error)
+        outbox.fail(error)
     outbox.end(control_pb2.LeaseEnded.WHY_ASKED)

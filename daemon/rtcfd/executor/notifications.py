@@ -53,7 +53,7 @@ _LATE_LONGEST_S = 3600.0
 _REPORT_S = 1.0  # from the first dropped record to the line with their number
 
 
-class Audience(Protocol):
+class Listener(Protocol):
     """Receives the notifications: the Runner."""
 
     def loop_ended(self, component: str, reason: str) -> None:
@@ -81,12 +81,12 @@ class Audience(Protocol):
         """A ROS node has changed parameters of a component."""
 
 
-class Events:
+class Notifications:
     """The notifications of one runner's executor."""
 
-    def __init__(self, runner: str, audience: Audience, limits: Callable[[], Limits]) -> None:
+    def __init__(self, runner: str, listener: Listener, limits: Callable[[], Limits]) -> None:
         self._runner = runner
-        self._audience = audience
+        self._listener = listener
         self._limits = limits
         self._budget = Budget(limits().log_records_per_s)
         self._report: asyncio.TimerHandle | None = None  # on dropped records
@@ -100,16 +100,16 @@ class Events:
         elif kind == "event":
             self._event(response.event)
         elif kind == "service_call":
-            self._audience.called(response.service_call)
+            self._listener.called(response.service_call)
         elif kind == "parameters_changed":
-            self._audience.parameters_changed(response.parameters_changed)
+            self._listener.parameters_changed(response.parameters_changed)
         elif kind == "direct_stop":
-            self._audience.stopped_directly(response.direct_stop)
+            self._listener.stopped_directly(response.direct_stop)
         elif kind == "error":
             log.error("%s", response.error.message, extra={"runner": self._runner})
 
     def _log(self, record: wire.LogRecord) -> None:
-        self._audience.take_log(record)
+        self._listener.take_log(record)
         level = _LEVELS.get(record.level, logging.INFO)
         # A component that logs in each cycle must not fill the disk.
         self._budget.per_s = self._limits().log_records_per_s
@@ -166,13 +166,13 @@ class Events:
                 },
             )
         if event.kind == wire.Event.KIND_LOOP_ENDED:
-            self._audience.loop_ended(event.component, event.message)
+            self._listener.loop_ended(event.component, event.message)
         elif event.kind == wire.Event.KIND_COMPONENT_FAILED:
-            self._audience.component_failed(event.component, event.message)
+            self._listener.component_failed(event.component, event.message)
         elif event.kind == wire.Event.KIND_OVERRUNS:
-            self._audience.late(event.message)
+            self._listener.late(event.message)
         if (kind := _KINDS.get(event.kind)) is not None:
-            self._audience.told(kind, event)
+            self._listener.told(kind, event)
 
 
 def logger_of(runner: str) -> "logging.LoggerAdapter[logging.Logger]":

@@ -22,7 +22,7 @@ class _Told:
     overruns: int
 
 
-class Figures:
+class LoopCounters:
     """The counts to subtract from the status, and the last report of late cycles."""
 
     def __init__(self) -> None:

@@ -7,8 +7,8 @@ import pytest
 from peer_executor import Peer
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import runner_pb2
-from rtcfd.executor.link import FIGURES_PROTOCOL
-from rtcfd.operations.figures import Figures
+from rtcfd.executor.link import STATISTICS_PROTOCOL
+from rtcfd.operations.loop_counters import LoopCounters
 from rtcfd_in_process import Rtcfd, SlowPeer, control_pb2
 
 
@@ -19,13 +19,13 @@ def status(iteration: int, overruns: int, missed: int = 0) -> runner_pb2.RunnerS
     )  # fmt: skip
 
 
-def shown(counts: Figures, found: runner_pb2.RunnerStatus) -> tuple[int, int, str]:
+def shown(counts: LoopCounters, found: runner_pb2.RunnerStatus) -> tuple[int, int, str]:
     counts.put_into(found)
     return found.overruns, found.missed, found.late
 
 
 def test_status_and_statistics_of_an_older_executor_have_the_same_start() -> None:
-    counts = Figures()
+    counts = LoopCounters()
     counts.leave_out(status(0, 7, 9), runner_pb2.RunnerStatistics(overruns=0, missed=0))
     assert shown(counts, status(100, 8, 12))[:2] == (1, 3)
     # For an adopted executor, its statistics determine the start.
@@ -33,7 +33,7 @@ def test_status_and_statistics_of_an_older_executor_have_the_same_start() -> Non
     assert shown(counts, status(200, 9, 12))[:2] == (4, 5)
 
 
-@pytest.mark.parametrize("protocol", [FIGURES_PROTOCOL - 1, FIGURES_PROTOCOL])
+@pytest.mark.parametrize("protocol", [STATISTICS_PROTOCOL - 1, STATISTICS_PROTOCOL])
 def test_a_reset_is_one_request_if_the_executor_supports_it(
     rtcfd: Callable[[], Rtcfd], monkeypatch: pytest.MonkeyPatch, protocol: int
 ) -> None:
@@ -62,9 +62,9 @@ def test_a_reset_is_one_request_if_the_executor_supports_it(
         await life.call("ResetStatistics", control_pb2.ResetStatisticsRequest())
         one = ["reset_statistics"]
         old = [*one, "get_status", "get_statistics"]  # one more overrun each
-        assert asked == (old if protocol < FIGURES_PROTOCOL else one)
+        assert asked == (old if protocol < STATISTICS_PROTOCOL else one)
         late[0] += 3
-        left_out = 7 - 1 if protocol < FIGURES_PROTOCOL else 0
+        left_out = 7 - 1 if protocol < STATISTICS_PROTOCOL else 0
         assert (await runner.status()).overruns == 10 - left_out
         await life.runners.close(in_order=False)
 
@@ -77,8 +77,8 @@ def test_only_a_constantly_late_loop_raises_the_alarm(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     clock = [100.0]
-    monkeypatch.setattr("rtcfd.operations.figures.time.monotonic", lambda: clock[0])
-    counts = Figures()
+    monkeypatch.setattr("rtcfd.operations.loop_counters.time.monotonic", lambda: clock[0])
+    counts = LoopCounters()
     said = "400 cycles ended late in 10 s, most of them in /slow"
     counts.told_of_late_cycles(status(1000, 1), "1 cycle ended late")
     assert shown(counts, status(1000, 1))[2] == ""

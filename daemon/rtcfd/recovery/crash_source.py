@@ -7,7 +7,7 @@ import asyncio
 
 from rtcf.v1 import control_pb2
 
-from rtcfd.common.refusals import Unavailable
+from rtcfd.common.errors import Unavailable
 from rtcfd.executor import source_lines
 from rtcfd.executor.flight_recorder import Trace
 from rtcfd.operations.runner_core import RunnerCore
@@ -16,7 +16,7 @@ from rtcfd.recovery.verdict import Verdict
 _TIMEOUT_S = 15.0  # for all files
 
 
-async def name_source(runner: RunnerCore, trace: Trace, verdict: Verdict) -> None:
+async def report_source(runner: RunnerCore, trace: Trace, verdict: Verdict) -> None:
     """Find the source lines of a crash, if there is debug information, and report them."""
     # Read the files first: the next executor is about to load its libraries.
     loaded = {path for path, *_ in runner.code.files().values()}

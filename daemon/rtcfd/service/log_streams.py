@@ -8,9 +8,9 @@ from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, errors_pb2
 from rtcf_shared.naming import closest, listing, suggestion
 
+from rtcfd.common.errors import NotFound
 from rtcfd.common.event_log import Entry, EventLog, NumberedLog
 from rtcfd.common.names import absolute
-from rtcfd.common.refusals import NotFound
 from rtcfd.runners.runner import Runner
 
 _BATCH = 200

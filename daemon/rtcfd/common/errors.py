@@ -7,7 +7,7 @@ statuses; executor/link.py creates them from the executor's errors.
 from rtcf.v1 import errors_pb2
 
 
-class Refusal(Exception):
+class RequestError(Exception):
     """A request failed.  The text gives the cause, the names, and the remedy.
 
     For programs, `reason` gives the code (see errors.proto), and `about` the names, by the
@@ -20,19 +20,19 @@ class Refusal(Exception):
         self.about = {key: value for key, value in about.items() if value}
 
 
-class InvalidArgument(Refusal):
+class InvalidArgument(RequestError):
     """The request itself is malformed."""
 
 
-class NotFound(Refusal):
+class NotFound(RequestError):
     """There is no such runner, component, port, package or type."""
 
 
-class AlreadyExists(Refusal):
+class AlreadyExists(RequestError):
     """A runner or component of that name exists already."""
 
 
-class FailedPrecondition(Refusal):
+class FailedPrecondition(RequestError):
     """The state of the graph, a library, a hook or the machine does not allow it."""
 
 
@@ -40,7 +40,7 @@ class NoMaster(FailedPrecondition):
     """A hook needs a ROS master, but none answers."""
 
 
-class Unavailable(Refusal):
+class Unavailable(RequestError):
     """The executor does not answer."""
 
 
@@ -48,13 +48,13 @@ class Silent(Unavailable):
     """The executor runs, and perhaps its loop, but it does not answer."""
 
 
-class PermissionDenied(Refusal):
+class PermissionDenied(RequestError):
     """The caller lacks the right."""
 
 
-class ResourceExhausted(Refusal):
+class ResourceExhausted(RequestError):
     """A limit of the settings is reached."""
 
 
-class Internal(Refusal):
+class Internal(RequestError):
     """A fault of rtcfd itself."""

@@ -10,8 +10,8 @@ from daemon_under_test import DaemonUnderTest
 from google.protobuf.descriptor import Descriptor, FieldDescriptor
 from google.protobuf.message_factory import MessageFactory
 from rtcf.v1 import control_pb2, runner_pb2
-from rtcfd.common import known_values
-from rtcfd.common.refusals import InvalidArgument
+from rtcfd.common import enumerators
+from rtcfd.common.errors import InvalidArgument
 
 UNKNOWN: Any = 99  # not a value of any enumeration
 REQUESTS = [
@@ -19,7 +19,7 @@ REQUESTS = [
 ]
 
 
-def enumerators(
+def enum_fields(
     message: Descriptor, above: tuple[str, ...] = ()
 ) -> Iterator[list[FieldDescriptor]]:
     """Yield the path to each enumerator of a message."""
@@ -27,7 +27,7 @@ def enumerators(
         if field.enum_type is not None:
             yield [field]
         elif field.message_type is not None and field.message_type.full_name not in above:
-            for rest in enumerators(field.message_type, (*above, message.full_name)):
+            for rest in enum_fields(field.message_type, (*above, message.full_name)):
                 yield [field, *rest]
 
 
@@ -52,15 +52,15 @@ def with_value(request: Descriptor, way: list[FieldDescriptor], value: int) -> A
 
 @pytest.mark.parametrize("request_type", REQUESTS, ids=lambda each: str(each.name))
 def test_each_enumerator_of_a_request_is_checked(request_type: Descriptor) -> None:
-    for way in enumerators(request_type):
+    for way in enum_fields(request_type):
         with pytest.raises(InvalidArgument, match=f"{way[-1].name} {UNKNOWN} is not known"):
-            known_values.check(with_value(request_type, way, UNKNOWN))
+            enumerators.check(with_value(request_type, way, UNKNOWN))
         for known in way[-1].enum_type.values_by_number:
-            known_values.check(with_value(request_type, way, known))
+            enumerators.check(with_value(request_type, way, known))
 
 
 def test_requests_have_enumerators() -> None:
-    assert sum(len(list(enumerators(each))) for each in REQUESTS) > 20
+    assert sum(len(list(enum_fields(each))) for each in REQUESTS) > 20
 
 
 def test_an_unknown_setting_is_rejected_and_not_stored(
