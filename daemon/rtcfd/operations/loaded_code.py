@@ -18,6 +18,7 @@ from rtcfd.common import regular_files
 from rtcfd.common.background import WorkerThreads
 from rtcfd.common.errors import Unavailable
 from rtcfd.common.names import absolute, full_name
+from rtcfd.common.regular_files import PARSE_ERRORS
 
 _Kinds = control_pb2.Difference
 _Identity = tuple[int, int, int]  # inode, modification time, size
@@ -106,7 +107,7 @@ class LoadedCode:
     def restore(self, file: Path) -> None:
         """Load the files that the previous rtcfd saved."""
         self._files = {}
-        with contextlib.suppress(OSError, *regular_files.PARSE_ERRORS):
+        with contextlib.suppress(OSError, *PARSE_ERRORS):
             found = json.loads(regular_files.read_bytes(file))
             self._files = {
                 str(name): (str(path), (int(then[0]), int(then[1]), int(then[2])))

@@ -17,6 +17,7 @@ from rtcf_shared import whole_files
 
 from rtcfd.common import enumerators, regular_files
 from rtcfd.common.errors import RequestError
+from rtcfd.common.regular_files import PARSE_ERRORS
 
 log = logging.getLogger(__name__)
 
@@ -43,7 +44,7 @@ def read(folder: Path) -> Handover | None:
         return Handover(defaults, {str(k): str(v) for k, v in document["graphs"].items()})
     except FileNotFoundError:
         return None
-    except (OSError, *regular_files.PARSE_ERRORS, RequestError):
+    except (OSError, *PARSE_ERRORS, RequestError):
         log.warning("cannot use %s: runners stay as they are", file)
         return None
 

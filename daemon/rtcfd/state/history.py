@@ -15,7 +15,7 @@ from typing import Any
 from google.protobuf import json_format
 from rtcf.v1 import graph_pb2
 
-from rtcfd.common import regular_files
+from rtcfd.common.regular_files import PARSE_ERRORS
 
 MOST_OF_A_COMPONENT = 200
 MOST = 4000
@@ -128,7 +128,7 @@ class History:
             self._bytes_on_disk += len(line)
             try:
                 change = _change(line)
-            except regular_files.PARSE_ERRORS:
+            except PARSE_ERRORS:
                 continue
             self._put(change)
             self._last = max(self._last, change.number)

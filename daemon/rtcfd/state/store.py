@@ -26,6 +26,7 @@ from rtcf_shared import whole_files
 from rtcfd.common import enumerators, regular_files
 from rtcfd.common.errors import FailedPrecondition, RequestError
 from rtcfd.common.names import check_base_name, full_name
+from rtcfd.common.regular_files import PARSE_ERRORS
 from rtcfd.state import history
 from rtcfd.state.desired import Desired, HoldTerms, LeaseTerms, this_boot
 from rtcfd.state.history import ParameterChange
@@ -111,7 +112,7 @@ class Store:
                 self._set_aside(file, "unreadable", _UNREADABLE.format(error.strerror))
             except _Newer as newer:
                 self._set_aside(file, "newer", str(newer))
-            except (*regular_files.PARSE_ERRORS, RequestError) as error:
+            except (*PARSE_ERRORS, RequestError) as error:
                 reason = " ".join(str(error).split())
                 self._set_aside(file, "corrupt", f"it is corrupt ({reason})")
             else:

@@ -85,7 +85,7 @@ def test_unreadable_settings_block_no_restart(
 ) -> None:
     daemon = stopped_daemon
     # The lock would last as long as this test process.
-    monkeypatch.setattr(store, "lock", lambda _: None)
+    monkeypatch.setattr(store, "_lock", lambda _: None)
     daemon.settings.touch()
     daemon.graphs.mkdir()
     given = options.parse(
