@@ -4,6 +4,7 @@ components keep their values."""
 import json
 
 import fig_1
+import pytest
 import rtcf
 from daemon_process import Daemon, wait_for
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
@@ -154,3 +155,35 @@ def test_a_replacement_starts_with_defaults_if_requested(
     done = daemon.ctl("replace", "knobs", "rtcf_test", "Knobs", "--reset-parameters")
     assert (done.stdout, done.stderr) == ("replaced knobs by /knobs\n", "")
     assert _values(client, "knobs")["rate"] == 1.5
+
+
+def test_derived_values_change_in_the_same_cycle_as_the_frequency(client: rtcf.Client) -> None:
+    client.load(rtcf.component("rtcf_test", "Sampled", name="fast"))
+    client.load(rtcf.component("rtcf_test", "Sampled", name="slow", every=3,
+                               remaps=["design:=/slow_design"]))  # fmt: skip
+    client.start()
+    for frequency in (250.0, 2000.0, 500.0):
+        client.set_runner(runner_pb2.RunnerSettings(frequency_hz=frequency))
+        wait_until_after(client, iteration(client) + 20)
+        for name, every in (("fast", 1), ("slow", 3)):
+            found = client.get_component(name)
+            assert [each.value for each in found.states] == ["0"], f"{name}: another period's value"
+            assert port_value(client, name, "design") == every * round(1e9 / frequency)
+
+
+def test_a_frequency_that_a_component_cannot_have_is_rejected(client: rtcf.Client) -> None:
+    client.load(rtcf.component("rtcf_test", "Sampled", name="other",
+                               remaps=["design:=/other_design"]))  # fmt: skip
+    client.load(
+        rtcf.component("rtcf_test", "Sampled", name="strict", parameters=["longest:=0.002"])
+    )
+    client.start()
+    with pytest.raises(rtcf.RefusedError, match="strict.*5000000 ns is too long a period"):
+        client.set_runner(runner_pb2.RunnerSettings(frequency_hz=200.0))
+    wait_until_after(client, iteration(client) + 20)
+    assert client.get_status("rt_runner").runners[0].settings.frequency_hz == 1000.0
+    client.set_parameters("strict", [rtcf.parse_parameter("longest:=0.005")])
+    client.set_runner(runner_pb2.RunnerSettings(frequency_hz=200.0))
+    wait_until_after(client, iteration(client) + 20)
+    for name in ("other", "strict"):
+        assert [each.value for each in client.get_component(name).states] == ["0"]

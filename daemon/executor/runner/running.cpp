@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <rtcf/design_period.hpp>
 
 #include "common/refusal.hpp"
 #include "common/time_units.hpp"
@@ -19,6 +20,19 @@ void addTexts(RealtimeProblems problems, std::vector<std::string>& texts) {
     }
 }
 
+// Lets a component compute the values that depend on its period for another one.
+void stagePeriod(Instance& instance, std::int64_t loop_period_ns,
+                 std::vector<StagedValue*>& values) {
+    for (DerivedBase* derived : instance.component().derived()) {
+        auto* const period = dynamic_cast<DesignPeriod*>(derived);
+        if (period == nullptr) continue;
+        period->propose(loop_period_ns * instance.definition().every);
+        const std::vector<StagedValue*> staged = instance.stageParameters({});
+        values.insert(values.end(), staged.begin(), staged.end());
+        return;
+    }
+}
+
 }  // namespace
 
 void Runner::configure(RunnerSettings settings) {
@@ -27,10 +41,14 @@ void Runner::configure(RunnerSettings settings) {
     try {
         Change change;
         change.graph = plan_->graph;
-        if (settings_.loop.period_ns != previous.loop.period_ns)
+        if (settings_.loop.period_ns != previous.loop.period_ns) {
             change.period_ns = settings_.loop.period_ns;
+            for (const GraphNode& node : change.graph.nodes())
+                stagePeriod(*node.instance, change.period_ns, change.values);
+        }
         adopt(std::move(change), [](const std::string&) {});
     } catch (...) {
+        for (const GraphNode& node : plan_->graph.nodes()) node.instance->releaseStaged();
         settings_ = previous;
         throw;
     }
