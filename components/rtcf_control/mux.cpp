@@ -1,28 +1,15 @@
 #include <Eigen/Core>
 
-#include <array>
 #include <cstddef>
-#include <memory>
 #include <string>
 
 #include <rtcf/component.hpp>
 #include <rtcf/eigen_type.hpp>
 
+#include "port_array.hpp"
+
 namespace rtcf_control {
 namespace {
-
-// The elements of a port array, "in1" to "in<Size>".
-template <typename Port, std::size_t Size>
-using Ports = std::array<std::unique_ptr<Port>, Size>;
-
-template <typename Port, std::size_t Size, typename... Options>
-Ports<Port, Size> makePorts(rtcf::Component* owner, const std::string& name,
-                            const Options&... options) {
-    Ports<Port, Size> ports;
-    for (std::size_t i = 0; i < Size; ++i)
-        ports[i] = std::make_unique<Port>(owner, name + std::to_string(i + 1), options...);
-    return ports;
-}
 
 template <std::size_t Size>
 using Vector = Eigen::Matrix<double, static_cast<int>(Size), 1>;

@@ -33,6 +33,21 @@ components:
 """
 
 
+_LQG = """\
+components:
+  - {name: plant, package: rtcf_control, type: StateSpace, breaks: [in1],
+     remaps: {in1: /force, out1: /position, out2: /angle},
+     parameters: {A: "0 1 0 0; 0 -0.1 2 0; 0 0 0 1; 0 -0.3 30 0", B: "0; 1; 0; 3",
+                  C: "1 0 0 0; 0 0 1 0", initial: "0 0 0.05 0"}}
+  - {name: controller, package: rtcf_control, type: StateSpace,
+     remaps: {measured1: /position, measured2: /angle, out1: /force},
+     parameters: {A: "0 1 0 0; 0 -0.1 2 0; 0 0 0 1; 0 -0.3 30 0", B: "0; 1; 0; 3",
+                  C: "1 0 0 0; 0 0 1 0", role: lqg, tracked: "1",
+                  process_noise: "0.01 1 0.01 1", measurement_noise: "1e-4",
+                  state_cost: "10 1 10 1", input_cost: "0.1"}}
+"""
+
+
 def drawn(title: str, values: Any, marks: Mapping[float, str]) -> str:
     """Return a curve from its first value on."""
     return "\n".join(pictures.drawn(title, [values[np.isfinite(values)]], marks))
@@ -98,9 +113,32 @@ def _motor(_: Path) -> str:
     )
 
 
+def _state_space(folder: Path) -> str:
+    file = folder / "loop.yaml"
+    file.write_text(_LQG)
+    with Bench(str(file), path=PATH) as bench:
+        setpoint = np.where(np.arange(16000) < 8000, 0.0, 0.3)
+        found = bench.run({"/controller.in1": setpoint})
+    marks = {0.0: "0 s: angle 0.05", 0.5: "8 s: setpoint 0.3", 1.0: "16 s"}
+    names = {"position in m": "/plant.out1", "angle in rad": "/plant.out2"}
+    return "\n\n".join(drawn(title, found[name], marks) for title, name in names.items())
+
+
+def _kalman_filter(_: Path) -> str:
+    with Bench("rtcf_control/KalmanFilter", path=PATH, A="0 1; 0 0", B="", C="1 0",
+               process_noise="0 1", measurement_noise="1e-4") as bench:  # fmt: skip
+        cycles = np.arange(1200)
+        missing = (cycles % 20 != 0) | ((cycles >= 500) & (cycles < 800))
+        found = bench.run({"measured1": MASKED.array(np.zeros(1200), mask=missing)})
+    marks = {0.0: "0.2 s", 0.3: "0.5 s", 0.6: "0.8 s", 1.0: "1.2 s"}
+    return drawn("deviation1", found["deviation1"][200:], marks)
+
+
 PLOTS: dict[str, tuple[str, Callable[[Path], str]]] = {
     "pid": ("pid.md", _pid),
     "biquads": ("biquads.md", _biquads),
+    "state-space": ("state_space.md", _state_space),
+    "kalman-filter": ("kalman_filter.md", _kalman_filter),
     "trajectory": ("trajectory.md", _trajectory),
     "joint-limiter": ("safety.md", _joint_limiter),
     "motor": ("motor.md", _motor),

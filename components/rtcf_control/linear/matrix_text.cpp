@@ -1,0 +1,167 @@
+#include "linear/matrix_text.hpp"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <cstdlib>
+#include <sstream>
+
+namespace rtcf_control {
+namespace {
+
+// Relative to the largest element: symmetry of a matrix, and eigenvalues that count as 0.
+constexpr double kRounding = 1e-9;
+
+std::vector<std::string> words(const std::string& text) {
+    std::string spaced = text;
+    std::replace(spaced.begin(), spaced.end(), ',', ' ');
+    std::istringstream stream(spaced);
+    std::vector<std::string> found;
+    for (std::string word; stream >> word;) found.push_back(word);
+    return found;
+}
+
+// Returns empty, or the text that is not a finite number.
+std::string readNumbers(const std::string& text, std::vector<double>& numbers) {
+    for (const std::string& word : words(text)) {
+        char* end = nullptr;
+        numbers.push_back(std::strtod(word.c_str(), &end));
+        if (*end != '\0' || !std::isfinite(numbers.back())) return word;
+    }
+    return {};
+}
+
+}  // namespace
+
+std::string readMatrix(const std::string& text, Eigen::MatrixXd& matrix) {
+    std::vector<std::vector<double>> rows;
+    std::istringstream lines(text);
+    for (std::string line; std::getline(lines, line, ';');) {
+        std::vector<double> row;
+        if (const std::string wrong = readNumbers(line, row); !wrong.empty())
+            return fmt::format("{} is not a number; write rows as in \"0 1; -4 -0.5\"", wrong);
+        if (row.empty()) continue;
+        if (!rows.empty() && row.size() != rows[0].size())
+            return fmt::format("row {} has {} numbers, and row 1 has {}", rows.size() + 1,
+                               row.size(), rows[0].size());
+        rows.push_back(std::move(row));
+    }
+    const auto most = static_cast<std::size_t>(kMostStates);
+    if (rows.size() > most || (!rows.empty() && rows[0].size() > most))
+        return fmt::format("{} x {} is larger than {} x {}", rows.size(), rows[0].size(), most,
+                           most);
+    matrix.resize(static_cast<Eigen::Index>(rows.size()),
+                  rows.empty() ? 0 : static_cast<Eigen::Index>(rows[0].size()));
+    for (Eigen::Index i = 0; i < matrix.rows(); ++i) {
+        for (Eigen::Index j = 0; j < matrix.cols(); ++j)
+            matrix(i, j) = rows[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
+    }
+    return {};
+}
+
+std::string readSystem(const SystemText& text, Eigen::MatrixXd& a, Eigen::MatrixXd& b,
+                       Eigen::MatrixXd& c, Eigen::MatrixXd& d) {
+    const auto read = [](const char* name, const std::string& given, Eigen::MatrixXd& matrix) {
+        const std::string error = readMatrix(given, matrix);
+        return error.empty() ? error : fmt::format("{}: {}", name, error);
+    };
+    if (std::string error = read("A", text.a, a); !error.empty()) return error;
+    if (std::string error = read("B", text.b, b); !error.empty()) return error;
+    if (std::string error = read("C", text.c, c); !error.empty()) return error;
+    if (std::string error = read("D", text.d, d); !error.empty()) return error;
+    if (a.rows() != a.cols())
+        return fmt::format("A is {} x {}, and not square", a.rows(), a.cols());
+    if (a.rows() == 0) {
+        if (b.size() != 0 || c.size() != 0) return "A is empty, so B and C must be empty, too";
+        if (d.size() == 0) return "A and D are empty: there is nothing to compute";
+        b.resize(0, d.cols());
+        c.resize(d.rows(), 0);
+        return {};
+    }
+    if (b.size() == 0) b = Eigen::MatrixXd::Zero(a.rows(), d.cols());
+    if (b.rows() != a.rows()) return fmt::format("B has {} rows, and A has {}", b.rows(), a.rows());
+    if (c.size() == 0) c = Eigen::MatrixXd::Identity(a.rows(), a.rows());
+    if (c.cols() != a.cols())
+        return fmt::format("C has {} columns, and A has {}", c.cols(), a.cols());
+    if (d.size() == 0) d = Eigen::MatrixXd::Zero(c.rows(), b.cols());
+    if (d.rows() != c.rows() || d.cols() != b.cols())
+        return fmt::format("D is {} x {}; C and B need {} x {}", d.rows(), d.cols(), c.rows(),
+                           b.cols());
+    return {};
+}
+
+std::string readWeight(const std::string& text, int size, bool definite, Eigen::MatrixXd& matrix) {
+    Eigen::MatrixXd given;
+    if (std::string error = readMatrix(text, given); !error.empty()) return error;
+    if (given.rows() == size && given.cols() == size) {
+        matrix = given;
+    } else if (given.rows() == 1 && given.cols() == size) {
+        matrix = given.row(0).asDiagonal();
+    } else if (given.size() == 1) {
+        matrix = given(0, 0) * Eigen::MatrixXd::Identity(size, size);
+    } else {
+        return fmt::format("{} x {} numbers; write 1, {} or {} x {}", given.rows(), given.cols(),
+                           size, size, size);
+    }
+    if (size == 0) return {};
+    const double scale = matrix.cwiseAbs().maxCoeff();
+    if ((matrix - matrix.transpose()).cwiseAbs().maxCoeff() > kRounding * scale)
+        return "the matrix is not symmetric";
+    matrix = (0.5 * (matrix + matrix.transpose())).eval();
+    const double lowest =
+        Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(matrix, Eigen::EigenvaluesOnly)
+            .eigenvalues()
+            .minCoeff();
+    if (definite && lowest <= 0.0)
+        return fmt::format("the eigenvalue {:.6g} is not above 0", lowest);
+    if (lowest < -kRounding * scale) return fmt::format("the eigenvalue {:.6g} is below 0", lowest);
+    return {};
+}
+
+std::string readVector(const std::string& text, int size, Eigen::VectorXd& vector) {
+    std::vector<double> numbers;
+    if (const std::string wrong = readNumbers(text, numbers); !wrong.empty())
+        return fmt::format("{} is not a number", wrong);
+    const auto count = static_cast<std::size_t>(size);
+    if (numbers.size() != 1 && numbers.size() != count)
+        return fmt::format("{} numbers; write {}, or one for all", numbers.size(), size);
+    vector.resize(size);
+    for (Eigen::Index i = 0; i < size; ++i)
+        vector[i] = numbers[numbers.size() == 1 ? 0 : static_cast<std::size_t>(i)];
+    return {};
+}
+
+std::string readPoles(const std::string& text, std::vector<std::complex<double>>& poles) {
+    for (const std::string& word : words(text)) {
+        char* end = nullptr;
+        const double first = std::strtod(word.c_str(), &end);
+        std::complex<double> pole(first, 0.0);
+        if (*end == 'j') {
+            pole = {0.0, first};
+            ++end;
+        } else if (*end == '+' || *end == '-') {
+            const char* const begin = end;
+            pole.imag(std::strtod(begin, &end));
+            if (end == begin || *end != 'j')
+                end = const_cast<char*>("?");
+            else
+                ++end;
+        }
+        if (*end != '\0' || !std::isfinite(std::abs(pole)))
+            return fmt::format("{} is not a number; write poles as in \"-3 -2+1j -2-1j\"", word);
+        poles.push_back(pole);
+    }
+    for (const std::complex<double>& pole : poles) {
+        if (std::count(poles.begin(), poles.end(), pole) !=
+            std::count(poles.begin(), poles.end(), std::conj(pole)))
+            return fmt::format("{}{:+}j has no conjugate {}{:+}j", pole.real(), pole.imag(),
+                               pole.real(), -pole.imag());
+    }
+    return {};
+}
+
+}  // namespace rtcf_control
