@@ -33,7 +33,7 @@ from rtcfd.notify import Notify, machine_goes_down
 from rtcfd.operations.runner_core import SharedContext
 from rtcfd.reload import Reloads
 from rtcfd.runners import ros_services
-from rtcfd.runners.held_runners import await_holder
+from rtcfd.runners.runner_leases import await_holder
 from rtcfd.runners.runners import Runners
 from rtcfd.service.control import Control
 from rtcfd.state import handover

@@ -66,7 +66,7 @@ class Config:
 SettingsError = Callable[[Config], str]
 
 
-class _Wrong(InvalidArgument):
+class _InvalidKey(InvalidArgument):
     """An error in the value of a key."""
 
     def __init__(self, key: str, text: str) -> None:
@@ -113,8 +113,8 @@ def read(file: Path, settings_error: SettingsError = lambda _: "") -> Config:
         _read_message(_table(document, "runner"), "runner", config.runner)
         _check_runner(config.runner)
         if config.runner.ListFields() and (reason := settings_error(config)):
-            raise _Wrong(_key(reason), reason)
-    except _Wrong as wrong:
+            raise _InvalidKey(_key(reason), reason)
+    except _InvalidKey as wrong:
         lines = _lines_of_keys(text)
         # A missing key, or one of an inline table, has the line of its table.
         line = lines.get(wrong.key) or lines.get(wrong.key.rpartition(".")[0])
@@ -146,9 +146,9 @@ def _check_numbers(value: Any, key: str) -> None:
         for number, each in enumerate(value):
             _check_numbers(each, f"{key}[{number}]" if isinstance(each, dict) else key)
     elif isinstance(value, int) and value not in _INTEGERS:
-        raise _Wrong(key, f"{key}: an integer does not fit into 64 bits")
+        raise _InvalidKey(key, f"{key}: an integer does not fit into 64 bits")
     elif isinstance(value, float) and not math.isfinite(value):
-        raise _Wrong(key, f"{key} must be a finite number, not {value}")
+        raise _InvalidKey(key, f"{key} must be a finite number, not {value}")
 
 
 def _read_daemon(table: dict[str, Any], config: Config) -> None:
@@ -158,7 +158,7 @@ def _read_daemon(table: dict[str, Any], config: Config) -> None:
             setattr(config, name, _absolute_path(f"daemon.{name}", table[name]))
     folders = table.get("path", [])
     if not isinstance(folders, list):
-        raise _Wrong("daemon.path", "daemon.path must be a list of folders")
+        raise _InvalidKey("daemon.path", "daemon.path must be a list of folders")
     config.path = [_absolute_path("daemon.path", folder) for folder in folders]
     if "realtime" in table:
         _enumerator("daemon.realtime", runner_pb2.Realtime.DESCRIPTOR, table["realtime"])
@@ -175,17 +175,19 @@ def _read_access(table: dict[str, Any], config: Config) -> None:
         key = f"access.{word}"
         names = table.get(word, [])
         if not isinstance(names, list):
-            raise _Wrong(key, f"{key} must be a list of users and @groups, not {names!r}")
+            raise _InvalidKey(key, f"{key} must be a list of users and @groups, not {names!r}")
         for name in names:
             if not isinstance(name, str) or not _PRINCIPAL.fullmatch(name):
-                raise _Wrong(key, f"{key}: {name!r} is neither a user nor a @group")
+                raise _InvalidKey(key, f"{key}: {name!r} is neither a user nor a @group")
             if name in seen:
-                raise _Wrong(key, f"{key}: {name} is already in {seen[name]}")
+                raise _InvalidKey(key, f"{key}: {name} is already in {seen[name]}")
             seen[name] = key
         named[rights.WORDS[word]] = names
     rules = table.get("parameters", [])
     if not isinstance(rules, list) or not all(isinstance(rule, dict) for rule in rules):
-        raise _Wrong("access.parameters", "access.parameters must be tables: [[access.parameters]]")
+        raise _InvalidKey(
+            "access.parameters", "access.parameters must be tables: [[access.parameters]]"
+        )
     config.access = rights.rules(named, default, tuple(_parameter_rules(rules)))
 
 
@@ -193,7 +195,7 @@ def _parameter_rules(tables: list[dict[str, Any]]) -> Iterator[Rule]:
     for number, table in enumerate(tables):
         try:
             yield _parameter_rule(table)
-        except _Wrong as wrong:
+        except _InvalidKey as wrong:
             wrong.key = wrong.key.replace("parameters", f"parameters[{number}]", 1)
             raise
 
@@ -206,20 +208,24 @@ def _parameter_rule(table: dict[str, Any]) -> Rule:
     if not isinstance(who, list) or not all(
         isinstance(name, str) and _PRINCIPAL.fullmatch(name) for name in who
     ):
-        raise _Wrong(f"{key}.who", f"{key}: who must be a list of users and @groups, not {who!r}")
+        raise _InvalidKey(
+            f"{key}.who", f"{key}: who must be a list of users and @groups, not {who!r}"
+        )
     if not isinstance(names, list):
-        raise _Wrong(f"{key}.names", f"{key}: names must be a list of expressions, not {names!r}")
+        raise _InvalidKey(
+            f"{key}.names", f"{key}: names must be a list of expressions, not {names!r}"
+        )
     for field_name, pattern in (*(("names", name) for name in names), ("runner", runner)):
         try:
             re.compile(pattern)
         except (re.error, TypeError) as error:
-            raise _Wrong(
+            raise _InvalidKey(
                 f"{key}.{field_name}",
                 f"{key}: {pattern!r} is not a regular expression: {error}",
             ) from None
     pace = table.get("most_per_s")
     if pace is not None and (type(pace) not in (int, float) or not pace > 0):
-        raise _Wrong(f"{key}.most_per_s", f"{key}: most_per_s must be above 0, not {pace!r}")
+        raise _InvalidKey(f"{key}.most_per_s", f"{key}: most_per_s must be above 0, not {pace!r}")
     return Rule(frozenset(who), runner, tuple(names), pace)
 
 
@@ -228,9 +234,9 @@ def _read_limits(table: dict[str, Any], config: Config) -> None:
     for name, value in table.items():
         key, (least, most) = f"limits.{name}", RANGES[name]
         if type(value) is not int:
-            raise _Wrong(key, f"{key} must be an integer, not {value!r}")
+            raise _InvalidKey(key, f"{key} must be an integer, not {value!r}")
         if not least <= value <= most:
-            raise _Wrong(key, f"{key} of {value} is out of range: {least} to {most}")
+            raise _InvalidKey(key, f"{key} of {value} is out of range: {least} to {most}")
     config.limits = Limits(**table)
 
 
@@ -243,7 +249,7 @@ def _read_message(table: dict[str, Any], where: str, message: Any) -> None:
         name = f"{where}.{key}"
         if descriptor.message_type is not None:
             if not isinstance(value, dict):
-                raise _Wrong(name, f"{name} must be a table")
+                raise _InvalidKey(name, f"{name} must be a table")
             _read_message(value, name, getattr(message, key))
         elif descriptor.enum_type is not None:
             setattr(message, key, _enumerator(name, descriptor.enum_type, value))
@@ -255,11 +261,11 @@ def _set_scalar(message: Any, key: str, name: str, value: Any, expected: type) -
     if expected is float and type(value) is int:
         value = float(value)
     if type(value) is not expected:
-        raise _Wrong(name, f"{name} must be {_TYPE_WORDS[expected]}, not {value!r}")
+        raise _InvalidKey(name, f"{name} must be {_TYPE_WORDS[expected]}, not {value!r}")
     try:
         setattr(message, key, value)
     except ValueError:
-        raise _Wrong(name, f"{name} is out of range: {value}") from None
+        raise _InvalidKey(name, f"{name} is out of range: {value}") from None
 
 
 def _check_runner(runner: runner_pb2.RunnerSettings) -> None:
@@ -287,34 +293,34 @@ def _check_alone(key: str, settings: runner_pb2.RunnerSettings) -> None:
     try:
         runner_settings.check(settings)
     except RequestError as error:
-        raise _Wrong(key, str(error)) from None
+        raise _InvalidKey(key, str(error)) from None
 
 
 def _enumerator(name: str, enum_type: Any, value: Any) -> int:
     known = choices(enum_type)
     if not isinstance(value, str) or value not in known:
-        raise _Wrong(name, f"{name} must be one of {', '.join(known)}, not {value!r}")
+        raise _InvalidKey(name, f"{name} must be one of {', '.join(known)}, not {value!r}")
     return known[value]
 
 
 def _level(name: str, value: Any) -> Level:
     if not isinstance(value, str) or value not in rights.WORDS:
-        raise _Wrong(name, f"{name} must be one of {', '.join(rights.WORDS)}, not {value!r}")
+        raise _InvalidKey(name, f"{name} must be one of {', '.join(rights.WORDS)}, not {value!r}")
     return rights.WORDS[value]
 
 
 def _absolute_path(name: str, value: Any) -> Path:
     if not isinstance(value, str) or not value.startswith("/"):
-        raise _Wrong(name, f"{name} must be an absolute path, not {value!r}")
+        raise _InvalidKey(name, f"{name} must be an absolute path, not {value!r}")
     if "\0" in value:
-        raise _Wrong(name, f"{name} must be a path, not {value!r}")
+        raise _InvalidKey(name, f"{name} must be a path, not {value!r}")
     return Path(value)
 
 
 def _table(document: dict[str, Any], name: str) -> dict[str, Any]:
     table = document.get(name, {})
     if not isinstance(table, dict):
-        raise _Wrong(name, f"{name} must be a table")
+        raise _InvalidKey(name, f"{name} must be a table")
     return table
 
 
@@ -322,7 +328,7 @@ def _check_keys(where: str, table: dict[str, Any], known: Iterable[str]) -> None
     names = list(known)
     for key in table:
         if key not in names:
-            raise _Wrong(
+            raise _InvalidKey(
                 f"{where}{key}",
                 f'unknown key "{where}{key}"{suggestion(key, names)} (known: {listing(names)})',
             )

@@ -24,7 +24,7 @@ from rtcfd.operations.runner_core import RunnerCore, SharedContext
 from rtcfd.recovery.bring_up import bring_up, recover, resumes
 from rtcfd.recovery.crash_source import report_source
 from rtcfd.recovery.verdict import Crashes, judge
-from rtcfd.runners.leases import Leases
+from rtcfd.runners.component_leases import ComponentLeases
 from rtcfd.runners.outbox import Outbox
 from rtcfd.runners.status import status_of
 from rtcfd.state.desired import Desired
@@ -41,7 +41,7 @@ class Runner(RunnerCore):
 
     def __init__(self, desired: Desired, shared: SharedContext) -> None:
         super().__init__(desired, shared)
-        self.leases = Leases(self, self.alarm)
+        self.leases = ComponentLeases(self, self.alarm)
         self.hold_outbox: Outbox | None = None  # of the holder, if it is connected
         self.logs = NumberedLog[wire.LogRecord]()  # of its components and its executor
         self.releasing = False  # its holder has ended, and cannot reconnect

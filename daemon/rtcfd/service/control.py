@@ -32,10 +32,10 @@ from rtcfd.executor.link import Progress
 from rtcfd.operations import graph, incidents, parameters, snapshots
 from rtcfd.operations.loop import stop
 from rtcfd.recovery import cycles
-from rtcfd.runners.held_runners import Hold
-from rtcfd.runners.leases import Lease
+from rtcfd.runners.component_leases import ComponentLease
 from rtcfd.runners.outbox import Outbox
 from rtcfd.runners.runner import Runner
+from rtcfd.runners.runner_leases import RunnerLease
 from rtcfd.runners.runners import Runners
 from rtcfd.runners.status import statuses_of
 from rtcfd.service.log_streams import watch, watch_logs
@@ -372,13 +372,13 @@ class Control(control_pb2_grpc.ControlServicer):
     def HoldRunner(self, request: control_pb2.OpenHold) -> Any:
         """Hold a runner while the call lasts."""
         outbox = Outbox(control_pb2.HoldRunnerResponse)
-        return outbox, Hold(self.runners, request, outbox)
+        return outbox, RunnerLease(self.runners, request, outbox)
 
     @with_lease
     def LeaseComponent(self, request: control_pb2.OpenLease) -> Any:
         """Lease a component while the call lasts."""
         outbox = Outbox(control_pb2.LeaseComponentResponse)
-        return outbox, Lease(self.runners.get(request.runner).leases, request, outbox)
+        return outbox, ComponentLease(self.runners.get(request.runner).leases, request, outbox)
 
     @unary
     async def ResetStatistics(self, request: control_pb2.ResetStatisticsRequest) -> Any:

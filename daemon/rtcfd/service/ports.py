@@ -15,7 +15,7 @@ _MOST_NAMES = 16384  # names of single outputs and states, which are looked up
 _WILD = frozenset("*?[")
 
 
-class _Waiting:
+class _CallerQueue:
     """The queue to the caller.
 
     Batches are meaningless without their schema.  So a schema is dropped only if no batch of it
@@ -90,7 +90,7 @@ async def watch_ports(
                 f"{count} {what} are too many, {most} at most: use wildcards",
                 errors_pb2.REASON_REQUEST_TOO_LARGE,
             )
-    waiting = _Waiting(request.every)
+    waiting = _CallerQueue(request.every)
     telling = asyncio.ensure_future(runner.watch_ports(request, waiting.put))
     telling.add_done_callback(lambda _: waiting.some.set())
     try:

@@ -23,8 +23,8 @@ def this_boot() -> str:
 
 
 @dataclass(frozen=True)
-class LeaseTerms:
-    """The terms of a lease on a component; see runners/leases.py."""
+class ComponentLeaseTerms:
+    """The terms of a lease on a component; see runners/component_leases.py."""
 
     run_id: str
     on_lost: int  # OnLeaseLost
@@ -32,8 +32,8 @@ class LeaseTerms:
 
 
 @dataclass
-class HoldTerms:
-    """The terms of a lease on a runner; see runners/held_runners.py."""
+class RunnerLeaseTerms:
+    """The terms of a lease on a runner; see runners/runner_leases.py."""
 
     token: str
     holder: str  # name for messages
@@ -51,8 +51,8 @@ class Desired:
         self.ended_boot = ""  # the boot in which the loop ended; empty: it runs, or never ran
         self.quarantined: dict[str, str] = {}  # components removed by a fault, with the reason
         self.left_out: dict[str, str] = {}  # components that are not loaded, with the reason
-        self.leased: dict[str, LeaseTerms] = {}  # leased components, which are not saved
-        self.hold: HoldTerms | None = None
+        self.leased: dict[str, ComponentLeaseTerms] = {}  # leased components, which are not saved
+        self.hold: RunnerLeaseTerms | None = None
         self.history = History()  # of its parameters
         self._components: dict[str, graph_pb2.ComponentSpec] = {}
         # The saved text of each component, cached: a change of one component among a thousand

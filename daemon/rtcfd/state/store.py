@@ -28,7 +28,7 @@ from rtcfd.common.errors import FailedPrecondition, RequestError
 from rtcfd.common.names import check_base_name, full_name
 from rtcfd.common.regular_files import PARSE_ERRORS
 from rtcfd.state import history
-from rtcfd.state.desired import Desired, HoldTerms, LeaseTerms, this_boot
+from rtcfd.state.desired import ComponentLeaseTerms, Desired, RunnerLeaseTerms, this_boot
 from rtcfd.state.history import ParameterChange
 
 log = logging.getLogger(__name__)
@@ -408,12 +408,14 @@ def _parse(runner: str, document: _Document) -> Desired:
     desired.running = document["running"] is True
     desired.ended_boot = str(document.get("ended_boot", ""))
     for name, terms in document["leased"].items():
-        desired.leased[name] = LeaseTerms(**terms)
+        desired.leased[name] = ComponentLeaseTerms(**terms)
         enumerators.check_value(
             control_pb2.OnLeaseLost.DESCRIPTOR, "on_lost", desired.leased[name].on_lost
         )
     if hold := document["hold"]:
-        desired.hold = HoldTerms(hold["token"], hold["holder"], desired.chosen, hold["added"])
+        desired.hold = RunnerLeaseTerms(
+            hold["token"], hold["holder"], desired.chosen, hold["added"]
+        )
         desired.chosen = json_format.ParseDict(hold["settings"], runner_pb2.RunnerSettings())
     for message in (desired.chosen, desired.hold and desired.hold.parked):
         if message is not None:

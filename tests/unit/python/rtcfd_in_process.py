@@ -33,7 +33,7 @@ from rtcfd.executor.link import Link
 from rtcfd.executor.process import End
 from rtcfd.incidents.incidents import Incidents
 from rtcfd.operations.runner_core import SharedContext
-from rtcfd.runners.held_runners import await_holder
+from rtcfd.runners.runner_leases import await_holder
 from rtcfd.runners.runners import Runners
 from rtcfd.service.control import Control
 from rtcfd.state.desired import Desired

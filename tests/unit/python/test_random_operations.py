@@ -22,7 +22,7 @@ from failing_disk import MODES, FailingDisk
 from hypothesis import HealthCheck, Phase, example, given, seed, settings
 from hypothesis import strategies as st
 from rtcf.v1 import control_pb2, runner_pb2
-from rtcfd.runners import held_runners, leases
+from rtcfd.runners import component_leases, runner_leases
 from rtcfd.state import saver
 from rtcfd_in_process import Machine, Refused, Rtcfd, quiet, spec
 
@@ -244,9 +244,9 @@ def machine() -> Any:
     machine = Machine()
     with pytest.MonkeyPatch.context() as patch:
         machine.install(patch)
-        patch.setattr(leases, "RETURN_S", 0.01)
-        patch.setattr(held_runners, "RETURN_S", 0.01)
-        patch.setattr(leases, "GATHER_S", 0.001)
+        patch.setattr(component_leases, "RETURN_S", 0.01)
+        patch.setattr(runner_leases, "RETURN_S", 0.01)
+        patch.setattr(component_leases, "GATHER_S", 0.001)
         patch.setattr("rtcf_shared.whole_files.os.fsync", lambda _: None)
         quiet()
         yield machine

@@ -9,7 +9,7 @@ from rtcf.v1 import errors_pb2, runner_pb2
 from rtcfd.common.errors import Silent
 from rtcfd.executor.executor import Executor
 from rtcfd.runners import runners
-from rtcfd.state.desired import Desired, HoldTerms
+from rtcfd.state.desired import Desired, RunnerLeaseTerms
 from rtcfd_in_process import Rtcfd, until
 
 
@@ -35,7 +35,9 @@ def test_a_launchs_runner_is_removed_when_its_silent_executor_dies(
     async def play() -> None:
         daemon = rtcfd()
         desired = Desired("arm")
-        desired.hold = HoldTerms("token", "a launch", runner_pb2.RunnerSettings(), added=True)
+        desired.hold = RunnerLeaseTerms(
+            "token", "a launch", runner_pb2.RunnerSettings(), added=True
+        )
         daemon.runners.adopt([desired])
         await daemon.runners.bring_up()
         assert [runner.name for runner in daemon.runners.all()] == ["arm"]

@@ -22,14 +22,14 @@ from rtcfd.common.errors import (
 )
 from rtcfd.common.names import DEFAULT_RUNNER
 from rtcfd.operations.loop import stop_quietly
-from rtcfd.runners.leases import RETURN_S
+from rtcfd.runners.component_leases import RETURN_S
 from rtcfd.runners.outbox import Outbox
 from rtcfd.runners.runner import Runner
 from rtcfd.runners.runners import Runners
-from rtcfd.state.desired import HoldTerms
+from rtcfd.state.desired import RunnerLeaseTerms
 
 
-class Hold:
+class RunnerLease:
     """The lease of one call on a runner.  `open` first, then `end` or `lost`."""
 
     def __init__(self, runners: Runners, request: control_pb2.OpenHold, outbox: Outbox) -> None:
@@ -78,7 +78,7 @@ class Hold:
         self._runner = runner
         runner.hold_outbox = self._outbox
 
-    def _require_holder(self, terms: HoldTerms) -> None:
+    def _require_holder(self, terms: RunnerLeaseTerms) -> None:
         if self._outbox.gone:
             raise Unavailable(
                 f"{terms.holder}, which requested the runner, has disconnected",
@@ -92,7 +92,9 @@ class Hold:
         holder = caller.current()
         if holder is not None and not request.settings.ros.HasField("peers"):
             request.settings.ros.peers = holder.level.right
-        terms = HoldTerms(request.token, request.holder or "a client", runner_pb2.RunnerSettings())
+        terms = RunnerLeaseTerms(
+            request.token, request.holder or "a client", runner_pb2.RunnerSettings()
+        )
         try:
             runner = self._runners.get(name)
         except NotFound:
@@ -158,7 +160,7 @@ async def release(runners: Runners, runner: Runner, outbox: Outbox | None) -> No
         runner.releasing = False
 
 
-async def _release(runners: Runners, runner: Runner, hold: HoldTerms) -> None:
+async def _release(runners: Runners, runner: Runner, hold: RunnerLeaseTerms) -> None:
     await stop_quietly(runner)
     await runner.leases.unload_all()
     runner.leases.end_all(

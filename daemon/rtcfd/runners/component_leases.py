@@ -24,7 +24,7 @@ from rtcfd.operations import graph, parameters
 from rtcfd.operations.loop import stop_quietly
 from rtcfd.operations.runner_core import RunnerCore
 from rtcfd.runners.outbox import Outbox
-from rtcfd.state.desired import LeaseTerms
+from rtcfd.state.desired import ComponentLeaseTerms
 
 # Time for holders to reconnect after a restart of rtcfd.
 RETURN_S = 10.0
@@ -35,10 +35,12 @@ _LONGEST_GATHER_S = 1.0
 _Ended = control_pb2.LeaseEnded
 
 
-class Lease:
+class ComponentLease:
     """The lease of one call on a component.  `open` first, then `end` or `lost`."""
 
-    def __init__(self, leases: "Leases", request: control_pb2.OpenLease, outbox: Outbox) -> None:
+    def __init__(
+        self, leases: "ComponentLeases", request: control_pb2.OpenLease, outbox: Outbox
+    ) -> None:
         self._leases = leases
         self._request = request
         self._outbox = outbox
@@ -65,7 +67,7 @@ class Lease:
         self._leases.lost(full_name(self._request.component), self._outbox)
 
 
-class Leases:
+class ComponentLeases:
     """All leases of a runner's components."""
 
     def __init__(self, runner: RunnerCore, alarm: Callable[[str], None]) -> None:
@@ -80,7 +82,7 @@ class Leases:
         self._patience: asyncio.Task[None] | None = None  # waits for holders after a restart
 
     @property
-    def _terms(self) -> dict[str, LeaseTerms]:
+    def _terms(self) -> dict[str, ComponentLeaseTerms]:
         return self._runner.desired.leased
 
     async def open(
@@ -112,7 +114,7 @@ class Leases:
                     component=name,
                 )
             # Saved in advance: if rtcfd dies meanwhile, the next one must know of the lease.
-            self._terms[name] = LeaseTerms(
+            self._terms[name] = ComponentLeaseTerms(
                 request.run_id, request.on_lost or control_pb2.ON_LEASE_LOST_STOP, request.holder
             )
             self._outboxes[name] = outbox
