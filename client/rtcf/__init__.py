@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from rtcf.client import Client
     from rtcf.connection import default_socket
     from rtcf.errors import DaemonUnreachableError, RefusedError
+    from rtcf.lease import Lease
     from rtcf.recording.reader import Recording, RecordingError, read_recording
-    from rtcf.tenancy import Tenancy
 
 __version__ = "0.1.0"
 
@@ -33,11 +33,11 @@ _LATER = {
     "DaemonUnreachableError": "rtcf.errors",
     "Graph": "rtcf_shared.graph_reader",
     "GraphFileError": "rtcf_shared.graph_reader",
+    "Lease": "rtcf.lease",
     "Recording": "rtcf.recording.reader",
     "RecordingError": "rtcf.recording.reader",
     "RefusedError": "rtcf.errors",
     "RtcfError": "rtcf_shared.errors",
-    "Tenancy": "rtcf.tenancy",
     "component": "rtcf_shared.spec",
     "default_socket": "rtcf.connection",
     "live_spec": "rtcf_shared.graph_writer",
@@ -55,11 +55,11 @@ __all__ = [
     "DaemonUnreachableError",
     "Graph",
     "GraphFileError",
+    "Lease",
     "Recording",
     "RecordingError",
     "RefusedError",
     "RtcfError",
-    "Tenancy",
     "component",
     "default_socket",
     "live_spec",

@@ -13,8 +13,8 @@ from rtcf_shared.spec import parse_port, several
 from rtcf import direct_stop, failures
 from rtcf.connection import CHANGE_TIMEOUT_S, QUERY_TIMEOUT_S, Closing, Connection, OnProgress
 from rtcf.errors import DaemonUnreachableError
+from rtcf.lease import Lease
 from rtcf.streams.numbered import NumberedStream, Place
-from rtcf.tenancy import Tenancy
 from rtcf.v1 import control_pb2, graph_pb2, incidents_pb2, ports_pb2, runner_pb2
 
 if TYPE_CHECKING:
@@ -375,13 +375,13 @@ class Client(Closing):
         request = control_pb2.RestoreSnapshotRequest(runner=runner, snapshot=snapshot)
         return self._connection.changed(self._stub.RestoreSnapshot, request, on_progress)
 
-    def hold_runner(self, opening: control_pb2.OpenHold) -> Tenancy:
-        """Hold a runner until the Tenancy ends; its messages are HoldRunnerResponse."""
-        return Tenancy(self._stub.HoldRunner, control_pb2.HoldRunnerRequest, opening, self.socket)
+    def hold_runner(self, opening: control_pb2.OpenHold) -> Lease:
+        """Hold a runner until the Lease ends; its messages are HoldRunnerResponse."""
+        return Lease(self._stub.HoldRunner, control_pb2.HoldRunnerRequest, opening, self.socket)
 
-    def lease_component(self, opening: control_pb2.OpenLease) -> Tenancy:
-        """Load a component until the Tenancy ends; its messages are LeaseComponentResponse."""
-        return Tenancy(
+    def lease_component(self, opening: control_pb2.OpenLease) -> Lease:
+        """Load a component until the Lease ends; its messages are LeaseComponentResponse."""
+        return Lease(
             self._stub.LeaseComponent, control_pb2.LeaseComponentRequest, opening, self.socket
         )
 

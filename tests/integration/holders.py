@@ -13,8 +13,8 @@ STOP = control_pb2.ON_LEASE_LOST_STOP
 class Holder:
     """Reads the messages of a lease in its own thread."""
 
-    def __init__(self, tenancy: rtcf.Tenancy) -> None:
-        self.tenancy = tenancy
+    def __init__(self, lease: rtcf.Lease) -> None:
+        self.lease = lease
         self.messages: list[Any] = []
         self.error: rtcf.RtcfError | None = None
         self._thread = threading.Thread(target=self._read, daemon=True)
@@ -22,7 +22,7 @@ class Holder:
 
     def _read(self) -> None:
         try:
-            for message in self.tenancy:
+            for message in self.lease:
                 self.messages.append(message)
         except rtcf.RtcfError as error:
             self.error = error
@@ -51,7 +51,7 @@ class Holder:
 
     def end(self) -> None:
         """End the lease in order."""
-        self.tenancy.end()
+        self.lease.end()
         assert self.why() == control_pb2.LeaseEnded.WHY_ASKED
 
 

@@ -54,7 +54,7 @@ def test_the_death_of_a_holder_stops_the_loop_and_unloads_its_component(
     client.load(counter("stays"))
     holder = leased(client, counter("leaves"))
     client.start()
-    holder.tenancy.drop()
+    holder.lease.drop()
     wait_for(lambda: names(client) == ["/stays"], "the unload of the component")
     assert state(client).state == runner_pb2.RUNNER_STATE_STOPPED
     assert "/leaves: holder of leaves has died: stopping the loop" in daemon.log()
@@ -66,7 +66,7 @@ def test_the_death_of_a_holder_only_unloads_its_component_if_requested(
     client.load(counter("stays"))
     holder = leased(client, counter("leaves"), UNLOAD)
     client.start()
-    holder.tenancy.drop()
+    holder.lease.drop()
     wait_for(lambda: names(client) == ["/stays"], "the unload of the component")
     wait_until_after(client, iteration(client) + 10)
 
@@ -77,7 +77,7 @@ def test_a_component_leased_with_keep_is_saved_after_its_holders_death(
     holder = leased(client, counter("kept"), KEEP)
     client.start()
     assert "kept" not in saved(daemon)["components"]
-    holder.tenancy.drop()
+    holder.lease.drop()
     wait_for(lambda: saved(daemon)["components"], "the component in the saved graph")
     wait_until_after(client, iteration(client) + 10)
     assert client.get_component("kept").holder == ""
@@ -92,7 +92,7 @@ def test_leases_that_end_together_unload_in_one_transaction(client: rtcf.Client)
         holders = [leased(client, counter(f"leaves{i}")) for i in range(4)]
         before = state(client).generation
         for holder in holders:
-            holder.tenancy.end()
+            holder.lease.end()
         for holder in holders:
             assert holder.why() == ENDED.WHY_ASKED
         assert sorted(names(client)) == ["/other", "/stays"]
@@ -235,7 +235,7 @@ def test_an_added_runner_is_removed_with_its_dead_holder(client: rtcf.Client) ->
     holder = held(client, "arm")
     member = leased(client, counter("member"), runner="arm", hold="token")
     client.start("arm")
-    holder.tenancy.drop()
+    holder.lease.drop()
     assert member.why() == ENDED.WHY_RUNNER_ENDED
     wait_for(
         lambda: [each.runner for each in client.get_status().runners] == ["rt_runner"],

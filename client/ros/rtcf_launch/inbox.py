@@ -1,6 +1,6 @@
-"""What the one thread of a node waits for: signals, and the messages of a tenancy.
+"""What the one thread of a node waits for: signals, and the messages of a lease.
 
-The main thread owns it; each tenancy has a thread of its own that reads it.
+The main thread owns it; each lease has a thread of its own that reads it.
 """
 
 import signal
@@ -22,7 +22,7 @@ class Asked:
 
 @dataclass(frozen=True)
 class Lost:
-    """A tenancy ended without its last message."""
+    """A lease ended without its last message."""
 
     error: rtcf.RtcfError
 
@@ -41,9 +41,9 @@ class Inbox:
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, self._signalled)
 
-    def read(self, tenancy: rtcf.Tenancy) -> None:
-        """Let the messages of a tenancy come in here."""
-        threading.Thread(target=self._read, args=(tenancy,), daemon=True).start()
+    def read(self, lease: rtcf.Lease) -> None:
+        """Let the messages of a lease come in here."""
+        threading.Thread(target=self._read, args=(lease,), daemon=True).start()
 
     def get(self, timeout_s: float | None = None) -> Any:
         """Return what comes next; None when the time is up."""
@@ -77,9 +77,9 @@ class Inbox:
         self.asked = True
         self._queue.put(Asked())
 
-    def _read(self, tenancy: rtcf.Tenancy) -> None:
+    def _read(self, lease: rtcf.Lease) -> None:
         try:
-            for message in tenancy:
+            for message in lease:
                 self._queue.put(message)
         except rtcf.RtcfError as error:
             self._queue.put(Lost(error))

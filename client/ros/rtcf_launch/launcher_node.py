@@ -79,7 +79,7 @@ class LauncherNode:
         self._ros_node: RosNode | None = None
         self._run_id = ""
         self._spec = graph_pb2.ComponentSpec()
-        self._tenancy: rtcf.Tenancy | None = None
+        self._lease: rtcf.Lease | None = None
         self._client: rtcf.Client | None = None
         self._loaded = False
         self._lost_since: float | None = None
@@ -205,11 +205,11 @@ class LauncherNode:
         for note in notes:
             self._screen.warn(note)
         self._spec = spec
-        self._lease()
+        self._take_lease()
 
-    def _lease(self, attach: bool = False) -> None:
+    def _take_lease(self, attach: bool = False) -> None:
         assert self._client is not None
-        self._tenancy = self._client.lease_component(
+        self._lease = self._client.lease_component(
             control_pb2.OpenLease(
                 runner=self._meeting.runner,
                 component=self._spec,
@@ -222,7 +222,7 @@ class LauncherNode:
                 unseen=_prints_to_log(self._given.log_file),
             )
         )
-        self._inbox.read(self._tenancy)
+        self._inbox.read(self._lease)
 
     def _serve(self) -> Code:
         self._load(self._find_runner())
@@ -235,10 +235,10 @@ class LauncherNode:
             if isinstance(event, Asked):
                 if event.why:
                     self._screen.warn(f"asked to end: {event.why}")
-                if self._tenancy is None or self._lost_since is not None:
+                if self._lease is None or self._lost_since is not None:
                     return Code.DONE
                 if deadline is None:
-                    self._tenancy.end()
+                    self._lease.end()
                     deadline = time.monotonic() + _END_S
                 continue
             if isinstance(event, Lost):
@@ -287,7 +287,7 @@ class LauncherNode:
             raise Ending(Code.LOST, str(error))
         if self._inbox.pause(_RETRY_S):
             raise Ending(Code.DONE)
-        self._lease(attach=True)
+        self._take_lease(attach=True)
 
 
 def _prints_to_log(log_file: str) -> bool:

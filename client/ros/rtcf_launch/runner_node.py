@@ -93,7 +93,7 @@ class RunnerNode:
         self._inbox = Inbox()
         self._master = Master(given.master_uri, own_node(self._node))
         self._daemon: PrivateDaemon | None = None
-        self._tenancy: rtcf.Tenancy | None = None
+        self._lease: rtcf.Lease | None = None
         self._client: rtcf.Client | None = None
         self._ros_node: RosNode | None = None
         self._announced = False
@@ -205,7 +205,7 @@ class RunnerNode:
 
     def _hold(self, attach: bool = False) -> None:
         assert self._client is not None
-        self._tenancy = self._client.hold_runner(
+        self._lease = self._client.hold_runner(
             control_pb2.OpenHold(
                 runner=self._runner,
                 settings=self._parameters.settings,
@@ -214,7 +214,7 @@ class RunnerNode:
                 attach=attach,
             )
         )
-        self._inbox.read(self._tenancy)
+        self._inbox.read(self._lease)
 
     # -- the loop's life ----------------------------------------------------
 
@@ -380,16 +380,16 @@ class RunnerNode:
                 pass
         if self._client is not None and self._was_running:
             self._say_statistics()
-        if self._tenancy is not None and (self._daemon is None or not self._daemon.ended):
-            self._give_back(self._tenancy)
+        if self._lease is not None and (self._daemon is None or not self._daemon.ended):
+            self._give_back(self._lease)
         if self._daemon is not None:
             self._daemon.end()
         if self._client is not None:
             self._client.close()
 
-    def _give_back(self, tenancy: rtcf.Tenancy) -> None:
+    def _give_back(self, lease: rtcf.Lease) -> None:
         """End the hold; show what hooks say until that is done."""
-        tenancy.end()
+        lease.end()
         deadline = time.monotonic() + _END_S
         while (left := deadline - time.monotonic()) > 0:
             event = self._inbox.get(left)

@@ -31,14 +31,14 @@ class Lease:
             run_id="test", holder="the test", on_lost=control_pb2.ON_LEASE_LOST_STOP,
         )  # fmt: skip
         self._client = rtcf.Client()
-        self._tenancy = self._client.lease_component(opening)
+        self._lease = self._client.lease_component(opening)
         self._thread = threading.Thread(target=self._listen, daemon=True)
         self._thread.start()
         assert self._loaded.wait(90)
 
     def _listen(self) -> None:
         try:
-            for message in self._tenancy:
+            for message in self._lease:
                 if message.WhichOneof("kind") == "loaded":
                     self._loaded.set()
                 if message.WhichOneof("kind") == "ended":
@@ -47,7 +47,7 @@ class Lease:
             self.ended.append(error)
 
     def end(self) -> None:
-        self._tenancy.end()
+        self._lease.end()
         self._thread.join(90)
         self._client.close()
 

@@ -78,15 +78,15 @@ def test_a_type_in_two_folders_is_reported(daemon: DaemonUnderTest, client: rtcf
 def test_a_launch_gets_a_note_once(daemon: DaemonUnderTest, client: rtcf.Client) -> None:
     daemon.package("demo", "elsewhere", types={"Fine": "fine"})
 
-    def leased(name: str) -> tuple[tuple[rtcf.Tenancy, Iterator[Any]], list[str]]:
+    def leased(name: str) -> tuple[tuple[rtcf.Lease, Iterator[Any]], list[str]]:
         spec = rtcf.component("demo", "Fine", name=name)
-        tenancy = client.lease_component(control_pb2.OpenLease(component=spec))
-        messages = iter(tenancy)
+        lease = client.lease_component(control_pb2.OpenLease(component=spec))
+        messages = iter(lease)
         loaded = next(each.loaded for each in messages if each.WhichOneof("kind") == "loaded")
-        return (tenancy, messages), list(loaded.notes)
+        return (lease, messages), list(loaded.notes)
 
-    def end(tenancy: rtcf.Tenancy, messages: Iterator[Any]) -> None:
-        tenancy.end()
+    def end(lease: rtcf.Lease, messages: Iterator[Any]) -> None:
+        lease.end()
         assert [each.WhichOneof("kind") for each in messages][-1] == "ended"
 
     first, told = leased("one")

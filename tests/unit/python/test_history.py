@@ -185,11 +185,11 @@ def test_apply_records_its_changes(client: rtcf.Client) -> None:
 def test_a_launch_is_named(client: rtcf.Client) -> None:
     spec = rtcf.component("demo", "Fine", name="pid", parameters=["kp:=1.5"])
     opening = control_pb2.OpenLease(component=spec, holder="launch of ann")
-    tenancy = client.lease_component(opening)
+    lease = client.lease_component(opening)
     wait_for(lambda: client.get_history("pid"), "the change")
     (change,) = client.get_history("pid")
     assert (change.who, change.how) == ("launch of ann", "launch")
-    tenancy.end()
+    lease.end()
 
 
 def test_a_change_without_its_client_is_recorded_with_its_user(

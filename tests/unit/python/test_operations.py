@@ -197,10 +197,10 @@ def test_a_runner_is_released_if_its_holder_dies_during_the_lease(
         client.unload(["a"])
         with held.back("serve"):
             opening = control_pb2.OpenHold(runner="rt_runner", token="t", holder="somebody")
-            tenancy = client.hold_runner(opening)
-            next(iter(tenancy))
+            lease = client.hold_runner(opening)
+            next(iter(lease))
             wait_for(lambda: status(service).holder == "somebody", "the hold")
-            tenancy.drop()
+            lease.drop()
         wait_for(lambda: not status(service).holder, "the release of the runner")
     wait_for(lambda: service.saved()["hold"] is None, "the state on disk")
 
@@ -210,10 +210,10 @@ def test_a_leased_load_interrupted_by_the_end_of_rtcfd_stays_leased(
 ) -> None:
     with held.back("load"), service.client() as client:
         spec = rtcf.component("demo", "Fine", name="leased")
-        tenancy = client.lease_component(control_pb2.OpenLease(component=spec, holder="somebody"))
+        lease = client.lease_component(control_pb2.OpenLease(component=spec, holder="somebody"))
         wait_for(lambda: "/leased" in service.saved()["leased"], "the settings on disk")
         service.end(signal.SIGUSR1)
-        tenancy.drop()
+        lease.drop()
     service.start_service()
     assert [each["name"] for each in service.saved()["components"]] == ["a"]
     with service.client() as client:

@@ -167,13 +167,13 @@ def test_holders_keep_their_leases_and_return(service: DaemonUnderTest) -> None:
     service.start_service()
     opening.attach = True
     with service.client() as again:
-        tenancy = again.lease_component(opening)
-        answers = iter(tenancy)
+        lease = again.lease_component(opening)
+        answers = iter(lease)
         assert next(answers).WhichOneof("kind") == "loaded"
         status = again.get_status().runners[0]
         assert (status.pid, status.state) == (pid, RUNNING)
         assert again.get_component("held").holder == "test"
-        tenancy.end()
+        lease.end()
         assert [each.ended.why for each in answers][-1] == control_pb2.LeaseEnded.WHY_ASKED
     assert "has died" not in service.log()
 

@@ -14,7 +14,7 @@ from rtcf import failures
 from rtcf.v1 import control_pb2
 
 
-class Tenancy:
+class Lease:
     """A lease.  One thread iterates over its messages; any thread may call end() and drop()."""
 
     def __init__(self, method: Any, request: Any, opening: Any, socket: str) -> None:
