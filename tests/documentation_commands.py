@@ -30,6 +30,7 @@ ELSEWHERE: dict[str, dict[str, str]] = {
     },
     "boot.md": {"sudo ": _BOOTED, "rtcfd --check-config": _BOOTED, "journalctl ": _BOOTED},
     "components.md": {"sudo cmake --install ": "installs into /usr"},
+    "control/motor.md": {"rtcfctl scope": "runs until Ctrl-C: tests/integration/test_scope.py"},
     "from-rtcf-2021.md": {
         "apt install ": _APT,
         "cd my_workspace": _WORKSPACE,

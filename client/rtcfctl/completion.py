@@ -150,7 +150,7 @@ class _Line:
             yield from _declared(client, self._given[-2], self._given[-1], source)
         elif source == "COMPONENT.PORT":
             yield from _ports(client, runner, graph_pb2.DIRECTION_INPUT)
-        elif source == "CONDITION":
+        elif source in ("CONDITION", "OUTPUT"):
             yield from _ports(client, runner, graph_pb2.DIRECTION_OUTPUT)
         elif source in ("PARAMETER", "PARAMETER:=VALUE") and self._given:
             with contextlib.suppress(rtcf.RefusedError):

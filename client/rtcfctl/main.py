@@ -63,6 +63,8 @@ _MODULES = {
     "trace": "signals.trace",
     "scope": "signals.scope",
     "incident": "signals.incident",
+    "identify": "control.identify",
+    "tune": "control.tune",
     "check": "machine.check",
     "doctor": "machine.doctor",
     "metrics": "machine.metrics",

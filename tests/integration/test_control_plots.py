@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from daemon_process import BUILD_TREE
+from daemon_process import BUILD_TREE, Daemon
+from documentation_commands import typed
 from rtcf.testing import Bench
 from rtcfctl.terminal import pictures
 
@@ -134,6 +135,37 @@ def _kalman_filter(_: Path) -> str:
     return drawn("deviation1", found["deviation1"][200:], marks)
 
 
+def _example(folder: Path) -> Mapping[str, str]:
+    """Return the output of the first identify and tune of the page of the motor, by verb."""
+    text = (PAGES / "motor.md").read_text()
+    (graph,) = re.findall(r"^```yaml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    (folder / "motor.yaml").write_text(graph)
+    found: dict[str, str] = {}
+    daemon = Daemon(folder)
+    daemon.start()
+    try:
+        for line in typed("control/motor.md"):
+            words = [str(folder / each) if each == "motor.yaml" else each for each in line.split()]
+            done = daemon.run(*words)
+            assert done.returncode == 0, f"{line}\n{done.stderr}"
+            found[words[1]] = done.stdout
+            if words[1] == "tune":
+                break
+    finally:
+        daemon.end()
+    return found
+
+
+def _identify(folder: Path) -> str:
+    plots = _example(folder)["identify"]
+    return plots[plots.index("gain in dB") : plots.index("residuals")].rstrip()
+
+
+def _tune(folder: Path) -> str:
+    plots = _example(folder)["tune"]
+    return plots[: plots.index("set kp")].rstrip()
+
+
 PLOTS: dict[str, tuple[str, Callable[[Path], str]]] = {
     "pid": ("pid.md", _pid),
     "biquads": ("biquads.md", _biquads),
@@ -142,6 +174,8 @@ PLOTS: dict[str, tuple[str, Callable[[Path], str]]] = {
     "trajectory": ("trajectory.md", _trajectory),
     "joint-limiter": ("safety.md", _joint_limiter),
     "motor": ("motor.md", _motor),
+    "identify": ("motor.md", _identify),
+    "tune": ("motor.md", _tune),
 }
 
 

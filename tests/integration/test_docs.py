@@ -56,7 +56,6 @@ PREPARE: dict[str, Callable[[Daemon, rtcf.Client], None]] = {
     "control/biquads.md": _nothing,
     "control/excitation.md": _nothing,
     "control/kalman_filter.md": _nothing,
-    "control/motor.md": _nothing,
     "control/pid.md": _nothing,
     "control/safety.md": _nothing,
     "control/state_space.md": _nothing,
@@ -80,6 +79,7 @@ PREPARE: dict[str, Callable[[Daemon, rtcf.Client], None]] = {
 BY_THEMSELVES = {
     "README.md",  # test_readme.py
     "components.md",
+    "control/motor.md",
     "python-components.md",
 }
 
@@ -179,6 +179,19 @@ def test_the_component_with_a_service_of_the_docs_is_built_and_described(tmp_pat
     finally:
         daemon.end()
     assert [port.name for port in found.ports] == ["speed", "torque"]
+
+
+def test_the_motor_of_the_docs_is_identified_tuned_and_tested(daemon: Daemon) -> None:
+    page = "control/motor.md"
+    (daemon.folder / "motor.yaml").write_text(_block(page, "yaml", "rt_runner"))
+    (daemon.folder / "test_motor.py").write_text(_block(page, "python", "Bench"))
+    environment = daemon.environment()
+    environment |= {
+        "PATH": f"{BUILD_TREE / 'bin'}:/usr/bin:{environment['PATH']}",
+        "PYTHONPATH": str(BUILD_TREE / "python"),
+    }
+    for line in typed(page):
+        _type(line, daemon.folder, environment)
 
 
 def test_the_python_component_of_the_docs_is_compiled_and_loaded(tmp_path: Path) -> None:

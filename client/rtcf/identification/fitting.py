@@ -1,0 +1,189 @@
+"""Fits models to recorded inputs and outputs of a plant that begins at rest."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from rtcf_shared.errors import RtcfError
+from scipy import optimize
+
+from rtcf.identification.models import Array, Model, StateSpace, Transfer
+
+_GRID = 9  # start values of a time constant, and of the delay
+_STARTS = 3  # that are refined
+_LEAST_SAMPLES = 30
+_MOST_STATES = 8
+_HISTORY = 60  # cycles of the regression, at most
+_CLOSE = 1.05  # of the smallest error: a model of lower order is preferred
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model, and how it describes the recorded values.
+
+    percent    100 (1 - |y - model| / |y - mean of y|): 100 is exact, 0 as good as a constant
+    residuals  recorded minus simulated outputs
+    offset     output of the plant at rest
+    """
+
+    model: Model
+    percent: float
+    residuals: Array
+    offset: float
+
+
+def fit_first_order(inputs: npt.ArrayLike, outputs: npt.ArrayLike, period: float) -> Fit:
+    """Fit K exp(-delay s) / (T s + 1).
+
+    inputs   an input per cycle
+    outputs  the output at the beginning of each cycle
+    period   in s
+
+    Raises RtcfError if the values do not determine a model.
+    """
+    return _fit(inputs, outputs, period, lambda p: (float(np.exp(p[0])), 1.0), [()])
+
+
+def fit_second_order(inputs: npt.ArrayLike, outputs: npt.ArrayLike, period: float) -> Fit:
+    """Fit K exp(-delay s) / (s² / w² + 2 z s / w + 1), with real or complex poles; see above."""
+
+    def denominator(p: Any) -> tuple[float, ...]:
+        time = float(np.exp(p[0]))
+        return (time * time, 2.0 * float(np.exp(p[1])) * time, 1.0)
+
+    starts: list[tuple[float, ...]] = [(float(np.log(each)),) for each in (0.1, 0.7, 2.0, 10.0)]
+    return _fit(inputs, outputs, period, denominator, starts)
+
+
+def fit_state_space(
+    inputs: npt.ArrayLike, outputs: npt.ArrayLike, period: float, order: int = 0
+) -> Fit:
+    """Fit a state space of an order, 0 = the smallest one that describes the values.
+
+    The Markov parameters of an observer, by least squares, are those of the plant (OKID: Juang,
+    Phan, Horta & Longman, Journal of Guidance, Control, and Dynamics 16, 1993), which the
+    eigensystem realization algorithm turns into a state space (ERA: Juang & Pappa, Journal of
+    Guidance, Control, and Dynamics 8, 1985).  Raises RtcfError.
+    """
+    u, y = _checked(inputs, outputs)
+    if not 0 <= order <= _MOST_STATES:
+        raise ValueError(f"order {order}: 0 to {_MOST_STATES}")
+    offset = float(y[0])
+    rows = max(2 * _MOST_STATES, min(_HISTORY, len(u) // 10))
+    markov = _markov_parameters(u, y - offset, rows, 2 * rows)
+    size = rows
+    index = np.arange(size)
+    hankel = markov[index[:, None] + index[None, :]]
+    shifted = markov[index[:, None] + index[None, :] + 1]
+    left, values, right = np.linalg.svd(hankel)
+    candidates = range(1, _MOST_STATES + 1) if order == 0 else [order]
+    fits = []
+    for n in candidates:
+        if values[n - 1] <= 1e-12 * values[0]:
+            break
+        root = np.sqrt(values[:n])
+        a = (left[:, :n] / root).T @ shifted @ (right[:n].T / root)
+        b, c = root * right[:n, 0], left[0, :n] * root
+        if np.max(np.abs(np.linalg.eigvals(a))) > 1.0 + 1e-3:
+            continue  # unstable: the output would be infinite
+        model = StateSpace(a, b, c, period)
+        fits.append(_judged(model, u, y, model.simulate(u)))
+    if not fits:
+        raise RtcfError("no stable state space describes the values: excite for longer")
+    errors = [float(np.linalg.norm(each.residuals)) for each in fits]
+    return next(
+        fit for fit, error in zip(fits, errors, strict=True) if error <= _CLOSE * min(errors)
+    )
+
+
+def _checked(inputs: npt.ArrayLike, outputs: npt.ArrayLike) -> tuple[Array, Array]:
+    """Return the inputs as differences from the first one, and the outputs."""
+    u, y = np.asarray(inputs, float), np.asarray(outputs, float)
+    if u.ndim != 1 or u.shape != y.shape:
+        raise ValueError("inputs and outputs must be two lists of the same length")
+    if len(u) < _LEAST_SAMPLES:
+        raise RtcfError(f"{len(u)} cycles are too few for a model: at least {_LEAST_SAMPLES}")
+    if not (np.isfinite(u).all() and np.isfinite(y).all()):
+        raise RtcfError("the recorded values are not all finite: no model")
+    if np.ptp(u) == 0:
+        raise RtcfError("the input is constant: no model; set a larger amplitude or wider limits")
+    if np.ptp(y) == 0:
+        raise RtcfError("the output is constant: no model; set a larger amplitude")
+    return u - u[0], y
+
+
+def _judged(model: Model, u: Array, y: Array, simulated: Array) -> Fit:
+    """Return a fit with the best offset."""
+    del u
+    offset = float(np.mean(y - simulated))
+    residuals = y - simulated - offset
+    spread = float(np.linalg.norm(y - y.mean()))
+    return Fit(model, 100.0 * (1.0 - float(np.linalg.norm(residuals)) / spread), residuals, offset)
+
+
+def _fit(
+    inputs: npt.ArrayLike,
+    outputs: npt.ArrayLike,
+    period: float,
+    denominator: Callable[[Any], tuple[float, ...]],
+    more: list[tuple[float, ...]],
+) -> Fit:
+    """Return the best model: gain and offset by linear least squares within a nonlinear search.
+
+    The parameters are the logarithm of a time constant, `more`, and the delay in cycles.
+    """
+    u, y = _checked(inputs, outputs)
+    longest = 0.5 * len(u) * period
+
+    def linear(p: Any) -> tuple[float, Array]:
+        unit = Transfer(1.0, denominator(p), max(float(p[-1]), 0.0) * period)
+        x = unit.simulate(u, period)
+        x0, y0 = x - x.mean(), y - y.mean()
+        power = float(x0 @ x0)
+        gain = float(x0 @ y0) / power if power > 0 else 0.0
+        residuals: Array = y0 - gain * x0
+        return gain, residuals
+
+    times = np.geomspace(period, 4.0 * longest, _GRID)
+    delays = np.concatenate([[0.0], np.geomspace(period, longest / 4.0, _GRID - 1)])
+    starts = [
+        (float(np.log(time)), *rest, float(delay / period))
+        for time in times
+        for rest in more
+        for delay in delays
+    ]
+    starts.sort(key=lambda p: float(np.linalg.norm(linear(p)[1])))
+    low = [np.log(period / 20.0), *(np.log(1e-3) for _ in more[0]), 0.0]
+    high = [np.log(100.0 * longest), *(np.log(1e3) for _ in more[0]), longest / period]
+    scale = float(np.linalg.norm(y - y.mean()))
+    best: Any = None
+    for start in starts[:_STARTS]:
+        found = optimize.least_squares(
+            lambda p: linear(p)[1] / scale, np.clip(start, low, high), bounds=(low, high),
+            xtol=1e-12, ftol=1e-12, gtol=1e-14, x_scale="jac", max_nfev=200,
+        )  # fmt: skip
+        if best is None or found.cost < best.cost:
+            best = found
+    gain = linear(best.x)[0]
+    model = Transfer(gain, denominator(best.x), float(best.x[-1]) * period)
+    return _judged(model, u, y, model.simulate(u, period))
+
+
+def _markov_parameters(u: Array, y: Array, history: int, count: int) -> Array:
+    """Return the first responses to a pulse of 1, from the cycle after it."""
+    rows = len(u) - history
+    columns = [y[history - i : history - i + rows] for i in range(1, history + 1)]
+    columns += [u[history - i : history - i + rows] for i in range(1, history + 1)]
+    regression = np.stack([*columns, np.ones(rows)], axis=1)
+    found = np.linalg.lstsq(regression, y[history:], rcond=1e-10)[0]
+    a, b = found[:history], found[history : 2 * history]
+    markov = np.zeros(count)
+    for k in range(count):
+        markov[k] = b[k] if k < history else 0.0
+        most = min(k, history)
+        markov[k] += float(a[:most] @ markov[k - most : k][::-1])
+    return markov

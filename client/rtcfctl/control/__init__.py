@@ -1,0 +1,1 @@
+"""Commands that identify a plant and tune its controller."""

@@ -1,0 +1,175 @@
+"""`rtcfctl tune`: compares closed-loop steps before and after a change of a controller's gains."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import rtcf
+
+from rtcfctl.control import excited
+from rtcfctl.terminal.output import Output
+from rtcfctl.terminal.pictures import drawn
+from rtcfctl.terminal.words import figure
+
+if TYPE_CHECKING:
+    from rtcf.identification.experiment import Experiment, Recorded
+    from rtcf.testing import StepResponse
+
+_DURATION_S = 2.0
+_LONGEST_S = 86400.0
+_TOLERANCE = 0.05
+_BASELINE = 0.2  # share of the time before the step from which its initial value is taken
+_ROWS = (
+    ("rise time", "rise_time", "s"),
+    ("settling time", "settling_time", "s"),
+    ("overshoot", "overshoot", "%"),
+    ("final error", "final_error", ""),
+)
+
+
+def register(verbs: Any, common: argparse.ArgumentParser) -> None:
+    """Add the verb."""
+    tune = verbs.add_parser(
+        "tune",
+        parents=[common],
+        help="compare closed-loop steps before and after a change of parameters",
+    )
+    tune.add_argument("controller", metavar="NAME", help="controller, e.g. a Pid")
+    tune.add_argument(
+        "--param", dest="parameters", action="append", default=[], metavar="PARAMETER:=VALUE",
+        help="new value of a parameter, repeatable (default: only measure)",
+    )  # fmt: skip
+    excited.add_options(tune)
+    tune.add_argument("--size", type=float, required=True, metavar="X", help="height of the step")
+    tune.add_argument(
+        "--input", metavar="COMPONENT.PORT",
+        help="input without a writer, or an Excitation of the graph (default: NAME.setpoint)",
+    )  # fmt: skip
+    tune.add_argument(
+        "--measured", metavar="OUTPUT", default="",
+        help="controlled output (default: that connected to NAME.measured)",
+    )  # fmt: skip
+    tune.add_argument(
+        "--duration", type=excited.seconds, default=_DURATION_S, metavar="S",
+        help=f"time before the step, and of the step ({_DURATION_S:g} s)",
+    )  # fmt: skip
+    tune.add_argument(
+        "--tolerance", type=float, default=_TOLERANCE, metavar="F",
+        help=f"of the settling time, as a fraction of the step ({_TOLERANCE:g})",
+    )  # fmt: skip
+    tune.add_argument(
+        "--undo", action="store_true", help="revert the parameters after the comparison"
+    )
+    tune.set_defaults(run=run)
+
+
+def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
+    """Step, change, step, compare."""
+    _check(args)
+    from rtcf.identification.experiment import connected_output
+
+    settings = [rtcf.parse_parameter(each) for each in args.parameters]
+    controller = client.get_component(args.controller, args.runner)
+    name = controller.full_name
+    measured = args.measured or connected_output(client, args.runner, controller, "measured")
+    with excited.experiment(
+        client, args.runner, args.input or f"{name}.setpoint", measured
+    ) as experiment:
+        experiment.configure(
+            **excited.limits(args), shape="step", mode="replace", amplitude=args.size,
+            delay=args.duration, duration=args.duration,
+        )  # fmt: skip
+        found = [_step(experiment, args)]
+        if settings:
+            client.set_parameters(name, settings, args.runner, output.progress)
+            try:
+                found.append(_step(experiment, args))
+            except BaseException as error:
+                client.undo_parameters(name, args.runner)
+                if isinstance(error, rtcf.RtcfError):
+                    raise rtcf.RtcfError(f"{error}; the parameters were set back") from None
+                raise
+            if args.undo:
+                client.undo_parameters(name, args.runner, output.progress)
+    if output.for_people:
+        _print(found, name, args, output)
+    else:
+        names = ("before", "after")
+        output.data({each: asdict(measures) for each, (_, measures) in
+                     zip(names, found, strict=False)})  # fmt: skip
+
+
+def _check(args: argparse.Namespace) -> None:
+    excited.checked(args)
+    if not 0 < args.duration <= _LONGEST_S:
+        raise ValueError(f"--duration {args.duration:g}: more than 0, at most {_LONGEST_S:g} s")
+    if not 0 < args.tolerance < 1:
+        raise ValueError(f"--tolerance {args.tolerance:g}: between 0 and 1")
+    if not (args.size and np.isfinite(args.size)):
+        raise ValueError(f"--size {args.size:g}: a number other than 0")
+    if args.undo and not args.parameters:
+        raise ValueError("--undo requires --param")
+
+
+def _step(experiment: Experiment, args: argparse.Namespace) -> tuple[tuple[Any, Any], StepResponse]:
+    """Return time and value of a closed-loop step, and its measures."""
+    recorded = experiment.run(stepped=args.stepped)
+    excited.complete(recorded, experiment.excitation)
+    return _measured(recorded, args)
+
+
+def _measured(recorded: Recorded, args: argparse.Namespace) -> tuple[tuple[Any, Any], StepResponse]:
+    from rtcf.testing import step_response
+
+    begin = int(np.argmax(recorded.signal != 0))
+    if recorded.signal[begin] != args.size:
+        raise rtcf.RtcfError(
+            f"the limits leave {recorded.signal[begin]:g} of the step of {args.size:g}: set wider "
+            "limits, or a smaller --size"
+        )
+    before = recorded.outputs[: begin + 1]
+    initial = float(before[-max(int(_BASELINE * len(before)), 1) :].mean())
+    time, value = recorded.time[begin:] - recorded.time[begin], recorded.outputs[begin:]
+    target = float(recorded.inputs[-1])
+    return (time, value), step_response(time, value, target, initial, args.tolerance)
+
+
+def _print(
+    found: list[tuple[tuple[Any, Any], StepResponse]],
+    name: str,
+    args: argparse.Namespace,
+    output: Output,
+) -> None:
+    rows = [
+        (title, *(_value(getattr(measures, field), unit) for _, measures in found))
+        for title, field, unit in _ROWS
+    ]
+    columns = ("step", "before", "after") if len(found) > 1 else ("step", "now")
+    output.table(columns, rows, columns[1:])
+    for title, ((time, value), _) in zip(columns[1:], found, strict=True):
+        output.line("")
+        ends = {0.0: "0 s", 1.0: f"{time[-1]:.3g} s"}
+        for line in drawn(title, [list(value)], ends):
+            output.line(line)
+    if len(found) > 1:
+        output.line("")
+        output.line(_outcome(args.parameters, name, args.undo))
+
+
+def _outcome(parameters: Iterable[str], name: str, undone: bool) -> str:
+    text = ", ".join(parameters)
+    if undone:
+        return f"reverted {text} of {name}"
+    return f"set {text} of {name}; `rtcfctl undo {name}` reverts it"
+
+
+def _value(number: float, unit: str) -> str:
+    if not np.isfinite(number):
+        return "never"
+    if unit == "%":
+        return f"{100.0 * number:.1f} %"
+    return f"{figure(float(f'{number:.4g}'))}{' ' if unit else ''}{unit}"
