@@ -223,18 +223,22 @@ class Bench(Closing):
             data.append(each.data)
         written: dict[str, npt.NDArray[np.bool_]] = {}
         columns: dict[str, npt.NDArray[np.generic]] = {}
+        without_columns: dict[str, str] = {}
         for name, topic in self._ports(graph_pb2.DIRECTION_OUTPUT).items():
             written[name] = np.zeros(steps, bool)
             if topic not in by_topic:
                 continue
             at = np.asarray(by_topic[topic][0], np.int64)
             written[name][at] = True
-            for path, values in messages.unpack(
-                topics[topic].definition, by_topic[topic][1]
-            ).items():
+            try:
+                unpacked = messages.unpack(topics[topic].definition, by_topic[topic][1])
+            except ValueError as error:
+                without_columns[name] = str(error)
+                continue
+            for path, values in unpacked.items():
                 columns[f"{name}.{path}" if path else name] = held(values, at, steps)
         time = np.arange(steps) * (self._period_ns / 1e9)
-        return Response(time, written, columns)
+        return Response(time, written, columns, without_columns)
 
 
 def _build_tree() -> Path | None:

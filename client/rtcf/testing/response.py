@@ -16,7 +16,8 @@ class Response(Mapping[str, npt.NDArray[np.generic]]):
     time     the times of the cycles, in seconds from 0
     written  for each output, whether it was written in each cycle
 
-    Before an output is written for the first time, it is NaN, or 0 for integers and bool.
+    Before an output is written for the first time, it is NaN, or 0 for integers and bool. An output
+    whose messages differ in length, e.g. a text, has no values here.
     """
 
     def __init__(
@@ -24,13 +25,19 @@ class Response(Mapping[str, npt.NDArray[np.generic]]):
         time: npt.NDArray[np.floating[Any]],
         written: dict[str, npt.NDArray[np.bool_]],
         columns: dict[str, npt.NDArray[np.generic]],
+        without_columns: Mapping[str, str],
     ) -> None:
+        """`without_columns`: outputs that were written but have no columns, with the reasons."""
         self.time = time
         self.written = written
         self._columns = columns
+        self._without_columns = without_columns
 
     def __getitem__(self, name: str) -> npt.NDArray[np.generic]:
         if name not in self._columns:
+            for port, reason in self._without_columns.items():
+                if name == port or name.startswith(f"{port}."):
+                    raise KeyError(f"output {port} has no columns: {reason}")
             names = list(self._columns)
             raise KeyError(
                 f"no output {name} was written{suggestion(name, names)} "
