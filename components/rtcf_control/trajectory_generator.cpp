@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -16,6 +15,7 @@
 
 #include <rtcf/component.hpp>
 
+#include "joint_names.hpp"
 #include "trajectory/stop_motion.hpp"
 #include "trajectory/synchronized_motion.hpp"
 #include "trajectory/trajectory_points.hpp"
@@ -24,11 +24,9 @@ namespace rtcf_control {
 namespace {
 
 class TrajectoryGenerator final : public rtcf::Component {
-    static constexpr std::size_t kMostJoints = SynchronizedMotion::kMostAxes;
+    static_assert(kMostJoints == SynchronizedMotion::kMostAxes);
     // Of a trajectory from a component of the loop, without allocation.
     static constexpr std::size_t kReservedPoints = 128;
-    // Of a message; bounds the work of a cycle.
-    static constexpr std::size_t kMostNames = 1024;
     // Rounding errors of positions and velocities that are compared with their limits, relative.
     static constexpr double kLimitTolerance = 1e-9;
 
@@ -38,20 +36,6 @@ class TrajectoryGenerator final : public rtcf::Component {
     using Motions = std::array<Motion, kMostJoints>;
     using Strings = std::vector<std::string>;
 
-    // Words separated by spaces or commas.
-    static Strings words(const std::string& text) {
-        Strings found;
-        std::string word;
-        for (const char c : text + " ") {
-            if (c != ',' && std::isspace(static_cast<unsigned char>(c)) == 0) {
-                word += c;
-            } else if (!word.empty()) {
-                found.push_back(word);
-                word.clear();
-            }
-        }
-        return found;
-    }
     static double seconds(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
     // At most some hundred years.
     static std::int64_t nanoseconds(double seconds) {
@@ -267,13 +251,7 @@ class TrajectoryGenerator final : public rtcf::Component {
         Setup setup;
         setup.joints = words(proposed[joints]);
         const std::size_t count = setup.joints.size();
-        if (count == 0 || count > kMostJoints)
-            return RTCF_FAIL(this, "joints has {} names; write 1 to {}", count, kMostJoints);
-        Strings sorted = setup.joints;
-        std::sort(sorted.begin(), sorted.end());
-        if (const auto twice = std::adjacent_find(sorted.begin(), sorted.end());
-            twice != sorted.end())
-            return RTCF_FAIL(this, "joints has {} twice", *twice);
+        if (const std::string why = jointsError(setup.joints); !why.empty()) return fail(why);
         if (memory_ && setup.joints != setup_->joints)
             return fail("joints cannot change after the load; unload the component and load it");
         Numbers numbers{};

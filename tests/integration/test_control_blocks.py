@@ -30,8 +30,10 @@ TYPES = (
 )  # fmt: skip
 # Tested in modules of their own.
 OTHERS = (
-    "Biquads", "CommandTimeout", "EStop", "Excitation", "Heartbeat", "JointLimiter",
-    "KalmanFilter", "Motor", "Pid", "SignalGenerator", "StateSpace", "TrajectoryGenerator",
+    "Biquads", "CommandTimeout", "EStop", "Excitation", "FrictionCompensation",
+    "Heartbeat", "JointCommandSubscriber", "JointLimiter",
+    "JointStatePublisher", "KalmanFilter", "Motor", "Pid", "SignalGenerator", "StateSpace",
+    "TrajectoryGenerator",
 )  # fmt: skip
 STATEFUL = (
     "Backlash", "Delay", "Derivative", "Hysteresis", "Integrator", "MovingAverage", "RateLimiter",

@@ -166,6 +166,43 @@ def _tune(folder: Path) -> str:
     return plots[: plots.index("set kp")].rstrip()
 
 
+def _friction(_: Path) -> str:
+    with Bench("rtcf_control/FrictionCompensation", path=PATH, coulomb=2.0, breakaway=3.0,
+               viscous=0.5) as bench:  # fmt: skip
+        found = bench.run({"velocity": np.linspace(-0.5, 0.5, 2001)})
+    marks = {0.0: "-0.5 rad/s", 0.5: "0", 1.0: "0.5 rad/s"}
+    return drawn("effort in N m by velocity", found["effort"], marks)
+
+
+_JOINTS = """\
+components:
+  - {name: arm, package: rtcf_control, type: TrajectoryGenerator, remaps: {command: /command},
+     parameters: {joints: shoulder elbow, initial: 0 0.5}}
+  - {name: split, package: rtcf_control, type: JointCommandSubscriber,
+     remaps: {command: /command, position1: /shoulder, position2: /elbow},
+     parameters: {joints: shoulder elbow}}
+  - {name: elbow_limiter, package: rtcf_control, type: JointLimiter,
+     remaps: {in: /elbow, out: /elbow_limited}, parameters: {upper: 0.8}}
+  - {name: state, package: rtcf_control, type: JointStatePublisher,
+     remaps: {position1: /shoulder, position2: /elbow_limited},
+     parameters: {joints: shoulder elbow}}
+"""
+
+
+def _joints(folder: Path) -> str:
+    file = folder / "loop.yaml"
+    file.write_text(_JOINTS)
+    with Bench(str(file), path=PATH) as bench:
+        target = MASKED.array(np.tile([-0.5, 1.0], (2500, 1)), mask=np.ones((2500, 2), bool))
+        target.mask[0] = False
+        found = bench.run({"/arm.target.position": target})
+    position = found["/state.state.position"]
+    marks = {0.0: "0 s: target -0.5, 1", 1.0: "2.5 s"}
+    return "\n\n".join(
+        drawn(name, position[:, index], marks) for index, name in enumerate(["shoulder", "elbow"])
+    )
+
+
 PLOTS: dict[str, tuple[str, Callable[[Path], str]]] = {
     "pid": ("pid.md", _pid),
     "biquads": ("biquads.md", _biquads),
@@ -176,6 +213,8 @@ PLOTS: dict[str, tuple[str, Callable[[Path], str]]] = {
     "motor": ("motor.md", _motor),
     "identify": ("motor.md", _identify),
     "tune": ("motor.md", _tune),
+    "friction": ("friction.md", _friction),
+    "joints": ("joints.md", _joints),
 }
 
 

@@ -55,6 +55,8 @@ PREPARE: dict[str, Callable[[Daemon, rtcf.Client], None]] = {
     "control/index.md": _nothing,
     "control/biquads.md": _nothing,
     "control/excitation.md": _nothing,
+    "control/friction.md": _nothing,
+    "control/joints.md": _nothing,
     "control/kalman_filter.md": _nothing,
     "control/pid.md": _nothing,
     "control/safety.md": _nothing,
