@@ -31,7 +31,7 @@ TYPES = (
 # Tested in modules of their own.
 OTHERS = (
     "Biquads", "CommandTimeout", "EStop", "Excitation", "FrictionCompensation",
-    "Heartbeat", "JointCommandSubscriber", "JointLimiter",
+    "GravityCompensation", "Heartbeat", "JointCommandSubscriber", "JointLimiter",
     "JointStatePublisher", "KalmanFilter", "Motor", "Pid", "SignalGenerator", "StateSpace",
     "TrajectoryGenerator",
 )  # fmt: skip

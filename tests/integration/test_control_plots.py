@@ -203,6 +203,30 @@ def _joints(folder: Path) -> str:
     )
 
 
+_LINK = (
+    '<link name="{}"><inertial><origin xyz="0.5 0 0"/><mass value="1"/><inertia ixx="0" ixy="0" '
+    'ixz="0" iyy="0" iyz="0" izz="0"/></inertial></link>'
+)
+_TWO_LINKS = (
+    '<robot name="arm"><link name="base"/>' + _LINK.format("upper") + _LINK.format("fore") +
+    '<joint name="shoulder" type="continuous"><parent link="base"/><child link="upper"/>'
+    '<axis xyz="0 -1 0"/></joint><joint name="elbow" type="continuous"><origin xyz="1 0 0"/>'
+    '<parent link="upper"/><child link="fore"/><axis xyz="0 -1 0"/></joint></robot>'
+)  # fmt: skip
+
+
+def _gravity(_: Path) -> str:
+    with Bench("rtcf_control/GravityCompensation", path=PATH, urdf=_TWO_LINKS) as bench:
+        shoulder = np.linspace(0.0, 2.0 * np.pi, 2001)
+        position = np.stack([shoulder, np.zeros(2001)], axis=1)
+        effort = bench.run({"measured.position": position})["command.effort"]
+    marks = {0.0: "0", 0.5: "180 degrees", 1.0: "360 degrees"}
+    return "\n\n".join(
+        drawn(f"effort of {name} in N m", effort[:, index], marks)
+        for index, name in enumerate(["shoulder", "elbow"])
+    )
+
+
 PLOTS: dict[str, tuple[str, Callable[[Path], str]]] = {
     "pid": ("pid.md", _pid),
     "biquads": ("biquads.md", _biquads),
@@ -215,6 +239,7 @@ PLOTS: dict[str, tuple[str, Callable[[Path], str]]] = {
     "tune": ("motor.md", _tune),
     "friction": ("friction.md", _friction),
     "joints": ("joints.md", _joints),
+    "gravity": ("gravity.md", _gravity),
 }
 
 

@@ -56,6 +56,7 @@ PREPARE: dict[str, Callable[[Daemon, rtcf.Client], None]] = {
     "control/biquads.md": _nothing,
     "control/excitation.md": _nothing,
     "control/friction.md": _nothing,
+    "control/gravity.md": _nothing,
     "control/joints.md": _nothing,
     "control/kalman_filter.md": _nothing,
     "control/pid.md": _nothing,
