@@ -172,14 +172,17 @@ class StateSpace final : public rtcf::Component {
                                        rtcf::Doc("number of outputs in the last cycle")};
     rtcf::State<bool> begun_{this, "begun", false, rtcf::Doc("the states are valid")};
 
-    // The model and its design, of any size. Returns an error, or empty.
+    // The model and its design, of any size. Its functions return an error, or empty.
     struct Designer {
+        Designer(const rtcf::Values& values, const StateSpace& component, double period)
+            : proposed(values), of(component), period_s(period) {}
+
         const rtcf::Values& proposed;
         const StateSpace& of;
         double period_s;
-        Design made{};
-        MatrixXd a{}, b{}, c{}, d{};  // as given
-        MatrixXd moved{}, driven{};   // discrete a, b
+        Design made;
+        MatrixXd a, b, c, d;     // as given
+        MatrixXd moved, driven;  // discrete a, b
 
         int states() const { return static_cast<int>(a.rows()); }
         int inputs() const { return static_cast<int>(b.cols()); }
@@ -446,7 +449,7 @@ class StateSpace final : public rtcf::Component {
     };
 
     bool prepare(const rtcf::Values& proposed) override {
-        Designer designer{proposed, *this, design_period_.proposedSeconds()};
+        Designer designer(proposed, *this, design_period_.proposedSeconds());
         if (const std::string error = designer.design(); !error.empty())
             return RTCF_FAIL(this, "{}", error);
         design_.stage(std::move(designer.made));
@@ -460,11 +463,9 @@ class StateSpace final : public rtcf::Component {
 
     void update() override {
         const Design& design = *design_;
-        bool has_inputs = false;
-        bool has_measured = false;
-        const SmallVector in = read(in_, design.inputs, has_inputs);
-        const SmallVector measured = read(measured_, design.measured, has_measured);
-        if (!begun_ && !has_measured) return;
+        const SmallVector in = read(in_, design.inputs);
+        const SmallVector measured = read(measured_, design.measured);
+        if (!begun_ && !complete(measured_, design.measured)) return;
         if (!in.allFinite() || !measured.allFinite()) {
             reject();
             if (begun_ && design.role != Role::System && design.role != Role::Regulator)
@@ -524,16 +525,20 @@ class StateSpace final : public rtcf::Component {
             out_[static_cast<std::size_t>(i)]->write(design.safe[i]);
     }
 
-    // `complete` = all have a value; those without one count as 0.
-    static SmallVector read(Ports<rtcf::Input<double>, kPorts>& ports, int count, bool& complete) {
+    // Inputs without a value count as 0.
+    static SmallVector read(Ports<rtcf::Input<double>, kPorts>& ports, int count) {
         SmallVector values(count);
-        complete = true;
         for (int i = 0; i < count; ++i) {
             rtcf::Input<double>& port = *ports[static_cast<std::size_t>(i)];
-            complete = port.read() != rtcf::DataStatus::None && complete;
+            port.read();
             values[i] = port.value();
         }
         return values;
+    }
+
+    static bool complete(const Ports<rtcf::Input<double>, kPorts>& ports, int count) {
+        return std::all_of(ports.begin(), ports.begin() + count,
+                           [](const auto& port) { return port->age() >= 0; });
     }
 
     // Rejected by the check: readers keep the last outputs.

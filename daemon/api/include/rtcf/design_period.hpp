@@ -22,7 +22,8 @@
 
 namespace rtcf {
 
-/// A component has at most one. It needs no value from the component.
+/// A component has at most one. The executor calls its virtual functions and propose(): raise
+/// RTCF_ABI_VERSION with any change of its layout.
 class DesignPeriod final : public DerivedBase {
    public:
     /// @param owner the component, `this`

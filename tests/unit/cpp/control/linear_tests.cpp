@@ -64,6 +64,33 @@ TEST_P(Roles, AreRealTimeSafe) {
 INSTANTIATE_TEST_SUITE_P(StateSpace, Roles,
                          testing::Values("system", "observer", "regulator", "lqg"));
 
+TEST(StateSpace, CommandsItsSafeValueWithinTheLimitsInTheLastCycle) {
+    for (const char* role : {"regulator", "lqg"}) {
+        Bench bench("StateSpace", {{"B", std::string("1 2")},
+                                   {"role", std::string(role)},
+                                   {"lower", std::string("-1 -1")},
+                                   {"upper", std::string("1 3")},
+                                   {"safe_value", std::string("2")}});
+        bench.write("measured1", 50.0);
+        bench.cycle(2);
+        EXPECT_EQ(*bench.read<double>("out1"), -1.0);
+        EXPECT_EQ(*bench.read<double>("out2"), -1.0);
+        bench.safe();
+        EXPECT_EQ(*bench.read<double>("out1"), 1.0);
+        EXPECT_EQ(*bench.read<double>("out2"), 2.0);
+    }
+}
+
+TEST(StateSpace, PassesOnASafeCommandInTheLastCycle) {
+    Bench bench("StateSpace",
+                {{"A", std::string()}, {"B", std::string()}, {"D", std::string("2")}});
+    bench.write("in1", 1.0);
+    bench.cycle();
+    bench.write("in1", 0.0);
+    bench.safe();
+    EXPECT_EQ(*bench.read<double>("out1"), 0.0);
+}
+
 class Modes : public testing::TestWithParam<bool> {};
 
 TEST_P(Modes, AreRealTimeSafe) {
