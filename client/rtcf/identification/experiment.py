@@ -180,7 +180,7 @@ class Experiment:
         names = [f"{self._excitation}.{each}" for each in ("out", "signal", "state", "armed")]
         with self._client.watch_ports([*names, self._measured], self._runner) as stream:
             self._require(stream, [*names, self._measured])
-            collector = _Collector(names, self._measured, period_ns)
+            collector = Collector(names, self._measured, period_ns)
             try:
                 if stepped:
                     self._follow_steps(stream, collector, period_ns)
@@ -197,7 +197,7 @@ class Experiment:
         self._write(False)
         return collector.recorded(late=self._is_late())
 
-    def _follow(self, stream: PortStream, collector: _Collector) -> None:
+    def _follow(self, stream: PortStream, collector: Collector) -> None:
         """Excite a running loop until the end of the excitation."""
         over = threading.Event()
 
@@ -226,7 +226,7 @@ class Experiment:
             if begun:
                 renewer.join()
 
-    def _follow_steps(self, stream: PortStream, collector: _Collector, period_ns: int) -> None:
+    def _follow_steps(self, stream: PortStream, collector: Collector, period_ns: int) -> None:
         """Excite a stopped loop in steps."""
         chunk = max(int(_LEASE_S / _RENEWALS * 1e9 / period_ns), 1)
         self._step(stream, collector, 2)
@@ -235,7 +235,7 @@ class Experiment:
             self._write(True)
             self._step(stream, collector, chunk)
 
-    def _step(self, stream: PortStream, collector: _Collector, cycles: int) -> None:
+    def _step(self, stream: PortStream, collector: Collector, cycles: int) -> None:
         self._client.step(cycles, self._runner)
         wanted = collector.cycles + cycles
         for batch in stream:
@@ -266,7 +266,7 @@ class Experiment:
         return order.index(component) > order.index(self._excitation)
 
 
-class _Collector:
+class Collector:
     """The values of a stream around an excitation."""
 
     def __init__(self, names: list[str], measured: str, period_ns: int) -> None:

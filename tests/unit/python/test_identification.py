@@ -16,12 +16,22 @@ import pytest
 from hypothesis import given, seed, settings
 from hypothesis import strategies as st
 from rtcf.identification import fitting, require_scipy, tuning
-from rtcf.identification.experiment import COMPLETED, LEFT_LIMITS, Recorded
+from rtcf.identification.experiment import (
+    COMPLETED,
+    LEFT_LIMITS,
+    NOT_BEGUN,
+    READY,
+    RUNNING,
+    Collector,
+    Recorded,
+)
 from rtcf.identification.margins import loop_response, margins
 from rtcf.identification.models import StateSpace, Transfer
 from rtcf.identification.result import estimated_response, fitted_response, identify
 from rtcf.identification.tuning import Gains, RelayPoint
+from rtcf.v1 import ports_pb2
 from rtcf_shared.errors import RtcfError
+from rtcf_shared.ports import PortBatch, PortSchema, Signal
 from scipy import signal
 
 EXACT, NOISY, ROUNDING, MARGIN = 1e-3, 0.05, 1e-9, 1e-6
@@ -386,3 +396,76 @@ def test_without_scipy_one_line_names_the_package(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(builtins, "__import__", without)
     with pytest.raises(RtcfError, match="^identification needs SciPy: sudo apt install"):
         require_scipy()
+
+
+# The cycles of a stream.
+
+NAMES = ["/e.out", "/e.signal", "/e.state", "/e.armed"]
+PERIOD_NS = 10_000_000
+SCHEMA = PortSchema(
+    tuple(ports_pb2.PortColumn(size=8) for _ in range(5)),
+    (),
+    {name: Signal(name, "", n, "<f8", (), 0) for n, name in enumerate([*NAMES, "/m.y"])},
+)
+
+
+def batch(first: int, states: list[int], armed: list[int], cycles: list[int] | None = None) -> Any:
+    """Return cycles whose input is 10 times, and whose output is 100 times the cycle number."""
+    numbers = np.arange(first, first + len(states)) if cycles is None else np.array(cycles)
+    columns = [10.0 * numbers, numbers, states, armed, 100.0 * numbers]
+    message = ports_pb2.PortBatch(
+        stamps_ns=[int(each) * PERIOD_NS for each in numbers],
+        values=[np.asarray(each, "<f8").tobytes() for each in columns],
+    )
+    return PortBatch(SCHEMA, 1, first, 0, False, message)
+
+
+def collected(*batches: Any) -> Collector:
+    collector = Collector(NAMES, "/m.y", PERIOD_NS)
+    for each in batches:
+        collector.take(each)
+    return collector
+
+
+def test_the_record_begins_one_cycle_before_the_excitation() -> None:
+    found = collected(
+        batch(0, [READY] * 3, [0, 1, 1]),
+        batch(3, [READY, RUNNING, RUNNING], [1, 0, 0]),
+        batch(6, [RUNNING, COMPLETED], [0, 0]),
+    )
+    assert found.over
+    run = found.recorded(late=False)
+    assert run.inputs.tolist() == [30.0, 40.0, 50.0, 60.0]
+    assert run.outputs.tolist() == [300.0, 400.0, 500.0, 600.0]
+    assert run.time.tolist() == pytest.approx([-0.01, 0.0, 0.01, 0.02])
+    assert (run.outcome, run.filled) == (COMPLETED, 0)
+    # Read by a loop break, outputs come one cycle later.
+    assert found.recorded(late=True).outputs.tolist() == [200.0, 300.0, 400.0, 500.0]
+
+
+def test_the_end_of_an_earlier_excitation_does_not_count() -> None:
+    found = collected(batch(0, [NOT_BEGUN] * 4, [0, 0, 1, 1]))
+    assert found.armed and not found.over
+    found = collected(batch(0, [NOT_BEGUN] * 4, [0, 0, 1, 0]))
+    assert found.over
+    assert "did not begin" in found.recorded(late=False).why
+
+
+def test_missing_cycles_are_interpolated_and_many_are_rejected() -> None:
+    cycles = [n for n in range(3, 203) if n not in (50, 120)]
+    found = collected(
+        batch(0, [READY] * 3, [0, 1, 1]),
+        batch(3, [RUNNING] * 197 + [LEFT_LIMITS], [0] * 198, cycles),
+    )
+    run = found.recorded(late=False)
+    assert (run.filled, run.outcome) == (2, LEFT_LIMITS)
+    assert run.outputs.tolist() == [100.0 * n for n in range(2, 202)]
+    # The command is constant until the next cycle.
+    assert run.inputs[50 - 2] == 490.0
+    cycles = list(range(3, 203, 2))
+    found = collected(
+        batch(0, [READY] * 3, [0, 1, 1]),
+        batch(3, [RUNNING] * 99 + [COMPLETED], [0] * 100, cycles),
+    )
+    with pytest.raises(RtcfError, match="98 of 198 cycles are late or dropped: the values are not"):
+        found.recorded(late=False)
