@@ -49,6 +49,10 @@ def _loop_with_a_bag(daemon: Daemon, client: rtcf.Client) -> None:
         bag.write("/G2_R2", Float64(1.5), rospy.Time(_BAG_S + 1))
 
 
+def _pendulum(daemon: Daemon, _: rtcf.Client) -> None:
+    (daemon.folder / "pendulum.xml").write_text(_block("mujoco.md", "xml", "<mujoco>"))
+
+
 # Setup that a page assumes.
 PREPARE: dict[str, Callable[[Daemon, rtcf.Client], None]] = {
     "boot.md": _nothing,
@@ -69,6 +73,7 @@ PREPARE: dict[str, Callable[[Daemon, rtcf.Client], None]] = {
     "graph-files.md": _graph_of_a_file("arm.yaml"),
     "graph.md": _nothing,
     "incidents.md": _nothing,
+    "mujoco.md": _pendulum,
     "operating.md": _nothing,
     "performance.md": _graph_of_a_file("fig1.yaml"),
     "ros.md": _nothing,

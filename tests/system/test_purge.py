@@ -4,8 +4,8 @@ from machine import Machine, wait_for
 from rtcf_service import Service
 
 PACKAGES = ("librtcf-dev", "python3-rtcf", "ros-rtcf", "rtcf-check", "rtcf-components",
-            "rtcf-control", "rtcf-doc", "rtcf-python", "rtcf-scope", "rtcfctl",
-            "rtcfd")  # fmt: skip
+            "rtcf-control", "rtcf-doc", "rtcf-mujoco", "rtcf-python", "rtcf-scope",
+            "rtcfctl", "rtcfd")  # fmt: skip
 
 
 def test_removal_while_rtcfd_is_dead_ends_its_loops(machine: Machine) -> None:
