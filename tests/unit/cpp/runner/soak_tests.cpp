@@ -1,6 +1,6 @@
 // Random changes while the loop runs, other threads query, and topics flow in and out: for
 // ThreadSanitizer and AddressSanitizer, which find errors that no counter shows. The expected graph
-// is a map here; tests/integration/test_soak.py has the complete model.
+// is a map here; tests/integration/graph/test_soak.py has the complete model.
 #include <gtest/gtest.h>
 
 #include <algorithm>

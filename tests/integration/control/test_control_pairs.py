@@ -1,0 +1,104 @@
+"""Components of rtcf_control in C++ and in Python, each against the other."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from daemon_process import BUILD_TREE
+from rtcf.testing import Bench
+
+SOURCES = Path(__file__).parents[3] / "components" / "rtcf_control" / "python"
+ROUNDING = 1e-12  # relative, of values of size 1
+STEPS = 2000
+# Steps, noise, and values that are not finite.
+SIGNAL = np.repeat(np.random.default_rng(7).normal(0.0, 2.0, STEPS // 50), 50)
+SIGNAL = SIGNAL + 0.2 * np.random.default_rng(8).normal(size=STEPS)
+SIGNAL[[100, 101, 700, 1500]] = np.nan, np.inf, -np.inf, np.nan
+RESET = np.arange(STEPS) % 600 > 590
+
+# By pair: the parameters of both, and of the one in C++ if they differ.
+PAIRS: list[tuple[str, str, Mapping[str, Any], Mapping[str, Any] | None]] = [
+    ("Saturation", "Saturation", {"lower": -1.0, "upper": 1.5}, None),
+    ("Saturation", "Saturation", {}, None),
+    ("RateLimiter", "RateLimiter", {"rising": 20.0, "falling": 50.0}, None),
+    ("RateLimiter", "RateLimiter", {}, None),
+    ("DeadBand", "DeadBand", {"lower": -0.5, "upper": 0.2}, None),
+    ("Backlash", "Backlash", {"width": 0.7}, None),
+    ("Hysteresis", "Hysteresis", {"low": -0.5, "high": 0.4, "initial": True}, None),
+    ("Integrator", "Integrator", {"gain": 3.0, "initial": 0.1, "upper": 1.0}, None),
+    ("Integrator", "Integrator", {"method": "euler"}, None),
+    ("Derivative", "Derivative", {"gain": 0.3, "filter_time": 0.01}, None),
+    ("Derivative", "Derivative", {}, None),
+    ("MovingAverage", "MovingAverage", {"length": 37}, None),
+    ("MovingAverage", "MovingAverage", {"length": 1}, None),
+    ("Biquads", "Biquad", {"kind": "lowpass", "f": 40.0, "q": 0.9}, {"sections": "lowpass 40 0.9"}),
+    ("Biquads", "Biquad", {"kind": "highpass", "f": 5.0, "q": 0.6}, {"sections": "highpass 5 0.6"}),
+    ("Biquads", "Biquad", {"kind": "bandpass", "f": 30.0, "q": 3.0}, {"sections": "bandpass 30 3"}),
+    ("Biquads", "Biquad", {"kind": "notch", "f": 90.0, "q": 5.0}, {"sections": "notch 90 5"}),
+]
+OUTPUTS = {
+    "Saturation": {"out": "y", "saturated": "saturated"},
+    "RateLimiter": {"out": "y", "limited": "limited"},
+}
+
+
+@pytest.fixture(scope="module")
+def compiled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """Return a folder of packages with the components in Python, compiled, as package `pairs`."""
+    folder = tmp_path_factory.mktemp("pairs")
+    (folder / "pairs").mkdir()
+    subprocess.run(
+        [BUILD_TREE / "bin" / "rtcf-compile", *sorted(SOURCES.glob("*.py")),
+         "-o", folder / "pairs" / "pairs.so"],
+        check=True,
+    )  # fmt: skip
+    yield folder
+
+
+def _line(name: str, package: str, type_: str, parameters: Mapping[str, Any]) -> str:
+    given = ", ".join(f"{key}: {value!r}" for key, value in parameters.items())
+    return f"  - {{name: {name}, ns: /{name}, package: {package}, type: {type_}, " \
+           f"parameters: {{{given}}}}}\n"  # fmt: skip
+
+
+@pytest.mark.parametrize(("cpp", "python", "parameters", "other"), PAIRS)
+def test_both_have_the_same_outputs(
+    compiled: Path,
+    tmp_path: Path,
+    cpp: str,
+    python: str,
+    parameters: Mapping[str, Any],
+    other: Mapping[str, Any] | None,
+) -> None:
+    file = tmp_path / "pair.yaml"
+    file.write_text(
+        "components:\n"
+        + _line("cpp", "rtcf_control", cpp, other or parameters).replace("True", "true")
+        + _line("python", "pairs", python, parameters).replace("True", "true")
+    )
+    inputs: dict[str, Any] = {"/cpp/cpp.in": SIGNAL, "/python/python.u": SIGNAL}
+    if cpp == "Integrator":
+        inputs |= {"/cpp/cpp.reset": RESET, "/python/python.reset": RESET}
+    with Bench(str(file), path=[BUILD_TREE / "lib" / "rtcf", compiled]) as bench:
+        found = bench.run(inputs)
+    for ours, theirs in OUTPUTS.get(cpp, {"out": "y"}).items():
+        one, two = found[f"/cpp/cpp.{ours}"], found[f"/python/python.{theirs}"]
+        assert np.allclose(
+            one.astype(float), two.astype(float), rtol=0, atol=ROUNDING, equal_nan=True
+        )
+    assert len(np.unique(one.astype(float))) > 1 or not parameters
+
+
+def test_the_sources_are_the_compiled_pairs() -> None:
+    written = {
+        line.removeprefix("class ").split("(")[0]
+        for file in SOURCES.glob("*.py")
+        for line in file.read_text().splitlines()
+        if line.startswith("class ") and "(Component)" in line
+    }
+    assert written == {python for _, python, _, _ in PAIRS}

@@ -1,0 +1,36 @@
+"""The example components in Python: each is accepted unchanged, and gives the same results compiled
+and interpreted.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rtcf_compile.main import main
+from rtcf_compile.rewriting import numpy_functions
+
+ROOT = Path(__file__).parents[4]
+FOLDER = ROOT / "components" / "rtcf_examples" / "python"
+EXAMPLES = sorted(each.stem for each in FOLDER.glob("*.py"))
+
+
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_an_example_gives_the_same_results_compiled_and_interpreted(name: str) -> None:
+    assert main([str(FOLDER / f"{name}.py"), "--verify", "400"]) == 0
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", EXAMPLES)
+def test_an_example_gives_the_same_results_over_20000_cycles(name: str) -> None:
+    assert main([str(FOLDER / f"{name}.py"), "--verify", "20000"]) == 0
+
+
+def test_functions_of_numpy_are_in_the_documentation() -> None:
+    page = (ROOT / "docs" / "python-components.md").read_text()
+    libm = set(numpy_functions.LIBM) - {"exp", "log", "hypot"}
+    aliases = {"ascontiguousarray", "amax", "amin", "around", "vdot", "matmul"}
+    aliases |= {"round_", "trapezoid"}
+    for function, _ in numpy_functions.STANDS_FOR:
+        name = function.__name__
+        is_numpy = name not in libm | aliases and getattr(np, name, None) is function
+        assert not is_numpy or f"`{name}`" in page, name

@@ -1,0 +1,121 @@
+"""Imports and includes between layers point down, and `make lint` reports exceptions."""
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+TREE = Path(__file__).resolve().parents[4]
+
+
+def check(*arguments: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [TREE / "tools" / "check-arrows", *arguments], capture_output=True, text=True
+    )
+
+
+@pytest.fixture
+def house(tmp_path: Path) -> Path:
+    """A package of two correct layers."""
+    (tmp_path / "rooms").write_text("house.attic\nhouse.cellar\nhouse\n")
+    for room in ("attic", "cellar"):
+        (tmp_path / "src" / "house" / room).mkdir(parents=True)
+        (tmp_path / "src" / "house" / room / "__init__.py").touch()
+    (tmp_path / "src" / "house" / "__init__.py").touch()
+    (tmp_path / "src" / "house" / "attic" / "box.py").write_text("from house.cellar import wine\n")
+    (tmp_path / "src" / "house" / "cellar" / "wine.py").touch()
+    return tmp_path
+
+
+def test_the_layers_of_this_tree_are_correct() -> None:
+    found = check()
+    assert (found.returncode, found.stderr) == (0, "")
+
+
+def test_lint_checks_them() -> None:
+    assert "tools/check-arrows" in (TREE / "tools" / "lint").read_text()
+
+
+def test_an_import_of_a_lower_layer_is_accepted(house: Path) -> None:
+    assert check(house / "rooms", house).returncode == 0
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "from house.attic.box import box",
+        "def late():\n    import house.attic.box",
+        "import typing\nif typing.TYPE_CHECKING:\n    from house.attic import box",
+    ],
+)
+def test_an_import_of_a_higher_layer_is_rejected(house: Path, text: str) -> None:
+    (house / "src" / "house" / "attic" / "box.py").touch()
+    (house / "src" / "house" / "cellar" / "wine.py").write_text(text)
+    found = check(house / "rooms", house)
+    assert found.returncode == 1
+    assert "house.cellar must not import house.attic" in found.stderr
+
+
+def test_a_circle_within_a_package_is_rejected(house: Path) -> None:
+    cellar = house / "src" / "house" / "cellar"
+    (cellar / "wine.py").write_text("from house.cellar.rack import Rack")
+    (cellar / "rack.py").write_text(
+        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import house.cellar.wine"
+    )
+    found = check(house / "rooms", house)
+    assert found.returncode == 1
+    assert "in a circle" in found.stderr
+
+
+def test_a_module_without_a_layer_is_rejected(house: Path) -> None:
+    (house / "rooms").write_text("house.attic\nhouse.cellar\n")
+    assert "has no package for it" in check(house / "rooms", house).stderr
+
+
+@pytest.fixture
+def hall(tmp_path: Path) -> Path:
+    """A C++ package of two correct layers."""
+    (tmp_path / "rooms").write_text("hall.main\nhall.gallery\nhall.vault\n")
+    for room in ("gallery", "vault"):
+        (tmp_path / "src" / "hall" / room).mkdir(parents=True)
+    (tmp_path / "src" / "hall" / "CMakeLists.txt").touch()
+    for file, text in (
+        ("main.cpp", '#include "gallery/view.hpp"\n'),
+        ("gallery/view.hpp", '#include <vector>\n#include "vault/coin.hpp"\n'),
+        ("gallery/view.cpp", '#include "gallery/view.hpp"\n'),
+        ("vault/coin.hpp", '#include "another/library.hpp"\n'),
+    ):
+        (tmp_path / "src" / "hall" / file).write_text(text)
+    return tmp_path
+
+
+def test_includes_of_a_lower_layer_are_accepted(hall: Path) -> None:
+    found = check(hall / "rooms", hall)
+    assert (found.returncode, found.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("file", ["coin.hpp", "coin.cpp"])
+@pytest.mark.parametrize(
+    "text", ['#include "gallery/view.hpp"', '# include "hall/gallery/view.hpp"']
+)
+def test_an_include_of_a_higher_layer_is_rejected(hall: Path, file: str, text: str) -> None:
+    (hall / "src" / "hall" / "vault" / file).write_text(f"#pragma once\n{text}\n")
+    found = check(hall / "rooms", hall)
+    assert found.returncode == 1
+    assert f"vault/{file}:2: hall.vault must not import hall.gallery" in found.stderr
+
+
+def test_a_circle_of_includes_within_a_package_is_rejected(hall: Path) -> None:
+    vault = hall / "src" / "hall" / "vault"
+    (vault / "coin.hpp").write_text('#include "vault/bar.hpp"\n')
+    (vault / "bar.hpp").touch()
+    (vault / "bar.cpp").write_text('#include "vault/bar.hpp"\n#include "vault/coin.hpp"\n')
+    found = check(hall / "rooms", hall)
+    assert found.returncode == 1
+    assert "in a circle" in found.stderr
+
+
+def test_a_folder_without_a_layer_is_rejected(hall: Path) -> None:
+    (hall / "src" / "hall" / "attic").mkdir()
+    (hall / "src" / "hall" / "attic" / "box.hpp").touch()
+    assert "attic/box.hpp: tools/rooms has no package for it" in check(hall / "rooms", hall).stderr
