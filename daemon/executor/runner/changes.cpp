@@ -5,11 +5,10 @@
 
 #include "common/refusal.hpp"
 #include "common/time_units.hpp"
+#include "logging/log_errors.hpp"
 #include "runner/runner.hpp"
 
 namespace rtcf::executor {
-
-namespace {}  // namespace
 
 MappingFilter Runner::filter() const {
     return {NamePattern("whitelist", settings_.whitelist),
@@ -25,7 +24,7 @@ std::shared_ptr<Instance> Runner::makeInstance(ComponentDefinition definition,
                                                bool configure) {
     const std::string full_name = definition.fullName();
     progress("loading " + full_name);
-    note(full_name + ".constructor");
+    activity_.begin(full_name + ".constructor");
     const std::shared_ptr<const Library> code = libraries_.open(library);
     requireThreadLocals(*code);
     auto instance =
@@ -36,7 +35,7 @@ std::shared_ptr<Instance> Runner::makeInstance(ComponentDefinition definition,
         return instance;
     }
     progress("configuring " + full_name);
-    note(full_name + ".configure");
+    activity_.begin(full_name + ".configure");
     instance->configure();
     return instance;
 }
@@ -70,7 +69,7 @@ std::string Runner::whatDoesNotReturn() const {
 }
 
 void Runner::adoptAtBoundary(Adoption& adoption) {
-    note({});
+    activity_.end();
     if (loop_.adopt(adoption, adoptionTimeout())) return;
     throw Refusal(RefusalKind::Unavailable,
                   fmt::format("the loop of {} reaches no cycle boundary: {}; nothing has changed",
@@ -93,14 +92,13 @@ std::vector<std::string> Runner::adopt(Change change, const Progress& progress) 
     adoption.copies = change.copies;
     adoption.period_ns = change.period_ns;
     adoption.restoration = change.restoration;
-    std::shared_ptr<const FrameTable> frames = framesOf(*plan);
     // Frames must not copy values of leaving components, even if a client watches them.
-    adoption.frames = frames->ring.get();
-    adoption.timed = frames->turns.wanted();
+    std::shared_ptr<const FrameTable> frames =
+        frames_.prepare(*plan, settings_.frequency_hz, settings_.frame_bytes, adoption);
     if (loop_.running() || state_ == RunnerState::Stepping) {
         for (const auto& instance : change.arriving) {
             progress("starting " + instance->fullName());
-            note(instance->fullName() + ".start");
+            activity_.begin(instance->fullName() + ".start");
             instance->start();
         }
     }
@@ -113,18 +111,18 @@ std::vector<std::string> Runner::adopt(Change change, const Progress& progress) 
     }
     plan->noteKept(adoption, *plan_);
     std::swap(plan_, plan);
-    publishFrames(std::move(frames));
+    frames_.publish(std::move(frames));
     // From here on, an error does not undo the change.
-    guarded("publishing a change", [&] { adopted(change); });
+    logErrors(log_, "publishing a change", [&] { adopted(change); });
     // The leaving components are out of the loop, so their hooks may take long.
     for (const auto& instance : change.leaving) {
         noteFaultsOf(*instance);
-        note(instance->fullName() + ".stop");
+        activity_.begin(instance->fullName() + ".stop");
         instance->stop();
-        note(instance->fullName() + ".cleanup");
+        activity_.begin(instance->fullName() + ".cleanup");
         instance->cleanup();
     }
-    guarded("supervising the loop", [this] { noticeEnd(); });
+    logErrors(log_, "supervising the loop", [this] { noticeEnd(); });
     for (const HandOver& hand_over : adoption.hand_overs) {
         if (!hand_over.skipped) continue;
         change.notes.push_back(fmt::format(
@@ -324,6 +322,30 @@ void Runner::addDifference(Change& change, const Difference& difference, const P
     change.graph.replace(name, {instance, definition.breaks});
     change.leaving.push_back(old);
     handOver(change, *old, *instance);
+}
+
+void Runner::watch(std::uint64_t watch, Watch wanted, bool allow_missing) {
+    if (!allow_missing) requireMatches(wanted.selection, *plan_);
+    frames_.add(watch, std::move(wanted));
+    try {
+        renewFrames();
+    } catch (...) {
+        frames_.remove(watch);
+        throw;
+    }
+}
+
+void Runner::endWatch(std::uint64_t watch) {
+    if (frames_.remove(watch)) renewFrames();
+}
+
+void Runner::renewFrames() {
+    noticeEnd();
+    Adoption adoption;
+    std::shared_ptr<const FrameTable> frames =
+        frames_.prepare(*plan_, settings_.frequency_hz, settings_.frame_bytes, adoption);
+    adoptAtBoundary(adoption);
+    frames_.publish(std::move(frames));
 }
 
 ChangeOutcome Runner::setBreaks(const std::vector<std::pair<std::string, std::string>>& ports,

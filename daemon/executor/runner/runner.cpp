@@ -4,6 +4,7 @@
 
 #include "common/refusal.hpp"
 #include "faults/crash_handler.hpp"
+#include "logging/log_errors.hpp"
 
 namespace rtcf::executor {
 
@@ -26,8 +27,8 @@ Runner::Runner(std::string name, Log& log, EventConsumer events, std::unique_ptr
       loop_(log, recorder, std::move(cpu_claims)),
       stall_monitor_(loop_),
       bridge_(std::move(bridge)),
-      size_watch_(name_,
-                  [this](const std::string& line) { log_.write(LogLevel::Warn, {}, line); }) {
+      size_watch_(name_, [this](const std::string& line) { log_.write(LogLevel::Warn, {}, line); }),
+      frames_(loop_, log) {
     if (bridge_) {
         bridge_->serveParameters([this](const std::string& component, ParameterBatch batch,
                                         std::function<void(const std::string&)> done) {
@@ -74,9 +75,9 @@ void Runner::threadMain() {
         }
         lock.unlock();
         job_stops_ = job.stops;
-        if (job.work) guarded("a change", job.work);
-        note({});
-        guarded("supervising the loop", [this] { tick(); });
+        if (job.work) logErrors(log_, "a change", job.work);
+        activity_.end();
+        logErrors(log_, "supervising the loop", [this] { tick(); });
         lock.lock();
     }
     lock.unlock();
@@ -84,7 +85,7 @@ void Runner::threadMain() {
     loop_.join(INT64_MAX);
     if (state_ == RunnerState::Stepping) loop_.endStepping();
     stopAll();
-    guarded("reporting the end", [this] {  // to clients of the bridge
+    logErrors(log_, "reporting the end", [this] {  // to clients of the bridge
         if (state_ != RunnerState::Faulted) setState(RunnerState::Stopped);
         publishPicture();
     });
@@ -95,21 +96,8 @@ void Runner::threadMain() {
     log_.drain();
 }
 
-// Logs exceptions, so that no error ends a process whose loop runs.
-void Runner::guarded(const char* what, const std::function<void()>& work) noexcept {
-    try {
-        try {
-            work();
-        } catch (const std::exception& error) {
-            log_.write(LogLevel::Error, {}, fmt::format("{} failed: {}", what, error.what()));
-        }
-    } catch (...) {
-        // Logging failed, too.
-    }
-}
-
 void Runner::tell(const RunnerEvent& event) noexcept {
-    guarded("reporting an event", [&] { events_(event); });
+    logErrors(log_, "reporting an event", [&] { events_(event); });
 }
 
 // Periodic work: a loop that ended by itself, clocks, counters.
@@ -117,7 +105,7 @@ void Runner::tick() {
     noticeEnd();
     if (loop_.joinable()) {
         loop_.refreshWallClock();
-        tuneSpin();
+        if (settings_.spin_auto) spin_tuner_.tune(loop_, settings_.loop.period_ns);
     }
     noteComponentFaults();
     noteOverruns(false);
@@ -206,7 +194,7 @@ void Runner::publishPicture() {
                        settings_,  degraded_,
                        status_,    bridge_ ? bridge_->status() : BridgeStatus{},
                        simulated_, size_watch_.total()};
-    if (settings_.spin_auto && tuned_spin_ns_ >= 0) next.settings.loop.spin_ns = tuned_spin_ns_;
+    if (settings_.spin_auto && spin_tuner_.spin()) next.settings.loop.spin_ns = *spin_tuner_.spin();
     const std::lock_guard<std::mutex> lock(published_mutex_);
     picture_ = std::move(next);
 }
@@ -224,17 +212,6 @@ std::shared_ptr<const GraphSnapshot> Runner::snapshot() const {
 RunnerPicture Runner::picture() const {
     const std::lock_guard<std::mutex> lock(published_mutex_);
     return picture_;
-}
-
-void Runner::note(std::string activity) {
-    const std::lock_guard<std::mutex> lock(published_mutex_);
-    activity_ = std::move(activity);
-    activity_since_ns_ = monotonicNow();
-}
-
-std::pair<std::string, std::int64_t> Runner::activity() const {
-    const std::lock_guard<std::mutex> lock(published_mutex_);
-    return {activity_, activity_since_ns_};
 }
 
 }  // namespace rtcf::executor

@@ -29,8 +29,11 @@
 #include "loop/stall_monitor.hpp"
 #include "ordering/plan.hpp"
 #include "plugins/library.hpp"
+#include "runner/frame_keeper.hpp"
+#include "runner/hook_activity.hpp"
 #include "runner/overrun_report.hpp"
 #include "runner/replay.hpp"
+#include "runner/spin_tuner.hpp"
 #include "runner/told_faults.hpp"
 #include "view/runner_view.hpp"
 #include "view/settings.hpp"
@@ -204,16 +207,16 @@ class Runner final : private RunnerView {
     NumberedState numberedState() const noexcept { return numbered_state_.load(); }
     const Loop& loop() const noexcept override { return loop_; }
     const FlightRecorder& recorder() const noexcept { return recorder_; }
-    const FrameMemory& frameMemory() const noexcept { return frame_memory_; }
-    /// New frame tables since the last call. Each table describes the frames in its ring, until the
-    /// next table's first frame. The last owner must release a table on the graph thread.
-    std::vector<std::shared_ptr<const FrameTable>> takeFrameTables();
-    /// Sets a function that the graph thread calls when steps wait for readers of frames.
-    void onFramesWaiting(std::function<void()> tell);
+    const FrameMemory& frameMemory() const noexcept { return frames_.memory(); }
+    /// See FrameKeeper.
+    std::vector<std::shared_ptr<const FrameTable>> takeFrameTables() {
+        return frames_.takePublished();
+    }
+    void onReadersAwaited(std::function<void()> tell) { frames_.onReadersAwaited(std::move(tell)); }
     /// See Loop. One thread only.
     void holdFigures(bool held) noexcept { loop_.holdFigures(held); }
     /// Hook that the graph thread is running, and since when (CLOCK_MONOTONIC, ns); empty = none.
-    std::pair<std::string, std::int64_t> activity() const;
+    std::pair<std::string, std::int64_t> activity() const { return activity_.present(); }
     /// @}
 
    private:
@@ -240,7 +243,6 @@ class Runner final : private RunnerView {
     };
 
     void threadMain();
-    void guarded(const char* what, const std::function<void()>& work) noexcept;
     void tell(const RunnerEvent& event) noexcept;
     void tick();
     void setState(RunnerState state) noexcept;
@@ -264,7 +266,6 @@ class Runner final : private RunnerView {
                         const std::function<void(const std::string&)>& done);
     std::shared_ptr<const BridgeTable> bridgeTable() const;
     void serveBridge(bool served);
-    void tuneSpin();
     const GraphNode* nodeOf(const Component* component) const noexcept;
     void beginStepping(std::int64_t stamp_ns = 0);
     void pause(const Progress& progress);
@@ -291,10 +292,6 @@ class Runner final : private RunnerView {
     void adopted(const Change& change);
     /// Replaces the frames after a change of the watches.
     void renewFrames();
-    std::shared_ptr<const FrameTable> framesOf(const Plan& plan);
-    void publishFrames(std::shared_ptr<const FrameTable> frames) noexcept;
-    std::uint64_t stepWatched(std::uint64_t cycles, const std::atomic<bool>* given_up);
-    void awaitReaders();
     void startAll(const Progress& progress);
     void stopAll() noexcept;
     ChangeOutcome outcome(std::string component = {}) const;
@@ -311,7 +308,6 @@ class Runner final : private RunnerView {
     void publishPicture();
     std::int64_t adoptionTimeout() const noexcept;
     void checkTaps(const Wiring& wiring) const;
-    void note(std::string activity);
 
     const std::string name_;
     Log& log_;
@@ -337,27 +333,20 @@ class Runner final : private RunnerView {
     OverrunReport overrun_report_;
     std::uint64_t told_faults_ = 0;  // LoopFigures::faults at the last check
     ToldFaults told_not_finite_;
-    std::int64_t tuned_spin_ns_ = -1;  // result of tuneSpin(); -1 = none yet
-    std::unique_ptr<Replay> replay_;   // null = no replay
-    bool bridge_served_ = true;        // false during a replay, which uses the ports alone
+    SpinTuner spin_tuner_;
+    std::unique_ptr<Replay> replay_;  // null = no replay
+    bool bridge_served_ = true;       // false during a replay, which uses the ports alone
     std::shared_ptr<SimulatedClock> clock_ = std::make_shared<SimulatedClock>();
-    bool simulated_ = false;        // the loop follows clock_
-    HistogramSnapshot tuned_from_;  // wake-up latency at the last tuneSpin()
-    std::int64_t tuned_at_ns_ = 0;
+    bool simulated_ = false;  // the loop follows clock_
     std::int64_t sizes_due_ns_ = 0;
-    FrameMemory frame_memory_;
-    Watches watches_;
-    std::shared_ptr<const FrameTable> frames_;  // frames of the loop; null before the first
+    FrameKeeper frames_;
 
     // Published for queries.
     std::atomic<NumberedState> numbered_state_;
     mutable std::mutex published_mutex_;
     std::shared_ptr<const GraphSnapshot> snapshot_ = std::make_shared<GraphSnapshot>();
     RunnerPicture picture_;
-    std::vector<std::shared_ptr<const FrameTable>> new_frames_;
-    std::function<void()> frames_waiting_;
-    std::string activity_;
-    std::int64_t activity_since_ns_ = 0;
+    HookActivity activity_;
 
     // Jobs.
     std::mutex jobs_mutex_;

@@ -5,7 +5,6 @@
 #include <rtcf/design_period.hpp>
 
 #include "common/refusal.hpp"
-#include "common/time_units.hpp"
 #include "runner/runner.hpp"
 
 namespace rtcf::executor {
@@ -52,7 +51,7 @@ void Runner::configure(RunnerSettings settings) {
         settings_ = previous;
         throw;
     }
-    tuned_spin_ns_ = -1;
+    spin_tuner_.reset();
     if (loop_.joinable()) {
         RealtimeProblems of_thread = loop_.retune(loopSettings());
         if (loop_.inRealTime()) {
@@ -119,7 +118,7 @@ RealtimeProblems Runner::lockAndStart() {
                                   "--realtime preferred",
                                   problem.text, name_));
     }
-    tuned_spin_ns_ = -1;
+    spin_tuner_.reset();
     for (RealtimeProblem& problem : loop_.start(settings, job_stops_))
         problems.push_back(std::move(problem));
     return problems;
@@ -135,19 +134,6 @@ LoopSettings Runner::loopSettings() const {
     LoopSettings settings = settings_.loop;
     settings.max_overruns = mostOverruns();
     return settings;
-}
-
-// For spin = auto: sets the spin time to the 99 % quantile of the wake-up latency of the last
-// second, at most a tenth of the period.
-void Runner::tuneSpin() {
-    if (!settings_.spin_auto || monotonicNow() - tuned_at_ns_ < kSecond) return;
-    const HistogramSnapshot now = loop_.figures().wake_up.snapshot();
-    const DistributionSummary late = summarize(difference(now, tuned_from_), 1.0);
-    tuned_from_ = now;
-    tuned_at_ns_ = monotonicNow();
-    if (late.count == 0) return;
-    tuned_spin_ns_ = std::min(static_cast<std::int64_t>(late.p99), settings_.loop.period_ns / 10);
-    loop_.setSpin(tuned_spin_ns_);
 }
 
 ChangeOutcome Runner::stop(const Progress& progress) {
@@ -183,7 +169,7 @@ void Runner::startAll(const Progress& progress) {
             Instance& instance = *plan_->graph.nodes()[index].instance;
             progress("starting " + instance.fullName());
             requireNoStop();
-            note(instance.fullName() + ".start");
+            activity_.begin(instance.fullName() + ".start");
             started.push_back(&instance);
             instance.setFault({});
             instance.start();
@@ -200,7 +186,7 @@ void Runner::stopAll() noexcept {
     // In reverse order of execution, so that a component's writers run as long as it does.
     for (auto index = plan_->wiring.order.rbegin(); index != plan_->wiring.order.rend(); ++index) {
         Instance& instance = *plan_->graph.nodes()[*index].instance;
-        note(instance.fullName() + ".stop");
+        activity_.begin(instance.fullName() + ".stop");
         instance.stop();
     }
 }

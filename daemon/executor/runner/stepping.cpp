@@ -45,10 +45,10 @@ ChangeOutcome Runner::step(std::uint64_t cycles, const Progress& progress,
     std::uint64_t left = cycles;
     while (left > 0) {
         const std::uint64_t wanted = std::min(left, kChunk);
-        const std::uint64_t done = stepWatched(wanted, given_up);
+        const std::uint64_t done = frames_.step(wanted, given_up);
         left -= done;
         log_.drain();
-        note({});  // resets the time of the activity, as a long run is not a hook that hangs
+        activity_.end();  // resets the time of the activity, as a long run is not a hook that hangs
         if (done < wanted || ending_) break;
         if (left > 0) progress(fmt::format("{} of {} cycles", cycles - left, cycles));
     }
@@ -74,7 +74,7 @@ ReplayOutcome Runner::replay(const ReplayChunk& chunk, const Progress& progress)
         }
     }
     log_.drain();
-    note({});
+    activity_.end();
     const bool ended = loop_.fault().kind != LoopFault::Kind::None || loop_.stopRequested();
     if ((chunk.end && !outcome.more) || ended) endStepping();
     if (ended) throw Refusal(RefusalKind::LoopFailed, status_);

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "common/refusal.hpp"
+#include "logging/log_errors.hpp"
 #include "runner/runner.hpp"
 #include "state/state_value.hpp"
 
@@ -71,7 +72,7 @@ ChangeOutcome Runner::setParameters(
     // From here on, an error does not undo the change.
     instance.releaseStaged();
     ++plan_->schedule.generation;  // not used by the cycle
-    guarded("publishing a change", [&] {
+    logErrors(log_, "publishing a change", [&] {
         publish({name});
         if (bridge_) bridge_->setTable(bridgeTable());
         noticeEnd();

@@ -148,7 +148,7 @@ void Server::serve(Runner& runner, Log& log, Access& access, const DirectStop& d
     access_ = &access;
     direct_stop_ = &direct_stop;
     figures_ = std::make_unique<Figures>(runner, log);
-    runner.onFramesWaiting([this] { wakeUp(); });
+    runner.onReadersAwaited([this] { wakeUp(); });
     while (!exiting_) {
         std::vector<pollfd> polled{
             {listener_.fd(), listener_.events(), 0}, {signals_, POLLIN, 0}, {wake_, POLLIN, 0}};
@@ -183,7 +183,7 @@ void Server::serve(Runner& runner, Log& log, Access& access, const DirectStop& d
         listener_.renew(monotonicNow());
         if (orphaned()) exiting_ = true;
     }
-    runner.onFramesWaiting({});
+    runner.onReadersAwaited({});
     runner.requestStop();
 }
 

@@ -1,0 +1,89 @@
+#include "runner/frame_keeper.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+#include <utility>
+
+#include "logging/log_errors.hpp"
+
+namespace rtcf::executor {
+
+namespace {
+
+// Longest wait for readers that take no frames.
+constexpr std::chrono::milliseconds kPatience{250};
+constexpr std::chrono::milliseconds kLook{1};
+
+}  // namespace
+
+void FrameKeeper::add(std::uint64_t number, Watch watch) {
+    watches_.emplace(number, std::move(watch));
+}
+
+std::shared_ptr<const FrameTable> FrameKeeper::prepare(const Plan& plan, double frequency_hz,
+                                                       std::size_t most_bytes, Adoption& adoption) {
+    std::shared_ptr<const FrameTable> table = makeFrameTable(
+        plan, {watches_, frequency_hz, most_bytes, loop_.cycle(), &memory_, table_.get()});
+    adoption.frames = table->ring.get();
+    adoption.timed = table->turns.wanted();
+    return table;
+}
+
+void FrameKeeper::publish(std::shared_ptr<const FrameTable> table) noexcept {
+    const std::shared_ptr<const FrameTable> previous = std::exchange(table_, std::move(table));
+    logErrors(log_, "publishing frames", [&] {
+        if (!watches_.empty()) {
+            const std::lock_guard<std::mutex> lock(mutex_);
+            published_.push_back(table_);
+        }
+        if (table_->shortness.empty()) return;
+        const bool told = previous != nullptr && !previous->shortness.empty() &&
+                          previous->ring->capacity() <= table_->ring->capacity();
+        if (!told) log_.write(LogLevel::Warn, {}, table_->shortness);
+    });
+}
+
+std::uint64_t FrameKeeper::step(std::uint64_t cycles, const std::atomic<bool>* given_up) {
+    if (watches_.empty()) return loop_.step(cycles, given_up);
+    const std::uint64_t most = table_->ring->capacity() / 2;
+    std::uint64_t done = 0;
+    while (done < cycles) {
+        const std::uint64_t wanted = std::min(cycles - done, most);
+        const std::uint64_t ran = loop_.step(wanted, given_up);
+        done += ran;
+        if (ran < wanted) break;
+        awaitReaders();
+    }
+    return done;
+}
+
+void FrameKeeper::awaitReaders() {
+    const FrameRing& ring = *table_->ring;
+    std::function<void()> tell;
+    {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        tell = readers_awaited_;
+    }
+    auto since = std::chrono::steady_clock::now();
+    std::uint64_t before = ring.waiting();
+    while (before > ring.capacity() / 4 && std::chrono::steady_clock::now() - since < kPatience) {
+        if (tell) tell();
+        std::this_thread::sleep_for(kLook);
+        const std::uint64_t now = ring.waiting();
+        if (now < before) since = std::chrono::steady_clock::now();
+        before = now;
+    }
+}
+
+std::vector<std::shared_ptr<const FrameTable>> FrameKeeper::takePublished() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return std::exchange(published_, {});
+}
+
+void FrameKeeper::onReadersAwaited(std::function<void()> tell) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    readers_awaited_ = std::move(tell);
+}
+
+}  // namespace rtcf::executor
