@@ -99,7 +99,7 @@ void say(const std::string& what) {
 }
 
 void run(const CheckRequest& request, Runner& runner, ValueSource& values) {
-    const Runner::Progress silent = [](const std::string&) {};
+    const Progress silent = [](const std::string&) {};
     RunnerSettings settings = runner.settings();
     settings.whitelist = ".*";
     settings.loop.warmup_cycles = 0;
@@ -116,7 +116,7 @@ void run(const CheckRequest& request, Runner& runner, ValueSource& values) {
         if (!members) members.emplace(runner.component(name));
         members->look();
         if (runner.loop().fault().kind != LoopFault::Kind::None) {
-            throw Refusal(RefusalKind::LoopFailed, runner.picture().status);
+            throw Refusal(RefusalKind::LoopFailed, runner.status().loop_fault);
         }
     }
     say("stopping");

@@ -5,7 +5,7 @@
 
 #include "graph/definition.hpp"
 #include "rtcf/executor/v1/executor.pb.h"
-#include "runner/runner.hpp"
+#include "runner/replay.hpp"
 
 namespace rtcf::executor {
 

@@ -6,7 +6,11 @@
 #include "graph/definition.hpp"
 #include "logging/log.hpp"
 #include "rtcf/executor/v1/executor.pb.h"
-#include "runner/runner.hpp"
+#include "runner/change_outcome.hpp"
+#include "runner/replay.hpp"
+#include "runner/runner_event.hpp"
+#include "runner/snapshots.hpp"
+#include "runner/value_changes.hpp"
 #include "view/snapshot.hpp"
 
 namespace rtcf::executor {

@@ -1,6 +1,6 @@
 /// @file
 /// Summarises late cycles, so that a loop that is always late logs one line every ten seconds.
-/// Owned by the Runner; graph thread.
+/// Owned by FaultReports; graph thread.
 #pragma once
 
 #include <cstdint>

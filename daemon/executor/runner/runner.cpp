@@ -19,28 +19,32 @@ Runner::Runner(std::string name, Log& log, EventConsumer events, std::unique_ptr
                FlightRecorder& recorder, std::string cpu_claims)
     : name_(std::move(name)),
       log_(log),
-      events_([this, events = std::move(events)](RunnerEvent event) {
-          event.state = numberedState();
-          events(std::move(event));
-      }),
+      events_(std::move(events)),
       recorder_(recorder),
       loop_(log, recorder, std::move(cpu_claims)),
-      stall_monitor_(loop_),
       bridge_(std::move(bridge)),
-      size_watch_(name_, [this](const std::string& line) { log_.write(LogLevel::Warn, {}, line); }),
-      frames_(loop_, log) {
-    if (bridge_) {
-        bridge_->serveParameters([this](const std::string& component, ParameterBatch batch,
-                                        std::function<void(const std::string&)> done) {
+      plan_(activity_),
+      frames_(loop_, log),
+      boundary_(name_, settings_, loop_, recorder, activity_),
+      control_(
+          name_, settings_, loop_, boundary_, plan_, publication_, bridge_, log,
+          [this](const RunnerEvent& event) { tell(event); }, ending_),
+      loader_(name_, loop_, control_, bridge_, activity_, log, recorder),
+      transactions_(name_, settings_, loop_, boundary_, control_, plan_, frames_, publication_,
+                    bridge_, loader_, activity_, log),
+      values_(name_, loop_, boundary_, control_, plan_, publication_, bridge_, transactions_, log),
+      offline_(name_, loop_, control_, plan_, frames_, publication_, bridge_, transactions_,
+               activity_, log),
+      snapshots_(name_, settings_, loop_, boundary_, control_, plan_, transactions_, offline_) {
+    validate(settings_);
+    control_.publishStatus();
+    discards_cycles_ =
+        !bridge_.attach(*this, [this](const std::string& component, ParameterBatch batch,
+                                      std::function<void(const std::string&)> done) {
             post([this, component, batch = std::move(batch), done = std::move(done)] {
                 changeByBridge(component, batch, done);
             });
         });
-    }
-    validate(settings_);
-    stall_monitor_.setTimeout(settings_.stall_timeout_ns);
-    publishPicture();
-    if (bridge_) discards_cycles_ = !bridge_->attach(*this);
     thread_ = std::thread([this] { threadMain(); });
 }
 
@@ -68,59 +72,74 @@ void Runner::threadMain() {
     std::unique_lock<std::mutex> lock(jobs_mutex_);
     while (!ending_) {  // jobs that still wait at the end are discarded
         jobs_changed_.wait_for(lock, kTick, [this] { return ending_ || !jobs_.empty(); });
-        Job job{};
+        Job job;
         if (!jobs_.empty()) {
             job = std::move(jobs_.front());
             jobs_.pop_front();
         }
         lock.unlock();
-        job_stops_ = job.stops;
+        control_.beginJob(job.stops);
         if (job.work) logErrors(log_, "a change", job.work);
         activity_.end();
         logErrors(log_, "supervising the loop", [this] { tick(); });
         lock.lock();
     }
     lock.unlock();
-    loop_.requestStop();
-    loop_.join(INT64_MAX);
-    if (state_ == RunnerState::Stepping) loop_.endStepping();
-    stopAll();
-    logErrors(log_, "reporting the end", [this] {  // to clients of the bridge
-        if (state_ != RunnerState::Faulted) setState(RunnerState::Stopped);
-        publishPicture();
-    });
-    if (bridge_) bridge_->setTable(std::make_shared<BridgeTable>());
+    control_.finish();
+    bridge_.close();
     // Components may use ROS until they are destroyed.
-    plan_ = std::make_unique<Plan>();
+    plan_.clear();
     bridge_.reset();
     log_.drain();
 }
 
-void Runner::tell(const RunnerEvent& event) noexcept {
-    logErrors(log_, "reporting an event", [&] { events_(event); });
-}
-
-// Periodic work: a loop that ended by itself, clocks, counters.
 void Runner::tick() {
-    noticeEnd();
-    if (loop_.joinable()) {
-        loop_.refreshWallClock();
-        if (settings_.spin_auto) spin_tuner_.tune(loop_, settings_.loop.period_ns);
-    }
-    noteComponentFaults();
-    noteOverruns(false);
-    noteClockJumps();
-    noteSizes();
+    control_.tick();
     CycleRecord record{};
     while (discards_cycles_ && loop_.popRecord(record)) {
     }
-    publishPicture();
+    control_.publishStatus();
 }
 
-// Handles a loop that has ended by itself, which is possible at any time, even while a change waits
-// for the next boundary.
-void Runner::noticeEnd() {
-    if (state_ == RunnerState::Running && !loop_.running()) loopEnded();
+void Runner::tell(RunnerEvent event) noexcept {
+    logErrors(log_, "reporting an event", [&] {
+        event.state = numberedState();
+        events_(std::move(event));
+    });
+}
+
+void Runner::configure(RunnerSettings settings) {
+    validate(settings);
+    const RunnerSettings previous = std::exchange(settings_, std::move(settings));
+    const std::int64_t period_ns = settings_.loop.period_ns;
+    try {
+        transactions_.applySettings(period_ns == previous.loop.period_ns ? 0 : period_ns);
+    } catch (...) {
+        settings_ = previous;
+        throw;
+    }
+    control_.applySettings();
+    log_.setLimit(settings_.log_limit);
+    bridge_.configure(settings_.bridge);
+    control_.publishStatus();
+}
+
+ChangeOutcome Runner::start(const Progress& progress) {
+    control_.noticeEnd();
+    if (loop_.running()) return outcomeWith(*plan_);
+    offline_.end();
+    std::vector<std::string> degraded = control_.start(progress);
+    ChangeOutcome result = outcomeWith(*plan_);
+    result.degraded = std::move(degraded);
+    return result;
+}
+
+ChangeOutcome Runner::stop(const Progress& progress) {
+    if (loop_.joinable())
+        control_.stop(progress);
+    else
+        offline_.end();
+    return outcomeWith(*plan_);
 }
 
 void Runner::changeByBridge(const std::string& component, const ParameterBatch& batch,
@@ -156,62 +175,9 @@ std::vector<std::string> Runner::states(const std::string& name) {
     Adoption look;
     look.copies = picture.copies();
     // A query must not delay the loop.
-    if (look.copies.empty() || bytesOf(look.copies) > mostAtOnce()) return {};
+    if (look.copies.empty() || bytesOf(look.copies) > boundary_.mostBytes()) return {};
     if (!loop_.adopt(look, kProbeTimeout + 2 * settings_.loop.period_ns)) return {};
     return picture.texts();
-}
-
-std::shared_ptr<const BridgeTable> Runner::bridgeTable() const {
-    if (!bridge_served_) return std::make_shared<BridgeTable>();
-    auto table = std::make_shared<BridgeTable>(plan_->bridgeTable());
-    for (const auto& component : snapshot_->components) {
-        if (!component->parameters.empty()) table->parameters.push_back(component);
-    }
-    return table;
-}
-
-ChangeOutcome Runner::outcome(std::string component) const {
-    ChangeOutcome result;
-    result.generation = plan_->schedule.generation;
-    for (const std::size_t index : plan_->wiring.order) {
-        result.order.push_back(plan_->graph.nodes()[index].instance->fullName());
-    }
-    result.component = std::move(component);
-    return result;
-}
-
-void Runner::publish(const std::set<std::string>& changed) {
-    const std::shared_ptr<const GraphSnapshot> next = takeSnapshot(*plan_, *snapshot(), changed);
-    {
-        const std::lock_guard<std::mutex> lock(published_mutex_);
-        snapshot_ = next;
-    }
-    publishPicture();
-}
-
-void Runner::publishPicture() {
-    RunnerPicture next{state_,     numbered_state_.load().number,
-                       settings_,  degraded_,
-                       status_,    bridge_ ? bridge_->status() : BridgeStatus{},
-                       simulated_, size_watch_.total()};
-    if (settings_.spin_auto && spin_tuner_.spin()) next.settings.loop.spin_ns = *spin_tuner_.spin();
-    const std::lock_guard<std::mutex> lock(published_mutex_);
-    picture_ = std::move(next);
-}
-
-void Runner::setState(RunnerState state) noexcept {
-    state_ = state;
-    numbered_state_.store({state, numbered_state_.load().number + 1});
-}
-
-std::shared_ptr<const GraphSnapshot> Runner::snapshot() const {
-    const std::lock_guard<std::mutex> lock(published_mutex_);
-    return snapshot_;
-}
-
-RunnerPicture Runner::picture() const {
-    const std::lock_guard<std::mutex> lock(published_mutex_);
-    return picture_;
 }
 
 }  // namespace rtcf::executor

@@ -1,9 +1,10 @@
-// Runner: simulated clock.
+#include "runner/simulation.hpp"
+
 #include <fmt/format.h>
 
 #include <chrono>
-
-#include "runner/runner.hpp"
+#include <optional>
+#include <thread>
 
 namespace rtcf::executor {
 
@@ -13,16 +14,16 @@ constexpr auto kBridgePatience = std::chrono::seconds(2);
 
 }  // namespace
 
-// Waits for a moment if the bridge has just been configured and does not know its peers' choice
-// yet.
-bool Runner::wantsSimulation(const Progress& progress) {
-    if (!bridge_ || !settings_.bridge.enabled || settings_.sim_time == SimTime::Never) return false;
-    if (settings_.sim_time == SimTime::Always) return true;
+bool Simulation::wanted(const RunnerSettings& settings, const Progress& progress,
+                        const std::function<void()>& require_go) const {
+    if (!bridge_.exists() || !settings.bridge.enabled || settings.sim_time == SimTime::Never)
+        return false;
+    if (settings.sim_time == SimTime::Always) return true;
     progress("asking the ROS master for /use_sim_time");
     const auto until = std::chrono::steady_clock::now() + kBridgePatience;
     while (std::chrono::steady_clock::now() < until && !ending_) {
-        requireNoStop();
-        const BridgeStatus status = bridge_->status();
+        require_go();
+        const BridgeStatus status = bridge_.status();
         if (status.simulated_time) return *status.simulated_time;
         if (!status.connected && !status.problem.empty()) return false;  // there is no master
         std::this_thread::sleep_for(std::chrono::milliseconds(10));
@@ -30,23 +31,27 @@ bool Runner::wantsSimulation(const Progress& progress) {
     return false;
 }
 
-void Runner::simulate(bool simulated) {
-    if (simulated) clock_->reset(settings_.max_clock_jump_ns);
-    simulated_ = simulated;
-    settings_.loop.clock = simulated ? clock_ : nullptr;
-    settings_.loop.realtime.wanted = !simulated;
-    if (!bridge_) return;
-    for (const auto& injector : plan_->bridgeTable().inputs) injector->setQueueing(simulated);
-    bridge_->setClock(settings_.loop.clock);
-    if (!simulated) return;
-    // Waits until the bridge follows the clock, so that a simulation started after the loop loses
-    // no tick.
+void Simulation::begin(RunnerSettings& settings, const Plan& plan) {
+    clock_->reset(settings.max_clock_jump_ns);
+    set(true, settings, plan);
+    if (!bridge_.exists()) return;
     const auto until = std::chrono::steady_clock::now() + kBridgePatience;
-    while (!bridge_->status().follows_clock && std::chrono::steady_clock::now() < until && !ending_)
+    while (!bridge_.status().follows_clock && std::chrono::steady_clock::now() < until && !ending_)
         std::this_thread::sleep_for(std::chrono::milliseconds(5));
 }
 
-void Runner::noteClockJumps() {
+void Simulation::end(RunnerSettings& settings, const Plan& plan) { set(false, settings, plan); }
+
+void Simulation::set(bool active, RunnerSettings& settings, const Plan& plan) {
+    active_ = active;
+    settings.loop.clock = active ? clock_ : nullptr;
+    settings.loop.realtime.wanted = !active;
+    if (!bridge_.exists()) return;
+    for (const auto& injector : plan.bridgeTable().inputs) injector->setQueueing(active);
+    bridge_.setClock(settings.loop.clock);
+}
+
+void Simulation::reportJumps(const TellEvent& tell) {
     while (const std::optional<ClockJump> jump = clock_->takeJump()) {
         const double to = static_cast<double>(jump->to_ns) / 1e9;
         std::string message = fmt::format("the simulated clock begins at {:.9f} s", to);

@@ -23,7 +23,7 @@ void trustOwnerOf(Runner& runner, const Message& message) {
 
 }  // namespace
 
-ChangeOutcome change(Runner& runner, const v1::Request& request, const Runner::Progress& progress,
+ChangeOutcome change(Runner& runner, const v1::Request& request, const Progress& progress,
                      const std::atomic<bool>& given_up) {
     switch (request.kind_case()) {
         case v1::Request::kStart:

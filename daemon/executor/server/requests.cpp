@@ -87,7 +87,7 @@ bool Server::answerQuery(std::uint64_t connection, const v1::Request& request) {
     const std::shared_ptr<const GraphSnapshot> graph = runner_->snapshot();
     switch (request.kind_case()) {
         case v1::Request::kListComponents: {
-            const RunnerState state = runner_->picture().state;
+            const RunnerState state = runner_->status().state;
             auto& result = *response.mutable_components();
             for (std::size_t i = 0; i < graph->components.size(); ++i) {
                 *result.add_components() = componentTo(*graph, i, state);
@@ -153,7 +153,7 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
                         (request.kind_case() == v1::Request::kReplay && request.replay().begin()) ||
                         ((request.kind_case() == v1::Request::kStep ||
                           request.kind_case() == v1::Request::kRestoreSnapshot) &&
-                         runner_->picture().state != RunnerState::Stepping);
+                         runner_->status().state != RunnerState::Stepping);
     if (begins && !runner_->loop().running() && !figures_->restart()) {
         figures_->restartInStep();  // during a step, which this request waits for
     }
@@ -240,7 +240,7 @@ void Server::submitProbe(std::uint64_t connection, const v1::Request& request) {
     const std::string name = fullNameOf(request.get_component().component());
     const std::uint64_t id = request.id();
     const std::shared_ptr<const GraphSnapshot> graph = runner_->snapshot();
-    const RunnerState state = runner_->picture().state;
+    const RunnerState state = runner_->status().state;
     const auto found =
         std::find_if(graph->components.begin(), graph->components.end(),
                      [&](const auto& component) { return component->full_name == name; });
@@ -301,19 +301,19 @@ void Server::endWatches(const std::vector<std::uint64_t>& watches) {
 }
 
 pb::RunnerStatus Server::status() const {
-    const RunnerPicture picture = runner_->picture();
+    const RunnerStatus present = runner_->status();
     const std::shared_ptr<const GraphSnapshot> graph = runner_->snapshot();
     const Loop& loop = runner_->loop();
     pb::RunnerStatus status;
     status.set_runner(runner_->name());
-    status.set_state(stateTo(picture.state));
-    status.set_status(picture.status);
-    status.set_simulated(picture.simulated);
+    status.set_state(stateTo(present.state));
+    status.set_status(present.loop_fault);
+    status.set_simulated(present.simulated);
     if (const std::string where = stuck(); !where.empty()) {
         status.set_state(pb::RUNNER_STATE_STUCK);
         status.set_status(fmt::format("stuck in {}()", where));
     }
-    *status.mutable_settings() = settingsTo(picture.settings);
+    *status.mutable_settings() = settingsTo(present.settings);
     status.set_pid(::getpid());
     status.set_realtime_tid(loop.threadId());
     if (loop.cpu() >= 0) status.set_loop_cpu(loop.cpu());
@@ -324,17 +324,17 @@ pb::RunnerStatus Server::status() const {
     for (const auto& component : graph->components)
         faults += component->figures->faults.count.value();
     status.set_faults(faults);
-    for (const std::string& line : picture.degraded) status.add_degraded(line);
+    for (const std::string& line : present.degraded) status.add_degraded(line);
     pb::RosStatus& ros = *status.mutable_ros();
-    ros.set_enabled(picture.bridge.enabled);
-    ros.set_connected(picture.bridge.connected);
-    ros.set_node(picture.bridge.node);
-    ros.set_master_uri(picture.bridge.master_uri);
-    ros.set_publications(picture.bridge.publications);
-    ros.set_subscriptions(picture.bridge.subscriptions);
-    ros.set_problem(picture.bridge.problem);
-    ros.set_killed(picture.bridge.killed);
-    ros.set_too_large(picture.too_large);
+    ros.set_enabled(present.bridge.enabled);
+    ros.set_connected(present.bridge.connected);
+    ros.set_node(present.bridge.node);
+    ros.set_master_uri(present.bridge.master_uri);
+    ros.set_publications(present.bridge.publications);
+    ros.set_subscriptions(present.bridge.subscriptions);
+    ros.set_problem(present.bridge.problem);
+    ros.set_killed(present.bridge.killed);
+    ros.set_too_large(present.too_large);
     std::uint64_t passed_over = 0;
     for (const auto& injector : graph->injectors) passed_over += injector->passedOver();
     ros.set_passed_over(passed_over);
@@ -345,7 +345,7 @@ pb::RunnerStatus Server::status() const {
 // not counted until then.
 void Server::resetStatistics(std::uint64_t connection, std::uint64_t request) {
     constexpr std::int64_t kPeriods = 10;
-    const std::int64_t period_ns = runner_->picture().settings.loop.period_ns;
+    const std::int64_t period_ns = runner_->status().settings.loop.period_ns;
     resets_.push_back({connection, request, monotonicNow() + kSecond + kPeriods * period_ns});
     goOnWithResets();
 }

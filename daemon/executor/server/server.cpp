@@ -196,7 +196,7 @@ bool Server::orphaned() {
         had_daemon_ = had_daemon_ || anybody;
         return false;
     }
-    return monotonicNow() - alone_since_ns_ >= runner_->picture().settings.orphan_timeout_ns;
+    return monotonicNow() - alone_since_ns_ >= runner_->status().settings.orphan_timeout_ns;
 }
 
 void Server::accept() {

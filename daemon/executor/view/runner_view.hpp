@@ -8,11 +8,10 @@
 #include <string>
 
 #include "loop/loop.hpp"
+#include "view/runner_status.hpp"
 #include "view/snapshot.hpp"
 
 namespace rtcf::executor {
-
-struct RunnerPicture;
 
 class RunnerView {
    public:
@@ -20,7 +19,7 @@ class RunnerView {
     /// @{
     virtual const std::string& name() const noexcept = 0;
     virtual std::shared_ptr<const GraphSnapshot> snapshot() const = 0;
-    virtual RunnerPicture picture() const = 0;
+    virtual RunnerStatus status() const = 0;
     virtual const Loop& loop() const noexcept = 0;
     virtual std::uint64_t logRecordsDropped() const = 0;
     /// @}

@@ -10,7 +10,6 @@
 
 #include "ros/roscpp/handles.hpp"
 #include "ros/threads/quiet_thread.hpp"
-#include "runner/runner.hpp"
 #include "view/runner_view.hpp"
 
 namespace rtcf::ros1 {
@@ -69,7 +68,7 @@ void Introspection::watchHealth() {
     Clock::time_point due = Clock::now();
     for (; !stop_; std::this_thread::sleep_for(kLook)) {
         const std::lock_guard lock(mutex_);
-        if (runner_.picture().state == told_ && Clock::now() < due) continue;
+        if (runner_.status().state == told_ && Clock::now() < due) continue;
         if (!diagnostics_) continue;
         tell();
         due = Clock::now() + std::chrono::seconds(1);
@@ -77,7 +76,7 @@ void Introspection::watchHealth() {
 }
 
 void Introspection::tell() {
-    told_ = runner_.picture().state;
+    told_ = runner_.status().state;
     diagnostic_msgs::DiagnosticArray array = report_.take();
     array.header.stamp = ros::Time::now();
     std::vector<std::uint8_t> bytes(ros::serialization::serializationLength(array));
@@ -98,7 +97,7 @@ void Introspection::tellLast() {
     constexpr auto kPause = std::chrono::milliseconds(1);
     std::unique_lock lock(mutex_);
     if (!diagnostics_) return;
-    if (runner_.picture().state != told_) tell();
+    if (runner_.status().state != told_) tell();
     const Departures::Until last = departures_.mark();
     const auto deadline = Clock::now() + kPatience;
     while (!departures_.gone(last) && Clock::now() < deadline) {

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 
-#include "runner/runner.hpp"
 #include "view/runner_view.hpp"
 
 namespace rtcf::ros1 {
@@ -74,18 +73,18 @@ std::string joined(const std::vector<std::string>& lines) {
 }  // namespace
 
 rtcf_msgs::GetLoop::Response describeRunner(const executor::RunnerView& runner) {
-    const executor::RunnerPicture picture = runner.picture();
+    const executor::RunnerStatus present = runner.status();
     const std::shared_ptr<const executor::GraphSnapshot> graph = runner.snapshot();
     const executor::LoopFigures& figures = runner.loop().figures();
     rtcf_msgs::GetLoop::Response response;
     response.runner = runner.name();
-    response.state = stateName(picture.state);
-    response.status = picture.status;
-    response.frequency = picture.settings.frequency_hz;
+    response.state = stateName(present.state);
+    response.status = present.loop_fault;
+    response.frequency = present.settings.frequency_hz;
     response.iteration = figures.iteration.load(std::memory_order_relaxed);
     response.overruns = figures.overruns.load(std::memory_order_relaxed);
     response.generation = graph->generation;
-    response.degraded = picture.degraded;
+    response.degraded = present.degraded;
     for (const auto& component : graph->components) {
         rtcf_msgs::LoopComponent info;
         info.name = component->full_name;
@@ -187,7 +186,7 @@ diagnostic_msgs::DiagnosticArray DiagnosticReport::take() {
 }
 
 DiagnosticStatus DiagnosticReport::loopStatus() {
-    const executor::RunnerPicture picture = runner_.picture();
+    const executor::RunnerStatus present = runner_.status();
     const executor::Loop& loop = runner_.loop();
     const executor::LoopFigures& figures = loop.figures();
     const executor::HistogramSnapshot duration = figures.duration.snapshot();
@@ -208,38 +207,38 @@ DiagnosticStatus DiagnosticReport::loopStatus() {
     DiagnosticStatus status;
     status.name = name_ + ": loop";
     status.level = DiagnosticStatus::OK;
-    status.message = stateName(picture.state);
+    status.message = stateName(present.state);
     const std::uint64_t overruns =
         growth(figures.overruns.load(std::memory_order_relaxed), overruns_);
     const std::uint64_t missed = growth(figures.missed.load(std::memory_order_relaxed), missed_);
     const std::uint64_t dropped = growth(taps + logs + cycles, dropped_);
     if (dropped != 0) {
         raise(status, DiagnosticStatus::WARN,
-              fmt::format("{}: {} dropped in full rings", stateName(picture.state),
+              fmt::format("{}: {} dropped in full rings", stateName(present.state),
                           counted(dropped, "record", "records")));
     }
     if (overruns != 0) {
         raise(status, DiagnosticStatus::WARN,
-              fmt::format("{}: {}, {} missed", stateName(picture.state),
+              fmt::format("{}: {}, {} missed", stateName(present.state),
                           counted(overruns, "overrun", "overruns"),
                           counted(missed, "cycle", "cycles")));
     }
-    if (!picture.degraded.empty()) {
-        status.message += ", not in real time: " + joined(picture.degraded);
+    if (!present.degraded.empty()) {
+        status.message += ", not in real time: " + joined(present.degraded);
         // Only once, so that it does not hide later warnings.
-        if (picture.degraded != degraded_) raise(status, DiagnosticStatus::WARN, status.message);
+        if (present.degraded != degraded_) raise(status, DiagnosticStatus::WARN, status.message);
     }
-    degraded_ = picture.degraded;
-    const double wanted_hz = picture.settings.frequency_hz;
+    degraded_ = present.degraded;
+    const double wanted_hz = present.settings.frequency_hz;
     const double done_hz =
         elapsed_ns > 0 ? static_cast<double>(done) * 1e9 / static_cast<double>(elapsed_ns) : 0.0;
     // Only if the loop ran during the whole report interval, and in real time.
     const bool runs = loop.running();
-    if (runs && ran_ && !picture.simulated && elapsed_ns >= kLongEnough &&
+    if (runs && ran_ && !present.simulated && elapsed_ns >= kLongEnough &&
         wanted_hz * static_cast<double>(elapsed_ns) * 1e-9 >= kEnoughCycles) {
         const double share = done_hz / wanted_hz;
         const std::string text = fmt::format("{}: {:.1f} Hz instead of {:g} Hz",
-                                             stateName(picture.state), done_hz, wanted_hz);
+                                             stateName(present.state), done_hz, wanted_hz);
         if (share < kFailing) {
             raise(status, DiagnosticStatus::ERROR, text);
         } else if (share < kSlow) {
@@ -247,12 +246,12 @@ DiagnosticStatus DiagnosticReport::loopStatus() {
         }
     }
     ran_ = runs;
-    if (picture.state == RunnerState::Faulted || picture.state == RunnerState::Stuck) {
+    if (present.state == RunnerState::Faulted || present.state == RunnerState::Stuck) {
         raise(status, DiagnosticStatus::ERROR,
-              fmt::format("{}: {}", stateName(picture.state), picture.status));
+              fmt::format("{}: {}", stateName(present.state), present.loop_fault));
     }
-    addValue(status, "state", stateName(picture.state));
-    addValue(status, "frequency wanted (Hz)", picture.settings.frequency_hz);
+    addValue(status, "state", stateName(present.state));
+    addValue(status, "frequency wanted (Hz)", present.settings.frequency_hz);
     if (elapsed_ns > 0 && loop.running()) {
         addValue(status, "frequency (Hz)", fmt::format("{:.1f}", done_hz));
     }
@@ -264,7 +263,7 @@ DiagnosticStatus DiagnosticReport::loopStatus() {
     addValue(status, "messages passed over for newer ones", passed_over);
     addValue(status, "log records lost", logs);
     addValue(status, "cycle messages lost", cycles);
-    addValue(status, "real time", picture.degraded.empty() ? "yes" : joined(picture.degraded));
+    addValue(status, "real time", present.degraded.empty() ? "yes" : joined(present.degraded));
     addMicroseconds(status, "calculation",
                     summarize(difference(duration, duration_), loop.counter().nsPerTick()));
     addMicroseconds(status, "wake-up latency", summarize(difference(latency, latency_), 1.0));

@@ -124,7 +124,7 @@ TEST_F(LoopTiming, FullBucketStopsTheLoopUnlessItRunsDegraded) {
     load(spinner);
     load(definition("Recorder", "A"));
     start();
-    if (runner().picture().degraded.empty()) {
+    if (runner().status().degraded.empty()) {
         ASSERT_TRUE(eventually([this] { return state() == RunnerState::Faulted; }));
         EXPECT_EQ(events().back().kind, RunnerEvent::Kind::LoopEnded);
         EXPECT_NE(events().back().message.find("more than 3 overruns"), std::string::npos);
@@ -157,14 +157,14 @@ TEST_F(LoopTiming, SpinFollowsTheWakeUpLatencyUpToATenthOfThePeriod) {
     configure([](RunnerSettings& settings) { settings.spin_auto = true; });
     load(definition("Ticker", "A"));
     start();
-    ASSERT_TRUE(eventually([this] { return runner().picture().settings.loop.spin_ns > 0; }));
-    EXPECT_LE(runner().picture().settings.loop.spin_ns, 100'000);
+    ASSERT_TRUE(eventually([this] { return runner().status().settings.loop.spin_ns > 0; }));
+    EXPECT_LE(runner().status().settings.loop.spin_ns, 100'000);
     // The chosen value is not a setting that could conflict with others.
     configure([](RunnerSettings& settings) { settings.frequency_hz = 20000.0; });
     ASSERT_TRUE(runs());
-    EXPECT_LE(runner().picture().settings.loop.spin_ns, 5'000);
+    EXPECT_LE(runner().status().settings.loop.spin_ns, 5'000);
     configure([](RunnerSettings& settings) { settings.spin_auto = false; });
-    EXPECT_EQ(runner().picture().settings.loop.spin_ns, 0);
+    EXPECT_EQ(runner().status().settings.loop.spin_ns, 0);
 }
 
 TEST_F(LoopTiming, EveryCycleIsInTheStatistics) {

@@ -21,7 +21,7 @@ class Placement : protected ClaimsFolder, public RunnerFixture {
    protected:
     Placement() : RunnerFixture(folder_) {}
     bool lacks(const std::string& text) {
-        const std::vector<std::string> degraded = runner().picture().degraded;
+        const std::vector<std::string> degraded = runner().status().degraded;
         return std::any_of(degraded.begin(), degraded.end(), [&](const std::string& each) {
             return each.find(text) != std::string::npos;
         });

@@ -316,7 +316,7 @@ TEST_F(Change, BadSettingsAreRejectedAndTheOldOnesStay) {
     EXPECT_NE(refusal([&] { configure([](RunnerSettings& s) { s.whitelist = "("; }); }), "");
     EXPECT_NE(refusal([&] { configure([](RunnerSettings& s) { s.loop.realtime.priority = 99; }); }),
               "");
-    EXPECT_EQ(runner().picture().settings.frequency_hz, 1000.0);
+    EXPECT_EQ(runner().status().settings.frequency_hz, 1000.0);
     EXPECT_TRUE(runs());
 }
 

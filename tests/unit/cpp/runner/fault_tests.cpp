@@ -74,7 +74,7 @@ TEST_F(Fault, LoopStartsAgainOnceTheCauseIsGone) {
     start();
     EXPECT_EQ(state(), RunnerState::Running);
     EXPECT_EQ(runner().snapshot()->get("/B").fault, "");
-    EXPECT_EQ(runner().picture().status, "");
+    EXPECT_EQ(runner().status().loop_fault, "");
     EXPECT_TRUE(runs());
 }
 

@@ -132,7 +132,7 @@ class Soak : public RunnerFixture {
                 for (const auto& component : snapshot->components)
                     (void)component->figures->duration.snapshot();
                 (void)runner().loop().figures().duration.snapshot();
-                (void)runner().picture();
+                (void)runner().status();
                 (void)runner().activity();
                 std::this_thread::yield();
             }

@@ -10,7 +10,7 @@ namespace rtcf::test {
 namespace {
 
 const std::string kLibrary = RTCF_UNIT_COMPONENTS "/rtcf_unit_test.so";
-const Runner::Progress kSilent = [](const std::string&) {};
+const executor::Progress kSilent = [](const std::string&) {};
 
 }  // namespace
 

@@ -103,7 +103,7 @@ class RunnerFixture : public ::testing::Test {
     std::uint64_t iteration() const { return runner_->loop().figures().iteration.load(); }
     /// Waits until the loop has run `cycles` more. @return false at the deadline
     bool runs(std::uint64_t cycles = 20);
-    RunnerState state() const { return runner_->picture().state; }
+    RunnerState state() const { return runner_->status().state; }
     std::vector<std::string> order() const;
     std::uint64_t generation() const { return runner_->snapshot()->generation; }
 

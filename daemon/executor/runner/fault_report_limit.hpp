@@ -1,7 +1,7 @@
 /// @file
 /// Rate limit of reports on non-finite values: the first fault of a component is reported at once,
-/// later ones after a silence, which doubles while the faults continue. Owned by the Runner; graph
-/// thread.
+/// later ones after a silence, which doubles while the faults continue. Owned by FaultReports;
+/// graph thread.
 #pragma once
 
 #include <cstdint>
@@ -12,12 +12,12 @@
 
 namespace rtcf::executor {
 
-class ToldFaults {
+class FaultReportLimit {
    public:
     /// Notes that a fault of a component was reported, and begins a silence.
     /// @param now_ns CLOCK_MONOTONIC, ns
     /// @return faults of this component since its last report; 0 = this is the first report
-    std::uint64_t told(const std::shared_ptr<ComponentFigures>& of, std::int64_t now_ns);
+    std::uint64_t noteReport(const std::shared_ptr<ComponentFigures>& of, std::int64_t now_ns);
     /// Enables the next report of components whose silence is over.
     void rearm(std::int64_t now_ns);
 

@@ -1,83 +1,65 @@
-// Runner: changes of the graph as transactions.
+#include "runner/transactions.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <rtcf/design_period.hpp>
 
 #include "common/refusal.hpp"
-#include "common/time_units.hpp"
 #include "logging/log_errors.hpp"
-#include "runner/runner.hpp"
+#include "ordering/wiring.hpp"
 
 namespace rtcf::executor {
 
-MappingFilter Runner::filter() const {
+namespace {
+
+// Lets a component compute the values that depend on its period for another one.
+void stagePeriod(Instance& instance, std::int64_t loop_period_ns,
+                 std::vector<StagedValue*>& values) {
+    for (DerivedBase* derived : instance.component().derived()) {
+        auto* const period = dynamic_cast<DesignPeriod*>(derived);
+        if (period == nullptr) continue;
+        period->propose(loop_period_ns * instance.definition().every);
+        const std::vector<StagedValue*> staged = instance.stageParameters({});
+        values.insert(values.end(), staged.begin(), staged.end());
+        return;
+    }
+}
+
+}  // namespace
+
+Transactions::Transactions(std::string runner, const RunnerSettings& settings, const Loop& loop,
+                           LoopBoundary& boundary, LoopControl& control, ActivePlan& plan,
+                           FrameKeeper& frames, const Publication& publication, BridgeLink& bridge,
+                           ComponentLoader& loader, HookActivity& activity, Log& log)
+    : runner_(std::move(runner)),
+      settings_(settings),
+      loop_(loop),
+      boundary_(boundary),
+      control_(control),
+      plan_(plan),
+      frames_(frames),
+      publication_(publication),
+      bridge_(bridge),
+      loader_(loader),
+      activity_(activity),
+      log_(log) {}
+
+MappingFilter Transactions::filter() const {
     return {NamePattern("whitelist", settings_.whitelist),
             NamePattern("blacklist", settings_.blacklist)};
 }
 
-std::int64_t Runner::adoptionTimeout() const noexcept {
-    return kSecond + 10 * settings_.loop.period_ns;
-}
-
-std::shared_ptr<Instance> Runner::makeInstance(ComponentDefinition definition,
-                                               const std::string& library, const Progress& progress,
-                                               bool configure) {
-    const std::string full_name = definition.fullName();
-    progress("loading " + full_name);
-    activity_.begin(full_name + ".constructor");
-    const std::shared_ptr<const Library> code = libraries_.open(library);
-    requireThreadLocals(*code);
-    auto instance =
-        std::make_shared<Instance>(std::move(definition), code, name_, loop_.clock(), log_,
-                                   recorder_, bridge_ ? bridge_->hooks() : nullptr);
-    if (!configure) {
-        instance->freezePorts();
-        return instance;
-    }
-    progress("configuring " + full_name);
-    activity_.begin(full_name + ".configure");
-    instance->configure();
-    return instance;
-}
-
-// A rejected library stays loaded, like all libraries; each later request checks it again.
-void Runner::requireThreadLocals(const Library& library) {
-    noticeEnd();
-    const std::string lacking = loop_.lackingThreadLocals(library.handle());
-    if (lacking.empty()) return;
-    const bool own = lacking.rfind("/proc/", 0) == 0;  // our copy of the library
-    throw Refusal(
-        RefusalKind::LoopRuns,
-        fmt::format(
-            "library {0}: {1} has thread_local variables, and the loop of {2} started "
-            "without memory for them: stop the loop first (rtcfctl -r {2} stop), or load it "
-            "before the loop starts",
-            library.path(), own ? "it" : lacking + ", which it links against,", name_));
-}
-
-void Runner::requireNoReplay() const {
-    if (!replay_) return;
+void Transactions::requireNoReplay() const {
+    if (!replaying_) return;
     throw Refusal(RefusalKind::ReplayRuns,
                   fmt::format("a replay of {0} is under way: wait for its end, or stop it: "
                               "rtcfctl -r {0} stop",
-                              name_));
+                              runner_));
 }
 
-std::string Runner::whatDoesNotReturn() const {
-    const std::string activity = recorder_.realtimeActivity();
-    return (activity.empty() ? "a component" : activity + "()") + " does not return";
-}
-
-void Runner::adoptAtBoundary(Adoption& adoption) {
-    activity_.end();
-    if (loop_.adopt(adoption, adoptionTimeout())) return;
-    throw Refusal(RefusalKind::Unavailable,
-                  fmt::format("the loop of {} reaches no cycle boundary: {}; nothing has changed",
-                              name_, whatDoesNotReturn()));
-}
-
-std::vector<std::string> Runner::adopt(Change change, const Progress& progress) {
-    noticeEnd();
+std::vector<std::string> Transactions::adopt(Change change, const Progress& progress) {
+    control_.noticeEnd();
     requireNoReplay();
     const Graph graph = change.graph;
     Wiring wiring = wire(graph, filter(), change.loading);
@@ -93,9 +75,8 @@ std::vector<std::string> Runner::adopt(Change change, const Progress& progress) 
     adoption.period_ns = change.period_ns;
     adoption.restoration = change.restoration;
     // Frames must not copy values of leaving components, even if a client watches them.
-    std::shared_ptr<const FrameTable> frames =
-        frames_.prepare(*plan, settings_.frequency_hz, settings_.frame_bytes, adoption);
-    if (loop_.running() || state_ == RunnerState::Stepping) {
+    std::shared_ptr<const FrameTable> frames = framesOf(*plan, adoption);
+    if (loop_.running() || control_.state() == RunnerState::Stepping) {
         for (const auto& instance : change.arriving) {
             progress("starting " + instance->fullName());
             activity_.begin(instance->fullName() + ".start");
@@ -103,26 +84,27 @@ std::vector<std::string> Runner::adopt(Change change, const Progress& progress) 
         }
     }
     progress("adopting the change");
-    adoptAtBoundary(adoption);
+    boundary_.adopt(adoption);
     if (change.restoration != nullptr && change.restoration->taken_out != nullptr) {
         throw Refusal(RefusalKind::FailedPrecondition,
                       fmt::format("{} was taken out after a fault: replace it first",
                                   change.restoration->taken_out->full_name));
     }
     plan->noteKept(adoption, *plan_);
-    std::swap(plan_, plan);
+    // Destroyed last: leaving components use it until they are cleaned up.
+    const std::unique_ptr<Plan> previous = plan_.replace(std::move(plan));
     frames_.publish(std::move(frames));
     // From here on, an error does not undo the change.
     logErrors(log_, "publishing a change", [&] { adopted(change); });
     // The leaving components are out of the loop, so their hooks may take long.
     for (const auto& instance : change.leaving) {
-        noteFaultsOf(*instance);
+        control_.reportFaults(*instance);
         activity_.begin(instance->fullName() + ".stop");
         instance->stop();
         activity_.begin(instance->fullName() + ".cleanup");
         instance->cleanup();
     }
-    logErrors(log_, "supervising the loop", [this] { noticeEnd(); });
+    logErrors(log_, "supervising the loop", [this] { control_.noticeEnd(); });
     for (const HandOver& hand_over : adoption.hand_overs) {
         if (!hand_over.skipped) continue;
         change.notes.push_back(fmt::format(
@@ -132,12 +114,13 @@ std::vector<std::string> Runner::adopt(Change change, const Progress& progress) 
     return std::move(change.notes);
 }
 
-void Runner::handOver(Change& change, const Instance& previous, const Instance& successor) const {
+void Transactions::handOver(Change& change, const Instance& previous,
+                            const Instance& successor) const {
     HandOver hand_over{&successor.component(), &previous.component(), {}};
     planHandOver(previous.component(), successor.component(), hand_over.states, change.notes);
     std::size_t bytes = bytesOf(hand_over.states);
     for (const HandOver& other : change.hand_overs) bytes += bytesOf(other.states);
-    requireSmall(bytes, "the state to hand over");
+    boundary_.requireSmall(bytes, "the state to hand over");
     if (bytes > kLargestState) {
         throw Refusal(RefusalKind::StateTooLarge,
                       fmt::format("a hand-over of {} bytes of state exceeds the limit of {} bytes: "
@@ -147,7 +130,7 @@ void Runner::handOver(Change& change, const Instance& previous, const Instance& 
     change.hand_overs.push_back(std::move(hand_over));
 }
 
-void Runner::adopted(const Change& change) {
+void Transactions::adopted(const Change& change) {
     if (!change.values.empty()) {
         for (const GraphNode& node : plan_->graph.nodes()) node.instance->releaseStaged();
     }
@@ -156,14 +139,14 @@ void Runner::adopted(const Change& change) {
         if (connection.written) written_.insert(name);
     }
     for (const Feed& feed : plan_->schedule.feeds) feed.injector->setBacklogs(feed.backlogs);
-    if (simulated_) {
+    if (control_.simulated()) {
         for (const auto& injector : plan_->bridgeTable().inputs) injector->setQueueing(true);
     }
-    publish(change.changed);
-    if (bridge_) bridge_->setTable(bridgeTable());
+    control_.publish(change.changed);
+    bridge_.setTable(*plan_, *publication_.graph());
 }
 
-void Runner::checkTaps(const Wiring& wiring) const {
+void Transactions::checkTaps(const Wiring& wiring) const {
     std::size_t taps = 0;
     for (const auto& [name, connection] : wiring.connections)
         taps += connection.published ? 1 + connection.others.size() : 0;
@@ -176,12 +159,12 @@ void Runner::checkTaps(const Wiring& wiring) const {
                     taps, most_taps_));
 }
 
-ChangeOutcome Runner::load(ComponentDefinition definition, const std::string& library,
-                           const Progress& progress) {
+ChangeOutcome Transactions::load(ComponentDefinition definition, const std::string& library,
+                                 const Progress& progress) {
     plan_->graph.requireFree(definition.fullName());
     const std::set<std::string> breaks = definition.breaks;
     const std::shared_ptr<Instance> instance =
-        makeInstance(std::move(definition), library, progress);
+        loader_.make(std::move(definition), library, progress);
     Change change;
     change.graph = plan_->graph;
     change.graph.add({instance, breaks});
@@ -191,8 +174,8 @@ ChangeOutcome Runner::load(ComponentDefinition definition, const std::string& li
     return outcomeOf(*instance);
 }
 
-ChangeOutcome Runner::outcomeOf(const Instance& arrived) const {
-    ChangeOutcome result = outcome(arrived.fullName());
+ChangeOutcome Transactions::outcomeOf(const Instance& arrived) const {
+    ChangeOutcome result = outcomeWith(*plan_, arrived.fullName());
     for (const std::string& remap : arrived.uselessRemaps()) {
         result.notes.push_back(
             fmt::format("remap {} matches no port of {}", remap, arrived.fullName()));
@@ -203,12 +186,14 @@ ChangeOutcome Runner::outcomeOf(const Instance& arrived) const {
     return result;
 }
 
-void Runner::addRemarks(ChangeOutcome& outcome, const std::set<std::string>& components) const {
+void Transactions::addRemarks(ChangeOutcome& outcome,
+                              const std::set<std::string>& components) const {
     for (std::string& line : remarks(plan_->graph, plan_->wiring, filter(), components))
         outcome.notes.push_back(std::move(line));
 }
 
-ChangeOutcome Runner::unload(const std::vector<std::string>& names, const Progress& progress) {
+ChangeOutcome Transactions::unload(const std::vector<std::string>& names,
+                                   const Progress& progress) {
     if (names.empty()) throw Refusal(RefusalKind::NameMissing, "no component to unload is named");
     Change change;
     change.graph = plan_->graph;
@@ -218,11 +203,12 @@ ChangeOutcome Runner::unload(const std::vector<std::string>& names, const Progre
     }
     progress("unloading");
     adopt(std::move(change), progress);
-    return outcome(names.size() == 1 ? names[0] : "");
+    return outcomeWith(*plan_, names.size() == 1 ? names[0] : "");
 }
 
-ChangeOutcome Runner::replace(const std::string& name, ComponentDefinition definition,
-                              const std::string& library, bool reset, const Progress& progress) {
+ChangeOutcome Transactions::replace(const std::string& name, ComponentDefinition definition,
+                                    const std::string& library, bool reset,
+                                    const Progress& progress) {
     const GraphNode old = plan_->graph.get(name);
     if (definition.fullName() != name) plan_->graph.requireFree(definition.fullName());
     if (!reset) {
@@ -236,7 +222,7 @@ ChangeOutcome Runner::replace(const std::string& name, ComponentDefinition defin
     }
     const std::set<std::string> breaks = definition.breaks;
     const std::shared_ptr<Instance> instance =
-        makeInstance(std::move(definition), library, progress);
+        loader_.make(std::move(definition), library, progress);
     Change change;
     change.graph = plan_->graph;
     change.graph.replace(name, {instance, breaks});
@@ -250,8 +236,8 @@ ChangeOutcome Runner::replace(const std::string& name, ComponentDefinition defin
     return result;
 }
 
-ChangeOutcome Runner::apply(const std::vector<WantedComponent>& wanted, bool dry_run,
-                            const Progress& progress) {
+ChangeOutcome Transactions::apply(const std::vector<WantedComponent>& wanted, bool dry_run,
+                                  const Progress& progress) {
     std::vector<Difference> differences = compare(plan_->graph, wanted);
     std::vector<std::pair<std::shared_ptr<Instance>, std::vector<ParameterValue>>> previous;
     for (const GraphNode& node : plan_->graph.nodes()) {
@@ -276,7 +262,7 @@ ChangeOutcome Runner::apply(const std::vector<WantedComponent>& wanted, bool dry
         restoreParameters();
         throw;
     }
-    ChangeOutcome result = outcome();
+    ChangeOutcome result = outcomeWith(*plan_);
     result.notes = std::move(notes);
     result.differences = std::move(differences);
     std::set<std::string> changed;
@@ -288,8 +274,8 @@ ChangeOutcome Runner::apply(const std::vector<WantedComponent>& wanted, bool dry
     return result;
 }
 
-void Runner::addDifference(Change& change, const Difference& difference, const Progress& progress,
-                           bool look) {
+void Transactions::addDifference(Change& change, const Difference& difference,
+                                 const Progress& progress, bool look) {
     const std::string& name = difference.component;
     switch (difference.kind) {
         case Difference::Kind::Unload:
@@ -312,7 +298,7 @@ void Runner::addDifference(Change& change, const Difference& difference, const P
     }
     const ComponentDefinition& definition = difference.wanted->definition;
     const std::shared_ptr<Instance> instance =
-        makeInstance(definition, difference.wanted->library, progress, !look);
+        loader_.make(definition, difference.wanted->library, progress, !look);
     change.arriving.push_back(instance);
     if (difference.kind == Difference::Kind::Load) {
         change.graph.add({instance, definition.breaks});
@@ -324,38 +310,96 @@ void Runner::addDifference(Change& change, const Difference& difference, const P
     handOver(change, *old, *instance);
 }
 
-void Runner::watch(std::uint64_t watch, Watch wanted, bool allow_missing) {
+void Transactions::renewComponents(const Progress& progress) {
+    Change renewed;
+    Change previous;
+    previous.graph = plan_->graph;
+    for (const GraphNode& node : plan_->graph.nodes()) {
+        const Instance& old = *node.instance;
+        ComponentDefinition definition = old.definition();
+        definition.parameters.clear();
+        const auto& parameters = old.component().parameters();
+        for (std::size_t i = 0; i < parameters.size(); ++i) {
+            definition.parameters.emplace_back(parameters[i]->declaration().name,
+                                               old.parameterValues()[i]);
+        }
+        auto instance = loader_.make(std::move(definition), old.library().path(), progress);
+        if (old.hasPhase()) instance->setPhase(old.phase());
+        renewed.graph.add({instance, node.breaks});
+        renewed.leaving.push_back(node.instance);
+    }
+    adopt({}, progress);  // removes all values of connections
+    try {
+        adopt(std::move(renewed), progress);
+    } catch (...) {
+        adopt(std::move(previous), progress);
+        throw;
+    }
+}
+
+void Transactions::applySettings(std::int64_t period_ns) {
+    Change change;
+    change.graph = plan_->graph;
+    change.period_ns = period_ns;
+    try {
+        if (period_ns != 0) {
+            for (const GraphNode& node : change.graph.nodes())
+                stagePeriod(*node.instance, period_ns, change.values);
+        }
+        adopt(std::move(change), [](const std::string&) {});
+    } catch (...) {
+        for (const GraphNode& node : plan_->graph.nodes()) node.instance->releaseStaged();
+        throw;
+    }
+}
+
+void Transactions::makeWritable(const std::string& topic) {
+    written_.insert(topic);
+    Change change;
+    change.graph = plan_->graph;
+    try {
+        adopt(std::move(change), [](const std::string&) {});
+    } catch (...) {
+        written_.erase(topic);
+        throw;
+    }
+}
+
+void Transactions::watch(std::uint64_t watch, Watch wanted, bool allow_missing) {
     if (!allow_missing) requireMatches(wanted.selection, *plan_);
     frames_.add(watch, std::move(wanted));
     try {
-        renewFrames();
+        adoptFrames();
     } catch (...) {
         frames_.remove(watch);
         throw;
     }
 }
 
-void Runner::endWatch(std::uint64_t watch) {
-    if (frames_.remove(watch)) renewFrames();
+void Transactions::endWatch(std::uint64_t watch) {
+    if (frames_.remove(watch)) adoptFrames();
 }
 
-void Runner::renewFrames() {
-    noticeEnd();
+std::shared_ptr<const FrameTable> Transactions::framesOf(const Plan& plan, Adoption& adoption) {
+    return frames_.prepare(plan, settings_.frequency_hz, settings_.frame_bytes, adoption);
+}
+
+void Transactions::adoptFrames() {
+    control_.noticeEnd();
     Adoption adoption;
-    std::shared_ptr<const FrameTable> frames =
-        frames_.prepare(*plan_, settings_.frequency_hz, settings_.frame_bytes, adoption);
-    adoptAtBoundary(adoption);
+    std::shared_ptr<const FrameTable> frames = framesOf(*plan_, adoption);
+    boundary_.adopt(adoption);
     frames_.publish(std::move(frames));
 }
 
-ChangeOutcome Runner::setBreaks(const std::vector<std::pair<std::string, std::string>>& ports,
-                                bool broken) {
+ChangeOutcome Transactions::setBreaks(const std::vector<std::pair<std::string, std::string>>& ports,
+                                      bool broken) {
     if (ports.empty()) throw Refusal(RefusalKind::NameMissing, "no input is named");
     Change change;
     change.graph = plan_->graph;
     for (const auto& [component, port] : ports) change.graph.setBreak(component, port, broken);
     adopt(std::move(change), [](const std::string&) {});
-    return outcome(ports[0].first);
+    return outcomeWith(*plan_, ports[0].first);
 }
 
 }  // namespace rtcf::executor

@@ -1,42 +1,55 @@
-// Runner: changes of parameters, state, and inputs without a writer.
+#include "runner/value_changes.hpp"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 
 #include "common/refusal.hpp"
 #include "logging/log_errors.hpp"
-#include "runner/runner.hpp"
 #include "state/state_value.hpp"
 
 namespace rtcf::executor {
 
-ChangeOutcome Runner::reset(const std::string& name) {
+ValueChanges::ValueChanges(std::string runner, const Loop& loop, LoopBoundary& boundary,
+                           LoopControl& control, ActivePlan& plan, const Publication& publication,
+                           BridgeLink& bridge, Transactions& transactions, Log& log)
+    : runner_(std::move(runner)),
+      loop_(loop),
+      boundary_(boundary),
+      control_(control),
+      plan_(plan),
+      publication_(publication),
+      bridge_(bridge),
+      transactions_(transactions),
+      log_(log) {}
+
+ChangeOutcome ValueChanges::reset(const std::string& name) {
     const Component& component = plan_->graph.get(name).instance->component();
     if (component.states().empty()) {
         throw Refusal(RefusalKind::NoState,
                       fmt::format("{} declares no state (rtcf::State) to reset", name));
     }
-    Change change;
+    Transactions::Change change;
     change.graph = plan_->graph;
     change.copies = planReset(component);
-    requireSmall(bytesOf(change.copies), "the reset");
-    adopt(std::move(change), [](const std::string&) {});
-    return outcome(name);
+    boundary_.requireSmall(bytesOf(change.copies), "the reset");
+    transactions_.adopt(std::move(change), [](const std::string&) {});
+    return outcomeWith(*plan_, name);
 }
 
 // Only while the loop does not run: outside changes of state must not disturb a running loop.
-ChangeOutcome Runner::setStates(const std::string& name,
-                                const std::vector<std::pair<std::string, ParameterValue>>& batch) {
-    noticeEnd();
+ChangeOutcome ValueChanges::setStates(
+    const std::string& name, const std::vector<std::pair<std::string, ParameterValue>>& batch) {
+    control_.noticeEnd();
     const auto& states = plan_->graph.get(name).instance->component().states();
     if (loop_.joinable()) {
         throw Refusal(RefusalKind::FailedPrecondition,
                       fmt::format("the loop of {0} runs: stop it to set state: rtcfctl -r "
                                   "{0} stop",
-                                  name_));
+                                  runner_));
     }
     std::vector<std::vector<std::byte>> values;
-    Change change;
+    Transactions::Change change;
     for (const auto& [state_name, value] : batch) {
         const auto found =
             std::find_if(states.begin(), states.end(),
@@ -50,21 +63,21 @@ ChangeOutcome Runner::setStates(const std::string& name,
         change.copies.push_back({found->value, values.back().data(), found->size});
     }
     change.graph = plan_->graph;
-    adopt(std::move(change), [](const std::string&) {});
-    return outcome(name);
+    transactions_.adopt(std::move(change), [](const std::string&) {});
+    return outcomeWith(*plan_, name);
 }
 
-ChangeOutcome Runner::setParameters(
+ChangeOutcome ValueChanges::setParameters(
     const std::string& name, const std::vector<std::pair<std::string, ParameterValue>>& batch) {
     Instance& instance = *plan_->graph.get(name).instance;
     const std::vector<ParameterValue> previous = instance.parameterValues();
-    noticeEnd();
-    requireNoReplay();
+    control_.noticeEnd();
+    transactions_.requireNoReplay();
     // Only values change; the schedule stays.
     Adoption adoption;
     adoption.values = instance.stageParameters(batch);
     try {
-        adoptAtBoundary(adoption);
+        boundary_.adopt(adoption);
     } catch (...) {
         instance.restoreParameterValues(previous);
         throw;
@@ -73,14 +86,14 @@ ChangeOutcome Runner::setParameters(
     instance.releaseStaged();
     ++plan_->schedule.generation;  // not used by the cycle
     logErrors(log_, "publishing a change", [&] {
-        publish({name});
-        if (bridge_) bridge_->setTable(bridgeTable());
-        noticeEnd();
+        control_.publish({name});
+        bridge_.setTable(*plan_, *publication_.graph());
+        control_.noticeEnd();
     });
-    return outcome(name);
+    return outcomeWith(*plan_, name);
 }
 
-WritableInput Runner::writableInput(const std::string& name, const std::string& port) const {
+WritableInput ValueChanges::writableInput(const std::string& name, const std::string& port) const {
     const InputBase& input = plan_->graph.get(name).instance->requireInput(port);
     const std::string full = fmt::format("{}.{}", name, port);
     for (const auto& [topic, connection] : plan_->wiring.connections) {
@@ -96,7 +109,7 @@ WritableInput Runner::writableInput(const std::string& name, const std::string& 
                                       writer.output->name()));
         }
         const auto injector = plan_->injectors.find(topic);
-        if (bridge_ && injector != plan_->injectors.end() && bridge_->feeds(*injector->second)) {
+        if (injector != plan_->injectors.end() && bridge_.feeds(*injector->second)) {
             throw Refusal(RefusalKind::TwoWriters,
                           fmt::format("{0} reads the ROS topic {1}: publish there (rostopic pub "
                                       "{1}), or keep the topic out: rtcfctl runner set --blacklist",
@@ -113,10 +126,10 @@ WritableInput Runner::writableInput(const std::string& name, const std::string& 
     throw Refusal(RefusalKind::PortNotFound, fmt::format("{} has no connection", full));
 }
 
-ChangeOutcome Runner::writeInput(const std::string& name, const std::string& port,
-                                 const std::string& message) {
-    noticeEnd();
-    requireNoReplay();
+ChangeOutcome ValueChanges::writeInput(const std::string& name, const std::string& port,
+                                       const std::string& message) {
+    control_.noticeEnd();
+    transactions_.requireNoReplay();
     const auto [topic, type] = writableInput(name, port);
     const auto* const bytes = reinterpret_cast<const std::uint8_t*>(message.data());
     const auto size = static_cast<std::uint32_t>(message.size());
@@ -126,24 +139,14 @@ ChangeOutcome Runner::writeInput(const std::string& name, const std::string& por
             RefusalKind::InvalidArgument,
             fmt::format("{}.{} is of type {}: the value has another size", name, port, type->name));
     }
-    if (plan_->injectors.count(topic) == 0) {
-        written_.insert(topic);
-        Change change;
-        change.graph = plan_->graph;
-        try {
-            adopt(std::move(change), [](const std::string&) {});
-        } catch (...) {
-            written_.erase(topic);
-            throw;
-        }
-    }
+    if (plan_->injectors.count(topic) == 0) transactions_.makeWritable(topic);
     if (!plan_->injectors.at(topic)->deliver(bytes, size)) {
         throw Refusal(RefusalKind::InvalidArgument,
                       fmt::format("{}.{}: a value of {} bytes is too large: rtcfctl runner set "
                                   "--largest-message",
                                   name, port, size));
     }
-    return outcome(name);
+    return outcomeWith(*plan_, name);
 }
 
 }  // namespace rtcf::executor

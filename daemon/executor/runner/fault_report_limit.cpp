@@ -1,4 +1,4 @@
-#include "runner/told_faults.hpp"
+#include "runner/fault_report_limit.hpp"
 
 #include <algorithm>
 #include <iterator>
@@ -17,7 +17,8 @@ constexpr std::int64_t kSoon = kSecond;
 
 }  // namespace
 
-std::uint64_t ToldFaults::told(const std::shared_ptr<ComponentFigures>& of, std::int64_t now_ns) {
+std::uint64_t FaultReportLimit::noteReport(const std::shared_ptr<ComponentFigures>& of,
+                                           std::int64_t now_ns) {
     const std::uint64_t count = of->faults.count.value();
     const auto [found, is_new] = silences_.try_emplace(of);
     Silence& silence = found->second;
@@ -29,7 +30,7 @@ std::uint64_t ToldFaults::told(const std::shared_ptr<ComponentFigures>& of, std:
     return is_new ? 0 : count - before;
 }
 
-void ToldFaults::rearm(std::int64_t now_ns) {
+void FaultReportLimit::rearm(std::int64_t now_ns) {
     for (auto it = silences_.begin(); it != silences_.end();) {
         Silence& silence = it->second;
         if (!silence.over && now_ns >= silence.until_ns) {

@@ -1,0 +1,99 @@
+#include "runner/fault_reports.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "common/time_units.hpp"
+
+namespace rtcf::executor {
+
+namespace {
+
+std::string whatFailed(const LoopFault& fault) {
+    const char* const text = fault.text.data();
+    switch (fault.kind) {
+        case LoopFault::Kind::NotFinite:
+            return fmt::format("output {} is not finite", text);
+        case LoopFault::Kind::NoMemory:
+            return fmt::format("no memory to copy the value of {}; reserve() the largest one",
+                               text);
+        default:
+            return fmt::format("update() threw: {}", text);
+    }
+}
+
+}  // namespace
+
+FaultReports::FaultReports(const std::string& runner, const Loop& loop, Log& log, TellEvent tell,
+                           PublishFault publish)
+    : loop_(loop),
+      tell_(std::move(tell)),
+      publish_(std::move(publish)),
+      sizes_(runner, [&log](const std::string& line) { log.write(LogLevel::Warn, {}, line); }) {}
+
+RunnerEvent FaultReports::endOfLoop(const Graph& graph, std::uint32_t max_overruns) const {
+    const LoopFault& fault = loop_.fault();
+    RunnerEvent event{RunnerEvent::Kind::LoopEnded, {}, {}, fault.iteration};
+    if (fault.kind == LoopFault::Kind::Overruns) {
+        event.message = fmt::format("loop stopped in iteration {}: more than {} overruns",
+                                    fault.iteration, max_overruns);
+    }
+    if (fault.component == nullptr) return event;
+    event.component = fault.component_name.data();
+    const std::string what = whatFailed(fault);
+    event.message =
+        fmt::format("loop stopped in iteration {}: {}: {}", fault.iteration, event.component, what);
+    const auto node = std::find_if(
+        graph.nodes().begin(), graph.nodes().end(),
+        [&](const GraphNode& each) { return &each.instance->component() == fault.component; });
+    // The component may have been unloaded at the boundary at which the loop ended.
+    if (node != graph.nodes().end())
+        node->instance->setFault(fmt::format("iteration {}: {}", fault.iteration, what));
+    return event;
+}
+
+void FaultReports::reportComponents(const Graph& graph) {
+    not_finite_.rearm(monotonicNow());
+    const std::uint64_t count = loop_.figures().faults.value();
+    if (std::exchange(reported_faults_, count) == count) return;
+    for (const GraphNode& node : graph.nodes()) report(*node.instance);
+}
+
+void FaultReports::report(Instance& instance) {
+    ComponentFaults& faults = instance.figures()->faults;
+    const auto say = [&](const ComponentFault* fault, const char* text, std::uint64_t more) {
+        if (fault == nullptr) return;
+        const char* of = fault->text.data();
+        std::string what = fmt::vformat(text, fmt::make_format_args(of));
+        if (more > 1) what += fmt::format("; {} times since the last report", more);
+        instance.setFault(fmt::format("iteration {}: {}", fault->iteration, what));
+        tell_({RunnerEvent::Kind::ComponentFailed,
+               fmt::format("{}: iteration {}: {}", instance.fullName(), fault->iteration, what),
+               instance.fullName(), fault->iteration});
+        publish_(instance.fullName());
+    };
+    if (const ComponentFault* fault = faults.not_finite.take(); fault != nullptr) {
+        const std::uint64_t more = not_finite_.noteReport(instance.figures(), monotonicNow());
+        say(fault, "output {} is not finite: readers keep its last value", more);
+    }
+    say(faults.taken_out.take(), "update() threw: {}; taken out, the loop goes on", 0);
+    say(faults.unsafe.take(), "cannot copy a value of safe(): {}; readers keep the value before",
+        0);
+}
+
+void FaultReports::reportOverruns(const Graph& graph, bool last, const char* remark) {
+    std::string line = overruns_.take(loop_, graph, last);
+    if (line.empty()) return;
+    tell_({RunnerEvent::Kind::Overruns, line + remark, {}, loop_.figures().iteration.load()});
+}
+
+void FaultReports::reportLostMessages(const Plan& plan, std::size_t largest) {
+    const std::int64_t now = monotonicNow();
+    if (now < sizes_due_ns_) return;
+    sizes_due_ns_ = now + kSecond / 2;
+    sizes_.look(plan.taps, plan.injectors, largest, now);
+}
+
+}  // namespace rtcf::executor
