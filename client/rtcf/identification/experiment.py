@@ -335,10 +335,11 @@ class Collector:
                 "`rtcfctl status`"
             )
         grid = np.arange(count)
+        time = (grid - (int(active[0]) - begin)) * (self._period_ns / 1e9)
         newest = np.searchsorted(at, grid, side="right") - 1
         return Recorded(
             period=self._period_ns / 1e9,
-            time=(grid - (int(active[0]) - begin)) * (self._period_ns / 1e9),
+            time=time.astype(np.float64),
             inputs=inputs[part][newest],
             signal=signal[part][newest],
             outputs=np.interp(grid, at, outputs[part]),

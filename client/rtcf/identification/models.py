@@ -99,7 +99,7 @@ class Transfer:
         late, newest = _held(a, b, period - rest)
         previous = late @ _held(a, b, rest)[1]
         adjugates = [np.eye(n)]
-        coefficients = np.poly(whole)
+        coefficients = np.asarray(np.poly(whole), dtype=np.float64)
         for k in range(1, n):  # Leverrier's algorithm
             adjugates.append(whole @ adjugates[-1] + coefficients[k] * np.eye(n))
         # C (zI - A)^-1 (newest + previous z^-1) with C = (1, 0)

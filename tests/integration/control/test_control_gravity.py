@@ -138,6 +138,7 @@ def test_efforts_are_the_gradient_of_the_potential_energy(
         again = bench.run({"measured.position": position})
     found = first["command.effort"]
     assert found.tobytes() == again["command.effort"].tobytes()
+    at: Any
     for at, row in zip(position, found, strict=True):
         expected = efforts(urdf, names, at[::-1], gravity)
         assert row[::-1].tolist() == pytest.approx(expected, abs=ROUNDING)

@@ -194,10 +194,11 @@ def with_events(command: Any) -> Any:
             def starts(_: float, x: Any, s: float = direction, u: float = u) -> Any:
                 return 1.0 if s else DRY["static_friction"] - abs(u - shaft(x))
 
-            for event in (rests, starts):
-                event.terminal, event.direction = True, -1.0  # type: ignore[attr-defined]
+            events: list[Any] = [rests, starts]
+            for event in events:
+                event.terminal, event.direction = True, -1.0
             done = integrate.solve_ivp(rates, (0.0, left), state, method="Radau",
-                                       rtol=1e-8, atol=1e-11, events=[rests, starts])  # fmt: skip
+                                       rtol=1e-8, atol=1e-11, events=events)  # fmt: skip
             state = done.y[:, -1]
             left -= done.t[-1]
             if done.t_events[0].size:

@@ -336,7 +336,7 @@ def test_the_hold_of_a_cycle_is_a_delay_of_half_a_period() -> None:
 
 
 def recorded(model: Transfer, inputs: Any = BITS) -> Recorded:
-    time = np.arange(len(inputs)) * PERIOD
+    time = (np.arange(len(inputs)) * PERIOD).astype(np.float64)
     return Recorded(
         PERIOD, time, inputs, inputs, noisy(model.simulate(inputs, PERIOD)), COMPLETED, 0
     )
