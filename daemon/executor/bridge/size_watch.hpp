@@ -14,7 +14,7 @@
 
 namespace rtcf::executor {
 
-/// Owned by the runner; graph thread only.
+/// Owned by FaultReports; graph thread only.
 class SizeWatch {
    public:
     using Report = std::function<void(const std::string& line)>;

@@ -10,7 +10,7 @@ namespace rtcf::executor {
 
 /// Runs `work`, and writes its exception to the log, so that no error ends a process whose loop
 /// runs. Not real-time.
-/// @param what the work, at the begin of the message
+/// @param what subject of the message, e.g. "a change"
 void logErrors(Log& log, const char* what, const std::function<void()>& work) noexcept;
 
 }  // namespace rtcf::executor

@@ -1,7 +1,7 @@
 /// @file
 /// The clock of a simulation: one thread delivers ticks, and the loop's thread waits for the cycles
 /// that are due. Each tick makes as many cycles due as whole periods have passed, each with its own
-/// exact time. Owned by the runner. Not real-time, as a simulated loop is not.
+/// exact time. Owned by Simulation. Not real-time, as a simulated loop is not.
 #pragma once
 
 #include <chrono>

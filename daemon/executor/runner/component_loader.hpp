@@ -1,6 +1,6 @@
 /// @file
 /// Makes components: opens their libraries, constructs and configures them, beside the running
-/// loop. Owned by Transactions; graph thread.
+/// loop. Owned by the runner; graph thread.
 #pragma once
 
 #include <sys/types.h>

@@ -1,6 +1,6 @@
 /// @file
-/// The frames of a loop and their watches: which values each cycle copies into its frame, the
-/// memory of the frames, and the tables that describe them to readers. Owned by the runner.
+/// The frames of a loop: the watches that select their values, their memory, and the tables that
+/// describe them to readers. Owned by the runner.
 #pragma once
 
 #include <atomic>

@@ -30,7 +30,7 @@ class LoopBoundary {
 
     /// Most bytes to copy at one boundary.
     std::size_t mostBytes() const;
-    /// @param what the copied values, at the begin of the message
+    /// @param what subject of the message, e.g. "a snapshot"
     /// @throws Refusal if these are too many bytes for one boundary
     void requireSmall(std::size_t bytes, const char* what) const;
 

@@ -2,7 +2,7 @@
 /// A replay: the loop runs on the time of recorded messages. Each message is injected before the
 /// first cycle whose time is not earlier. Outputs that would be published are collected after each
 /// cycle. There is no other input and no clock of the machine, so the same graph, newly created,
-/// gives the same outputs, bit by bit. Owned by the runner; graph thread only.
+/// gives the same outputs, bit by bit. Owned by OfflineRun; graph thread only.
 #pragma once
 
 #include <cstdint>

@@ -1,8 +1,5 @@
 #include "runner/runner.hpp"
 
-#include <fmt/format.h>
-
-#include "common/refusal.hpp"
 #include "faults/crash_handler.hpp"
 #include "logging/log_errors.hpp"
 
@@ -101,10 +98,11 @@ void Runner::tick() {
     control_.publishStatus();
 }
 
-void Runner::tell(RunnerEvent event) noexcept {
+void Runner::tell(const RunnerEvent& event) noexcept {
     logErrors(log_, "reporting an event", [&] {
-        event.state = numberedState();
-        events_(std::move(event));
+        RunnerEvent numbered = event;
+        numbered.state = numberedState();
+        events_(std::move(numbered));
     });
 }
 

@@ -1,10 +1,9 @@
 /// @file
 /// A runner: the graph, its loop, and the graph thread, which alone changes them. The runner owns
-/// the thread and its jobs, and the objects that do the work, each of which takes only the objects
-/// above it that it needs:
+/// the thread, its jobs, and the following objects. An object uses only those above it:
 ///
-///     ActivePlan, FrameKeeper, BridgeLink    what the loop executes, records and is connected to
-///     Publication, HookActivity              what queries read
+///     HookActivity, Publication              data for queries
+///     ActivePlan, FrameKeeper, BridgeLink    plan and frames of the loop; link to the outside
 ///     LoopBoundary                           changes at a cycle boundary
 ///     LoopControl                            start, stop and supervision of the loop
 ///     ComponentLoader, Transactions          changes of the graph
@@ -179,7 +178,7 @@ class Runner final : private RunnerView {
 
     void threadMain();
     void tick();
-    void tell(RunnerEvent event) noexcept;
+    void tell(const RunnerEvent& event) noexcept;
     /// Changes parameters at the request of the bridge.
     void changeByBridge(const std::string& component, const ParameterBatch& batch,
                         const std::function<void(const std::string&)>& done);

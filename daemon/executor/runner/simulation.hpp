@@ -5,7 +5,6 @@
 #include <atomic>
 #include <functional>
 #include <memory>
-#include <vector>
 
 #include "loop/loop.hpp"
 #include "loop/simulated_clock.hpp"

@@ -1,6 +1,6 @@
 /// @file
 /// Adjusts the spin time of a loop to its wake-up latency, for the setting spin = auto. Owned by
-/// the runner; graph thread.
+/// LoopControl; graph thread.
 #pragma once
 
 #include <cstdint>

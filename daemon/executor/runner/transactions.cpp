@@ -2,18 +2,17 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <rtcf/design_period.hpp>
 
 #include "common/refusal.hpp"
 #include "logging/log_errors.hpp"
-#include "ordering/wiring.hpp"
+#include "names/name_pattern.hpp"
 
 namespace rtcf::executor {
 
 namespace {
 
-// Lets a component compute the values that depend on its period for another one.
+// Computes a component's derived values for another period of the loop. Adds them to `values`.
 void stagePeriod(Instance& instance, std::int64_t loop_period_ns,
                  std::vector<StagedValue*>& values) {
     for (DerivedBase* derived : instance.component().derived()) {

@@ -18,8 +18,8 @@
 #include "graph/difference.hpp"
 #include "logging/log.hpp"
 #include "loop/loop.hpp"
-#include "names/name_pattern.hpp"
 #include "ordering/plan.hpp"
+#include "ordering/wiring.hpp"
 #include "runner/active_plan.hpp"
 #include "runner/bridge_link.hpp"
 #include "runner/change_outcome.hpp"
@@ -35,7 +35,7 @@ namespace rtcf::executor {
 
 class Transactions {
    public:
-    /// What a change of the graph consists of.
+    /// The parts of a change of the graph.
     struct Change {
         Graph graph;
         std::string loading;            // new component, for advice on loops
