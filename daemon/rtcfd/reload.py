@@ -65,9 +65,8 @@ class Reloads:
         self._copying = WorkerThreads("state folder")
         self._left: Handover | None = None  # from the previous rtcfd
         self._graphs = BootGraphs(given.graphs_dir, {}, self._settings_error)
-        self._late: list[
-            BootGraph
-        ] = []  # changed graphs of runners whose executors are adopted first
+        # Changed graphs of runners whose executors are adopted first.
+        self._late: list[BootGraph] = []
         self._graph_problems: list[str] = []
         self._refused = ""  # the error of the last reload; empty = it succeeded
         self._files = (Path(__file__), given.executor)

@@ -292,7 +292,7 @@ async def _ask_to_apply(
     kept: Mapping[str, tuned.Tuned],
     progress: Progress,
 ) -> control_pb2.ChangeResult:
-    """Make the executor apply a graph and settings, or none of both."""
+    """Make the executor apply a graph and settings, or neither."""
     before = runner.settings()
     changes = runner_settings.differences(before, request.settings)
     apply = wire.Apply(components=await loads(runner.shared.catalog, specs), dry_run=True)

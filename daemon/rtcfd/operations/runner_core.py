@@ -82,8 +82,8 @@ class Change:
     """A change of a runner, made by RunnerCore.make() in its turn."""
 
     name: str  # for messages: "the load of demo/Fine"
-    # What to ask the executor, or a function that returns it when the turn has come.  A function
-    # may also ask by itself, and return the result.
+    # The request to the executor, or a function that returns it in the turn of the change.  The
+    # function may also ask the executor itself, and return the result.
     request: wire.Request | Callable[[], Awaitable[wire.Request | control_pb2.ChangeResult]]
     event: Callable[[control_pb2.ChangeResult], str]  # returns the line for the event and the log
     # Notes the adopted change in the desired state, which is then saved; None: it does not change.

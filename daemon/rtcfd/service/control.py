@@ -39,7 +39,7 @@ from rtcfd.runners.runner_leases import RunnerLease
 from rtcfd.runners.runners import Runners
 from rtcfd.runners.status import statuses_of
 from rtcfd.service.log_streams import watch, watch_logs
-from rtcfd.service.methods import Work, unary, with_lease, with_progress
+from rtcfd.service.methods import Work, stream, unary, with_lease, with_progress
 from rtcfd.service.pages import page
 from rtcfd.service.ports import watch_ports
 from rtcfd.service.replay import Replay
@@ -137,20 +137,18 @@ class Control(control_pb2_grpc.ControlServicer):
         chosen, token = page(found, request, lambda each: str(each.name))
         return incidents_pb2.ListIncidentsResponse(incidents=chosen, next_page_token=token)
 
+    @stream
     async def ReadIncident(
-        self, request: incidents_pb2.ReadIncidentRequest, context: Any
+        self, request: incidents_pb2.ReadIncidentRequest
     ) -> AsyncIterator[incidents_pb2.ReadIncidentResponse]:
         """Stream the file of an incident, piece by piece."""
-        try:
-            kept = self.runners.incidents
-            found = await kept.get(request.name)
-            yield incidents_pb2.ReadIncidentResponse(incident=found)
-            at = 0
-            while piece := await kept.read(found, at):
-                at += len(piece)
-                yield incidents_pb2.ReadIncidentResponse(data=piece)
-        except Exception as error:
-            await abort(context, error, request)
+        kept = self.runners.incidents
+        found = await kept.get(request.name)
+        yield incidents_pb2.ReadIncidentResponse(incident=found)
+        at = 0
+        while piece := await kept.read(found, at):
+            at += len(piece)
+            yield incidents_pb2.ReadIncidentResponse(data=piece)
 
     @unary
     async def ListComponents(self, request: control_pb2.ListComponentsRequest) -> Any:
@@ -211,49 +209,38 @@ class Control(control_pb2_grpc.ControlServicer):
         statistics = await self._statistics(request.runner, request.buckets)
         return control_pb2.GetStatisticsResponse(statistics=statistics)
 
+    @stream
     async def WatchStatistics(
-        self, request: control_pb2.WatchStatisticsRequest, context: Any
+        self, request: control_pb2.WatchStatisticsRequest
     ) -> AsyncIterator[control_pb2.WatchStatisticsResponse]:
         """Stream the statistics of a runner at an interval."""
         interval_s = max(request.interval_ms or _WATCH_MS, _SHORTEST_WATCH_MS) / 1000
-        try:
-            while True:
-                statistics = await self._statistics(request.runner)
-                yield control_pb2.WatchStatisticsResponse(statistics=statistics)
-                await asyncio.sleep(interval_s)
-        except Exception as error:
-            await abort(context, error, request)
+        while True:
+            statistics = await self._statistics(request.runner)
+            yield control_pb2.WatchStatisticsResponse(statistics=statistics)
+            await asyncio.sleep(interval_s)
 
-    async def WatchEvents(
-        self, request: control_pb2.WatchEventsRequest, context: Any
+    @stream
+    def WatchEvents(
+        self, request: control_pb2.WatchEventsRequest
     ) -> AsyncIterator[control_pb2.WatchEventsResponse]:
         """Stream events."""
-        try:
-            require_some = partial(self.runners.require_some, request.runners)
-            async for response in watch(self._events, request, require_some):
-                yield response
-        except Exception as error:
-            await abort(context, error, request)
+        require_some = partial(self.runners.require_some, request.runners)
+        return watch(self._events, request, require_some)
 
-    async def WatchLogs(
-        self, request: control_pb2.WatchLogsRequest, context: Any
+    @stream
+    def WatchLogs(
+        self, request: control_pb2.WatchLogsRequest
     ) -> AsyncIterator[control_pb2.WatchLogsResponse]:
         """Stream log records."""
-        try:
-            async for response in watch_logs(self.runners.get(request.runner), request):
-                yield response
-        except Exception as error:
-            await abort(context, error, request)
+        return watch_logs(self.runners.get(request.runner), request)
 
-    async def WatchPorts(
-        self, request: ports_pb2.WatchPortsRequest, context: Any
+    @stream
+    def WatchPorts(
+        self, request: ports_pb2.WatchPortsRequest
     ) -> AsyncIterator[ports_pb2.WatchPortsResponse]:
         """Stream the values of ports, cycle by cycle."""
-        try:
-            async for response in watch_ports(self.runners.get(request.runner), request):
-                yield response
-        except Exception as error:
-            await abort(context, error, request)
+        return watch_ports(self.runners.get(request.runner), request)
 
     # -- changes ----------------------------------------------------------------
 

@@ -1,4 +1,4 @@
-"""Decorators of the service's methods: unary calls, calls with progress, calls that hold a lease.
+"""Decorators of the service's methods: unary calls, streams, calls with progress or a lease.
 
 Only this module notices that a caller has disconnected.
 """
@@ -29,6 +29,20 @@ def unary(method: Callable[..., Awaitable[Any]]) -> Any:
     async def wrapper(self: Any, request: Any, context: Any) -> Any:
         try:
             return await method(self, request)
+        except Exception as error:
+            await abort(context, error, request)
+
+    return wrapper
+
+
+def stream(method: Callable[..., AsyncIterator[Any]]) -> Any:
+    """Convert errors of a method that streams its responses into statuses."""
+
+    @functools.wraps(method)
+    async def wrapper(self: Any, request: Any, context: Any) -> AsyncIterator[Any]:
+        try:
+            async for response in method(self, request):
+                yield response
         except Exception as error:
             await abort(context, error, request)
 
