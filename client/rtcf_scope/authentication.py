@@ -23,9 +23,9 @@ from urllib.parse import urlsplit
 from aiohttp import web
 
 from rtcf_scope.connection import HEADERS, Connection
+from rtcf_scope.options import LOOPBACK
 from rtcf_scope.printable import printable
 
-LOOPBACK = ("127.0.0.1", "localhost", "::1")
 _MOST_SESSIONS = 256  # the least recently used ones are removed
 _SESSION_PROTOCOL = "session."  # subprotocol prefix; pages cannot set WebSocket headers
 _STRANGER_S = 5.0  # deadline of the first authenticated request

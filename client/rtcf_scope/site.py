@@ -24,7 +24,6 @@ from rtcf_scope.recordings import Recordings
 from rtcf_scope.status_feed import StatusFeed
 from rtcf_scope.tab import PROTOCOL, Tab
 
-RIGHTS = ("observe", "tune", "operate")
 MOST_TABS = 32
 _LONGEST = 500  # characters of an error message
 _PAGE = Path(__file__).with_name("page")

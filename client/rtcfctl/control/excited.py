@@ -8,15 +8,16 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import rtcf
-
-from rtcfctl.terminal.words import amount
+from rtcf.v1 import graph_pb2
 
 if TYPE_CHECKING:
     from rtcf.identification.experiment import Experiment, Recorded
 
+_LONGEST_S = 86400.0
+
 
 def add_options(to: argparse.ArgumentParser) -> None:
-    """Add the limits and the time of an excitation."""
+    """Add the limits of an excitation, and --step."""
     limits = to.add_argument_group("limits")
     limits.add_argument(
         "--lower", type=float, required=True, metavar="X", help="lowest value of the input"
@@ -37,12 +38,14 @@ def add_options(to: argparse.ArgumentParser) -> None:
 
 
 def checked(args: argparse.Namespace) -> None:
-    """Check the limits; raises ValueError."""
+    """Check the limits and the duration; raises ValueError."""
     for low, high in (("lower", "upper"), ("measured_lower", "measured_upper")):
         first, last = getattr(args, low), getattr(args, high)
         if first is not None and last is not None and not first < last:
             option = f"--{low.replace('_', '-')}"
             raise ValueError(f"{option} {first:g}: must be below {option[:-5]}upper {last:g}")
+    if not 0 < args.duration <= _LONGEST_S:
+        raise ValueError(f"--duration {args.duration:g}: more than 0, at most {_LONGEST_S:g} s")
 
 
 def limits(args: argparse.Namespace) -> dict[str, Any]:
@@ -68,10 +71,9 @@ def experiment(client: rtcf.Client, runner: str, what: str, measured: str) -> It
     found = Experiment.by_component(client, runner, what, measured)
     component = client.get_component(found.excitation, runner)
     before = [
-        rtcf.parse_parameter(f"{each.name}:=0") for each in component.parameters
-    ]  # of the right type below
-    for setting, each in zip(before, component.parameters, strict=True):
-        setting.value.CopyFrom(each.value)
+        graph_pb2.ParameterSetting(name=each.name, value=each.value)
+        for each in component.parameters
+    ]
     try:
         yield found
     finally:
@@ -86,6 +88,3 @@ def complete(recorded: Recorded, excitation: str) -> None:
     """Raise RtcfError if an excitation has ended early."""
     if recorded.why:
         raise rtcf.RtcfError(f"the excitation by {excitation} ended early: {recorded.why}")
-
-
-seconds = amount("s")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,7 @@ import rtcf
 
 from rtcfctl.control import excited
 from rtcfctl.terminal.output import Output
-from rtcfctl.terminal.words import counted, figure, whole
+from rtcfctl.terminal.words import amount, counted, figure, whole
 
 if TYPE_CHECKING:
     from rtcf.identification.experiment import Recorded
@@ -23,7 +24,6 @@ _DURATION_S = 10.0
 _BITS = 200.0  # of the default PRBS
 _TURNS = 2.0  # of the lowest default frequency
 _LINES = 30  # of a multisine
-_LONGEST_S = 86400.0
 _NEGLIGIBLE = 1e-9
 
 
@@ -53,7 +53,7 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
         help="height or peak value (default: half of --upper minus --lower)",
     )  # fmt: skip
     identify.add_argument(
-        "--duration", type=excited.seconds, default=_DURATION_S, metavar="S",
+        "--duration", type=amount("s"), default=_DURATION_S, metavar="S",
         help=f"duration of the excitation ({_DURATION_S:g} s)",
     )  # fmt: skip
     identify.add_argument(
@@ -73,7 +73,7 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
         "--method", choices=_METHODS, help="rule for the gains (simc; relay after a relay)"
     )
     identify.add_argument(
-        "--closed-loop-time", type=excited.seconds, metavar="S",
+        "--closed-loop-time", type=amount("s"), metavar="S",
         help="time constant of the closed loop, for simc and lambda",
     )  # fmt: skip
     identify.add_argument("--apply", metavar="NAME", help="set the gains of this PID controller")
@@ -84,7 +84,7 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
 
 
 def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
-    """Excite, fit, print, and apply if told."""
+    """Excite, fit, print, and apply with --apply."""
     _check(args)
     from rtcf.identification import require_scipy
 
@@ -116,8 +116,6 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
 
 def _check(args: argparse.Namespace) -> None:
     excited.checked(args)
-    if not 0 < args.duration <= _LONGEST_S:
-        raise ValueError(f"--duration {args.duration:g}: more than 0, at most {_LONGEST_S:g} s")
     if args.hysteresis < 0:
         raise ValueError(f"--hysteresis {args.hysteresis:g}: 0 or more")
     if args.method == "relay" and args.shape != "relay":
@@ -158,16 +156,16 @@ def _require_pid(client: rtcf.Client, args: argparse.Namespace) -> None:
 
 
 def settings(proposal: Proposal) -> list[str]:
-    """Return the parameters of a Pid as words."""
-    gains = proposal.gains
-    found = [f"kp:={gains.kp:.4g}", f"ki:={gains.ki:.4g}", f"kd:={gains.kd:.4g}"]
-    return [*found, f"filter_time:={gains.filter_time:.4g}"] if gains.kd else found
+    """Return the parameters of a Pid as words, with four digits."""
+    names = ("kp", "ki", "kd", "filter_time") if proposal.gains.kd else ("kp", "ki", "kd")
+    # Not as an integer, which is another type of parameter.
+    return [f"{name}:={float(f'{getattr(proposal.gains, name):.4g}')!r}" for name in names]
 
 
 def _apply(
     client: rtcf.Client, proposal: Proposal, args: argparse.Namespace, output: Output
 ) -> None:
-    words = [_real(each) for each in settings(proposal)]
+    words = settings(proposal)
     result = client.set_parameters(
         args.apply, [rtcf.parse_parameter(each) for each in words], args.runner, output.progress
     )
@@ -178,19 +176,13 @@ def _apply(
         )
 
 
-def _real(word: str) -> str:
-    """Return a parameter whose value is no integer."""
-    name, value = word.split(":=")
-    return f"{name}:={float(value)!r}"
-
-
 def describe(fit: Fit) -> str:
     """Return the numbers of a model."""
     from rtcf.identification.models import StateSpace
 
     model = fit.model
     if isinstance(model, StateSpace):
-        poles = sorted({(round(abs(p) / 6.283185307179586, 4), round(-p.real / abs(p), 4))
+        poles = sorted({(round(abs(p) / math.tau, 4), round(-p.real / abs(p), 4))
                         for p in model.poles})  # fmt: skip
         text = ", ".join(f"{figure4(f)} Hz (damping {figure4(d)})" for f, d in poles)
         return f"order {model.order}, poles at {text}"
@@ -199,7 +191,7 @@ def describe(fit: Fit) -> str:
         ", ".join(f"T{n if len(times) > 1 else ''} = {figure4(each)} s"
                   for n, each in enumerate(times, 1))
         if times
-        else f"{figure4(model.natural_frequency / 6.283185307179586)} Hz, "
+        else f"{figure4(model.natural_frequency / math.tau)} Hz, "
              f"damping {figure4(model.damping)}"
     )  # fmt: skip
     return f"K = {figure4(model.gain)}, {shape}, delay {figure4(model.delay)} s"
@@ -251,7 +243,7 @@ def _print(
     if not margins.stable:
         output.line("the loop would be unstable: set a longer --closed-loop-time", "bold red")
     if not args.apply:
-        output.line(f"rtcfctl set PID {' '.join(_real(each) for each in settings(proposal))}")
+        output.line(f"rtcfctl set PID {' '.join(settings(proposal))}")
 
 
 def _data(recorded: Recorded, found: Identified, proposal: Proposal) -> dict[str, Any]:

@@ -28,22 +28,25 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
         "files", nargs="*", metavar="FILE", type=Path, help="recordings that the page can open"
     )
     try:
-        from rtcf_scope import service
+        from rtcf_scope import options
     except ImportError:
         scope.set_defaults(run=_missing)
         return
-    service.add_options(scope, 0)
+    options.add_options(scope, 0)
     scope.add_argument("--no-browser", action="store_true", help="only print the address")
     scope.set_defaults(run=run)
 
 
 def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Serve until Ctrl-C."""
-    from rtcf_scope import service
-    from rtcf_scope.authentication import Authentication
-    from rtcf_scope.redirect import Redirect
+    try:
+        from rtcf_scope import options, service
+        from rtcf_scope.authentication import Authentication
+        from rtcf_scope.redirect import Redirect
+    except ImportError:
+        raise rtcf.RtcfError(_PACKAGE) from None
 
-    given = service.options(args, args.files)
+    given = options.options(args, args.files)
     with contextlib.ExitStack() as at_the_end:
 
         def ready(address: str, authentication: Authentication) -> None:

@@ -330,6 +330,23 @@ def test_a_call_imports_only_the_modules_of_its_verb(tmp_path: Path) -> None:
     assert not {"rtcfctl.machine.doctor", "rtcfctl.machine.check", "rtcfctl.completion"} & loaded
 
 
+@pytest.mark.parametrize("words", [["--help"], ["__complete", "st"]])
+def test_help_and_completion_import_no_large_library(words: list[str]) -> None:
+    script = (
+        "import contextlib, io, sys; from rtcfctl.main import main\n"
+        "with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):\n"
+        f"    main({words!r})\n"
+        "print(*sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], cwd=BUILD_TREE / "python", capture_output=True, text=True,
+        check=True,
+    )  # fmt: skip
+    loaded = set(done.stdout.split())
+    assert {"rtcfctl.control.tune", "rtcfctl.signals.scope"} <= loaded
+    assert not {"numpy", "scipy", "matplotlib", "aiohttp", "rich", "yaml"} & loaded
+
+
 @pytest.mark.parametrize(
     "line", ["status", "-r stats load a b", "--socket x -v -o json stop", "--output=yaml info a"]
 )
