@@ -21,7 +21,7 @@ from rtcf_shared.naming import listing
 from rtcf_shared.ports import PortBatch
 from rtcf_shared.value_text import parse
 
-from rtcf.client import Client
+from rtcf.client import DEFAULT_RUNNER, Client
 from rtcf.errors import DaemonUnreachableError
 from rtcf.streams.ports import PortStream
 from rtcf.v1 import graph_pb2, runner_pb2
@@ -65,7 +65,7 @@ class Recorded:
 
     @property
     def why(self) -> str:
-        """Why the excitation ended early; empty if it is complete."""
+        """The reason of an early end; empty if the excitation is complete."""
         return _WHY.get(self.outcome, "")
 
 
@@ -136,7 +136,7 @@ class Experiment:
         try:
             yield cls(client, runner, f"/{name}", _full(measured))
         except DaemonUnreachableError:
-            raise  # it ends with its lease, and stays
+            raise  # the Excitation stays, and ends with its lease
         except BaseException:
             with contextlib.suppress(RtcfError):
                 client.unload([f"/{name}"], runner)
@@ -166,7 +166,7 @@ class Experiment:
 
         Raises RtcfError if the loop does not run, or if too many cycles are dropped.
         """
-        (status,) = self._client.get_status(self._runner or "rt_runner").runners
+        (status,) = self._client.get_status(self._runner or DEFAULT_RUNNER).runners
         runs = status.state == runner_pb2.RUNNER_STATE_RUNNING
         name = status.runner
         if stepped and runs:

@@ -75,8 +75,7 @@ def fit_state_space(
     offset = float(y[0])
     rows = max(2 * _MOST_STATES, min(_HISTORY, len(u) // 10))
     markov = _markov_parameters(u, y - offset, rows, 2 * rows)
-    size = rows
-    index = np.arange(size)
+    index = np.arange(rows)
     hankel = markov[index[:, None] + index[None, :]]
     shifted = markov[index[:, None] + index[None, :] + 1]
     left, values, right = np.linalg.svd(hankel)
@@ -91,7 +90,7 @@ def fit_state_space(
         if np.max(np.abs(np.linalg.eigvals(a))) > 1.0 + 1e-3:
             continue  # unstable: the output would be infinite
         model = StateSpace(a, b, c, period)
-        fits.append(_judged(model, u, y, model.simulate(u)))
+        fits.append(_judged(model, y, model.simulate(u)))
     if not fits:
         raise RtcfError("no stable state space describes the values: excite for longer")
     errors = [float(np.linalg.norm(each.residuals)) for each in fits]
@@ -116,9 +115,8 @@ def _checked(inputs: npt.ArrayLike, outputs: npt.ArrayLike) -> tuple[Array, Arra
     return u - u[0], y
 
 
-def _judged(model: Model, u: Array, y: Array, simulated: Array) -> Fit:
+def _judged(model: Model, y: Array, simulated: Array) -> Fit:
     """Return a fit with the best offset."""
-    del u
     offset = float(np.mean(y - simulated))
     residuals = y - simulated - offset
     spread = float(np.linalg.norm(y - y.mean()))
@@ -170,7 +168,7 @@ def _fit(
             best = found
     gain = linear(best.x)[0]
     model = Transfer(gain, denominator(best.x), float(best.x[-1]) * period)
-    return _judged(model, u, y, model.simulate(u, period))
+    return _judged(model, y, model.simulate(u, period))
 
 
 def _markov_parameters(u: Array, y: Array, history: int, count: int) -> Array:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import rtcf
 from rtcf.identification.models import StateSpace
 from rtcf.identification.result import estimated_response, fitted_response
-from rtcf_shared import whole_files
 
+from rtcfctl.terminal import image_file
 from rtcfctl.terminal.pictures import drawn
 
 if TYPE_CHECKING:
@@ -27,8 +25,7 @@ _STEP_BY_TIME = 6.0  # length of a step response by the longest time constant
 
 def require_format(file: Path) -> None:
     """Raise ValueError for an unknown suffix."""
-    if file.suffix not in _FORMATS:
-        raise ValueError(f"{file}: use one of {', '.join(_FORMATS)}")
+    image_file.require_format(file, _FORMATS)
 
 
 def lines(recorded: Recorded, found: Identified) -> list[str]:
@@ -71,13 +68,7 @@ def step_of(fit: Fit, recorded: Recorded) -> tuple[Any, Any]:
 
 def draw(recorded: Recorded, found: Identified, file: Path) -> None:
     """Write the plots of all models to an image file.  Raises RtcfError."""
-    try:
-        import matplotlib
-
-        matplotlib.use("Agg")
-        from matplotlib import pyplot
-    except ImportError:
-        raise rtcf.RtcfError("Matplotlib not found: sudo apt install python3-matplotlib") from None
+    pyplot = image_file.pyplot_module()
     figure, axes = pyplot.subplots(4, 1, figsize=(8, 11), layout="constrained")
     f, estimate = estimated_response(recorded)
     grid = np.geomspace(f[0], f[-1], 500)
@@ -101,15 +92,7 @@ def draw(recorded: Recorded, found: Identified, file: Path) -> None:
         axis.set_xlabel(below)
         axis.grid(True)
     axes[0].legend()
-    picture = io.BytesIO()
-    # Text in an SVG file remains text, which can be searched.
-    with matplotlib.rc_context({"svg.fonttype": "none"}):
-        figure.savefig(picture, dpi=150, format=file.suffix.removeprefix("."))
-    pyplot.close(figure)
-    try:
-        whole_files.write_named(file, picture.getvalue())
-    except OSError as error:
-        raise rtcf.RtcfError(f"{file}: {error.strerror or error}") from None
+    image_file.write(figure, file)
 
 
 def _at(grid: Any, f: Any, estimate: Any) -> Any:

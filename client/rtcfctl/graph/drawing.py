@@ -18,9 +18,10 @@ from rtcf_shared import whole_files
 
 from rtcfctl.graph.folding import Cell, Link, Point, Sizes, place, route, shape
 from rtcfctl.graph.loop_graph import Line, LoopGraph, topic, type_of
+from rtcfctl.terminal import image_file
 from rtcfctl.terminal.output import Output
 
-_FORMATS = ("svg", "png", "dot")
+_FORMATS = (".svg", ".png", ".dot")
 _MOST_WORDS = 60  # components; larger graphs are drawn without types and connection names
 # Largest graph that Graphviz lays out: components in series and in parallel.
 _MOST_LAYERS, _MOST_BESIDE = 12, 30
@@ -56,9 +57,8 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
 
 def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Print the graph, or write a drawing of it."""
-    kind = args.file.suffix.removeprefix(".") if args.file is not None else ""
-    if args.file is not None and kind not in _FORMATS:
-        raise ValueError(f"{args.file}: use one of {', '.join(f'.{each}' for each in _FORMATS)}")
+    if args.file is not None:
+        image_file.require_format(args.file, _FORMATS)
     graph = LoopGraph(client, args.runner or "rt_runner")
     if args.file is None:
         if output.for_people:
@@ -66,7 +66,7 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         else:
             output.data({"components": graph.components, "connections": graph.connections})
         return
-    drawing = dot(graph)
+    drawing, kind = dot(graph), args.file.suffix.removeprefix(".")
     content = drawing.encode() if kind == "dot" else _drawn(drawing, kind)
     try:
         whole_files.write_named(str(args.file), content)

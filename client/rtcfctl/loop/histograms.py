@@ -3,7 +3,6 @@
 All axes are logarithmic, so that one slow cycle in a million is visible beside the others.
 """
 
-import io
 import itertools
 import math
 from collections.abc import Iterator, Sequence
@@ -13,8 +12,8 @@ from typing import Any
 
 import rtcf
 from rtcf.v1 import runner_pb2
-from rtcf_shared import whole_files
 
+from rtcfctl.terminal import image_file
 from rtcfctl.terminal.pictures import bar
 
 _FORMATS = (".svg", ".png", ".pdf")
@@ -72,16 +71,9 @@ def lines(found: runner_pb2.RunnerStatistics, width: int) -> Iterator[str]:
 
 def draw(found: runner_pb2.RunnerStatistics, file: Path) -> None:
     """Write an image file.  Raises ValueError for an unknown suffix, and RtcfError."""
-    if file.suffix not in _FORMATS:
-        raise ValueError(f"{file}: use one of {', '.join(_FORMATS)}")
+    image_file.require_format(file, _FORMATS)
     require_cycles(found)
-    try:
-        import matplotlib
-
-        matplotlib.use("Agg")
-        from matplotlib import pyplot
-    except ImportError:
-        raise rtcf.RtcfError("Matplotlib not found: sudo apt install python3-matplotlib") from None
+    pyplot = image_file.pyplot_module()
     figure, axes = pyplot.subplots(1, 2, figsize=(11, 4.5), layout="constrained")
     figure.suptitle(f"{found.runner}, {_grouped(found.iterations)} cycles")
     for axis, letter, (title, buckets, figures) in zip(axes, "ab", _panels(found), strict=True):
@@ -89,15 +81,7 @@ def draw(found: runner_pb2.RunnerStatistics, file: Path) -> None:
         axis.set_ylabel("cycles")
         if buckets:
             _draw(axis, title, bins(buckets, _MOST_BINS, _MOST_BINS), figures)
-    picture = io.BytesIO()
-    # Text in an SVG file remains text, which can be searched.
-    with matplotlib.rc_context({"svg.fonttype": "none"}):
-        figure.savefig(picture, dpi=150, format=file.suffix.removeprefix("."))
-    pyplot.close(figure)
-    try:
-        whole_files.write_named(file, picture.getvalue())
-    except OSError as error:
-        raise rtcf.RtcfError(f"{file}: {error.strerror or error}") from None
+    image_file.write(figure, file)
 
 
 _Panel = tuple[str, Sequence[runner_pb2.Bucket], runner_pb2.Distribution]
