@@ -1,6 +1,6 @@
-"""What the one thread of a node waits for: signals, and the messages of a lease.
+"""The events of a node: signals, and the messages of its leases.
 
-The main thread owns it; each lease has a thread of its own that reads it.
+The main thread owns the queue and handles its events. A thread for each lease adds the messages.
 """
 
 import signal
@@ -33,7 +33,7 @@ class MasterBack:
 
 
 class Inbox:
-    """A queue that signals may fill too."""
+    """A queue of events; signal handlers add to it, too."""
 
     def __init__(self) -> None:
         self._queue: SimpleQueue[Any] = SimpleQueue()
@@ -42,18 +42,18 @@ class Inbox:
             signal.signal(number, self._signalled)
 
     def read(self, lease: rtcf.Lease) -> None:
-        """Let the messages of a lease come in here."""
+        """Add the messages of a lease, in a thread of their own."""
         threading.Thread(target=self._read, args=(lease,), daemon=True).start()
 
     def get(self, timeout_s: float | None = None) -> Any:
-        """Return what comes next; None when the time is up."""
+        """Return the next event; None after the timeout."""
         try:
             return self._queue.get(timeout=timeout_s)
         except Empty:
             return None
 
     def pause(self, seconds: float) -> bool:
-        """Wait, but not longer than until the process is asked to end; tell whether it was."""
+        """Wait, at most until a request to end; return whether there is one."""
         aside = []
         deadline = time.monotonic() + seconds
         while not self.asked and (left := deadline - time.monotonic()) > 0:
@@ -65,12 +65,12 @@ class Inbox:
         return self.asked
 
     def ask(self, why: str) -> None:
-        """Let the process end, as a signal does.  Any thread."""
+        """Request the end of the process, as a signal does.  Any thread."""
         self.asked = True
         self._queue.put(Asked(why))
 
     def master_back(self) -> None:
-        """Tell that the node is registered again.  Any thread."""
+        """Report that the node is registered again.  Any thread."""
         self._queue.put(MasterBack())
 
     def _signalled(self, _: int, __: Any) -> None:
