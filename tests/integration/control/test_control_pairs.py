@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 from daemon_process import BUILD_TREE
+from pages import TREE
 from rtcf.testing import Bench
 
-SOURCES = Path(__file__).parents[3] / "components" / "rtcf_control" / "python"
+SOURCES = TREE / "components" / "rtcf_control" / "python"
 ROUNDING = 1e-12  # relative, of values of size 1
 STEPS = 2000
 # Steps, noise, and values that are not finite.

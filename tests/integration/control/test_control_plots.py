@@ -15,10 +15,11 @@ import numpy as np
 import pytest
 from daemon_process import BUILD_TREE, Daemon
 from documentation_commands import typed
+from pages import TREE
 from rtcf.testing import Bench
 from rtcfctl.terminal import pictures
 
-PAGES = Path(__file__).parents[3] / "docs" / "control"
+PAGES = TREE / "docs" / "control"
 PATH = [BUILD_TREE / "lib" / "rtcf"]
 WIDTH = 72
 DT = 0.001  # s

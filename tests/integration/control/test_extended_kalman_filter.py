@@ -7,18 +7,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import rtcf
 from block_bench import PATH
+from pages import TREE
 from rtcf.testing import Bench
 from rtcf.v1 import runner_pb2
 from rtcf_shared.value_text import parse
 
-TREE = Path(__file__).parents[3]
 DT = 0.001
 GRAVITY = 9.81
 ROUNDING = 1e-9

@@ -2,17 +2,15 @@
 
 import subprocess
 import sys
-from pathlib import Path
 
 import grpc
 import pytest
 import rtcf
 from daemon_process import Daemon
 from fig_1 import mimo
+from pages import TREE
 from rtcf import refusals
 from rtcf.v1 import control_pb2, control_pb2_grpc, errors_pb2
-
-TREE = Path(__file__).resolve().parents[3]
 
 
 def test_an_error_has_a_reason_and_suggests_a_name(client: rtcf.Client) -> None:

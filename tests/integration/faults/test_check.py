@@ -22,7 +22,7 @@ PARAMETERS = {
     "rtcf_control/GravityCompensation": [f"urdf:={PENDULUM}"],
     "rtcf_mujoco/Simulation": [f"model:={TREE / 'tests' / 'mujoco' / 'models' / 'arm.xml'}"],
 }
-OURS = {folder.name for folder in (Path(__file__).parents[3] / "components").iterdir()}
+OURS = {folder.name for folder in (TREE / "components").iterdir()}
 
 
 def check(*arguments: str) -> subprocess.CompletedProcess[str]:

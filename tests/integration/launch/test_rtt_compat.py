@@ -9,10 +9,11 @@ import pytest
 import rosgraph
 import rtcf
 from daemon_process import BUILD_TREE, Daemon, clean_environment, wait_for, with_ros
+from pages import TREE
 from ros_processes import Master
 from values import iteration
 
-LISTING = Path(__file__).parents[2] / "components" / "compat" / "listing.cpp"
+LISTING = TREE / "tests" / "components" / "compat" / "listing.cpp"
 TUNED = Path(__file__).with_name("tuned")
 BUILD_S = 600.0
 

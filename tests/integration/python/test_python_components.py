@@ -10,12 +10,13 @@ import pytest
 import rtcf
 from daemon_process import BUILD_TREE, Daemon, clean_environment, wait_for
 from geometry_msgs.msg import TwistStamped
+from pages import TREE
 from rtcf.v1 import graph_pb2, runner_pb2
 from rtcf_compile.source.modules import components, load
 from sensor_msgs.msg import JointState
 from values import state
 
-SOURCE = Path(__file__).parents[2] / "components" / "python" / "controllers.py"
+SOURCE = TREE / "tests" / "components" / "python" / "controllers.py"
 MESSAGES = SOURCE.with_name("messages.py")
 RTCF_DIR = BUILD_TREE / "cmake" / "rtcf"
 PROJECT = """\

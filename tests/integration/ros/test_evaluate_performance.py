@@ -9,10 +9,11 @@ from typing import Any
 import genpy
 import pytest
 import rosbag
+from pages import TREE
 from rtcf_msgs.msg import Cycle, IterationInfo
 from std_msgs.msg import Float64, Header
 
-PROGRAM = Path(__file__).parents[3] / "client" / "ros" / "evaluate_performance_rosbag.py"
+PROGRAM = TREE / "client" / "ros" / "evaluate_performance_rosbag.py"
 PERIOD_NS = 500_000
 TOPIC = "/rt_runner/cycles"
 

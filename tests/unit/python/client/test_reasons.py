@@ -2,7 +2,6 @@
 as google.rpc.Status."""
 
 import re
-from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
@@ -11,6 +10,7 @@ import pytest
 from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from hypothesis import given, seed, settings
 from hypothesis import strategies as st
+from pages import TREE
 from rtcf import errors, failures
 from rtcf.refusals import BY_REASON
 from rtcf.v1 import errors_pb2
@@ -18,7 +18,6 @@ from rtcfd.common import errors as daemon_errors
 from rtcfd.common import status_codes
 from rtcfd.common.errors import RequestError
 
-TREE = Path(__file__).resolve().parents[4]
 REASONS = [each.name for each in errors_pb2.Reason.DESCRIPTOR.values if each.number]
 ON_STANDARD_ERROR = {"REASON_DAEMON_FAILED"}
 

@@ -2,15 +2,13 @@
 and interpreted.
 """
 
-from pathlib import Path
-
 import numpy as np
 import pytest
+from pages import TREE
 from rtcf_compile.main import main
 from rtcf_compile.rewriting import numpy_functions
 
-ROOT = Path(__file__).parents[4]
-FOLDER = ROOT / "components" / "rtcf_examples" / "python"
+FOLDER = TREE / "components" / "rtcf_examples" / "python"
 EXAMPLES = sorted(each.stem for each in FOLDER.glob("*.py"))
 
 
@@ -26,7 +24,7 @@ def test_an_example_gives_the_same_results_over_20000_cycles(name: str) -> None:
 
 
 def test_functions_of_numpy_are_in_the_documentation() -> None:
-    page = (ROOT / "docs" / "python-components.md").read_text()
+    page = (TREE / "docs" / "python-components.md").read_text()
     libm = set(numpy_functions.LIBM) - {"exp", "log", "hypot"}
     aliases = {"ascontiguousarray", "amax", "amin", "around", "vdot", "matmul"}
     aliases |= {"round_", "trapezoid"}

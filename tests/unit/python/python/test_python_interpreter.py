@@ -11,12 +11,12 @@ import genpy
 import pytest
 import rtcf
 from geometry_msgs.msg import TwistStamped
+from pages import TREE
 from rtcf.component import Fault
 from rtcf_compile.source.modules import components, load
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64MultiArray
 
-TREE = Path(__file__).parents[4]
 CONTROLLERS = load(TREE / "tests" / "components" / "python" / "controllers.py")
 CLASSES = {each.__name__: each for each in components(CONTROLLERS)}
 

@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pages import TREE
 from rtcf_compile import main
 from rtcf_compile.comparison import inside, verify, watched
 from rtcf_compile.machine_code import lowering
 from rtcf_compile.rewriting.functions import HELPERS
 from rtcf_compile.source import modules as source
 
-FOLDER = Path(__file__).parents[3] / "components" / "python"
+FOLDER = TREE / "tests" / "components" / "python"
 NAMES = ("controllers", "filters", "messages", "written")
 FILES = [source.load(FOLDER / f"{name}.py") for name in NAMES]
 # One branch of Failing fills the arena, which the interpreter does not have.

@@ -1,12 +1,11 @@
 """Messages and services of RTCF 2021, whose MD5 sums its bags, scripts and peers rely on."""
 
-from pathlib import Path
-
 import pytest
 from genmsg.gentools import compute_md5
 from genmsg.msg_loader import MsgContext, load_depends, load_msg_from_file, load_srv_from_file
+from pages import TREE
 
-FOLDER = Path(__file__).parents[4] / "proto" / "rtcf_msgs"
+FOLDER = TREE / "proto" / "rtcf_msgs"
 SEARCH = {"rtcf_msgs": [str(FOLDER / "msg")], "std_msgs": ["/usr/share/std_msgs/msg"]}
 
 MESSAGES = {

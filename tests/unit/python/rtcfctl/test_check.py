@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from daemon_under_test import BUILD_TREE
-from pages import SUPPORT
+from pages import SUPPORT, TREE
 from rtcf import checking
 from rtcf.errors import RtcfError
 from rtcf.sanitizer import Frame, violations
@@ -125,7 +125,7 @@ def test_a_missing_executor_in_a_build_tree_names_the_build_command(tmp_path: Pa
         checking.check(
             checking.executor_of(tmp_path / "build"), "pkg", "T", 1, build_tree=tmp_path / "build"
         )
-    goals = (Path(__file__).parents[4] / "Makefile").read_text()
+    goals = (TREE / "Makefile").read_text()
     assert "\nchecker: " in goals
 
 

@@ -6,10 +6,11 @@ from pathlib import Path
 import pytest
 import rtcf
 from daemon_under_test import BUILD_TREE, DaemonUnderTest
+from pages import TREE
 from rtcfctl import completion
 from rtcfctl.main import parser
 
-SCRIPT = Path(__file__).parents[4] / "client" / "completion" / "rtcfctl"
+SCRIPT = TREE / "client" / "completion" / "rtcfctl"
 
 
 @pytest.fixture

@@ -4,13 +4,12 @@ import keyword
 import re
 import subprocess
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from google.protobuf.descriptor import Descriptor, EnumDescriptor, FieldDescriptor, FileDescriptor
+from pages import TREE
 from rtcf.v1 import control_pb2, errors_pb2, graph_pb2, runner_pb2
 
-TREE = Path(__file__).resolve().parents[4]
 FILES: list[FileDescriptor] = [
     each.DESCRIPTOR for each in (control_pb2, errors_pb2, graph_pb2, runner_pb2)
 ]

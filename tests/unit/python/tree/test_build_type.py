@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 from daemon_under_test import BUILD_TREE
+from pages import TREE
 
-PACKAGE = Path(__file__).parents[4] / "debian" / "tests" / "offset"
+PACKAGE = TREE / "debian" / "tests" / "offset"
 
 
 def _configure(folder: Path, *options: str) -> tuple[str, str]:

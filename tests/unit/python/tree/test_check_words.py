@@ -4,8 +4,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-
-TREE = Path(__file__).resolve().parents[4]
+from pages import TREE
 
 
 def check(*files: Path) -> subprocess.CompletedProcess[str]:

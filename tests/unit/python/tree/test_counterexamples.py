@@ -6,8 +6,8 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from pages import TREE
 
-TREE = Path(__file__).resolve().parents[4]
 # The first run fails, each later one passes; a file tells the process which run it is.
 HEAD = """
 import atexit

@@ -1,11 +1,10 @@
 """docs/troubleshooting.md explains existing messages."""
 
 import re
-from pathlib import Path
 
 import pytest
+from pages import TREE
 
-TREE = Path(__file__).parents[4]
 MESSAGES = re.findall(
     r"^\| `([^`]+)` \|", (TREE / "docs" / "troubleshooting.md").read_text(), re.MULTILINE
 )

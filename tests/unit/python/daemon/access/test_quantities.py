@@ -1,9 +1,9 @@
 """Numeric settings: units on the command line, and one table for all their descriptions."""
 
 import re
-from pathlib import Path
 
 import pytest
+from pages import TREE
 from rtcf.v1 import runner_pb2
 from rtcf_shared import quantities
 from rtcf_shared.quantities import ROS, RUNNER, Quantity
@@ -12,7 +12,6 @@ from rtcfctl.main import parser
 from rtcfd.common import runner_settings
 from rtcfd.common.errors import InvalidArgument
 
-TREE = Path(__file__).parents[5]
 EVERY = [
     *((f"{name}", message, quantity) for message, known in (("RunnerSettings", RUNNER),
       ("RosSettings", ROS)) for name, quantity in known.items()),

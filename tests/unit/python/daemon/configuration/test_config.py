@@ -8,6 +8,7 @@ from typing import Any
 
 import odd_files
 import pytest
+from pages import TREE
 from rtcf.v1 import runner_pb2
 from rtcfd.access.rights import Access
 from rtcfd.common import runner_settings
@@ -277,7 +278,7 @@ def test_the_service_uses_systemds_folder(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_every_line_of_the_shipped_file_is_a_setting_that_is_accepted(tmp_path: Path) -> None:
-    shipped = Path(__file__).parents[5] / "systemd" / "rtcfd.toml"
+    shipped = TREE / "systemd" / "rtcfd.toml"
     lines = [line[1:] if re.match(r"#([a-z_]+ = |\[[a-z.]+\]$)", line) else line
              for line in shipped.read_text().splitlines()]  # fmt: skip
     file = written(tmp_path, "\n".join(lines))
@@ -292,7 +293,7 @@ def test_every_line_of_the_shipped_file_is_a_setting_that_is_accepted(tmp_path: 
 
 
 def test_a_block_can_be_appended_to_the_settings_as_shipped(tmp_path: Path) -> None:
-    shipped = (Path(__file__).parents[5] / "systemd" / "rtcfd.toml").read_text()
+    shipped = (TREE / "systemd" / "rtcfd.toml").read_text()
     file = tmp_path / "rtcfd.toml"
     file.write_text(f"{shipped}\n[access]\ndefault = 'observe'\n[runner]\nfrequency_hz = 20.0\n")
     found = settings_file.read(file)
