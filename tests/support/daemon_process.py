@@ -165,8 +165,8 @@ class Daemon:
 
 
 def is_gone(pid: int) -> bool:
-    """Return whether a process has ended."""
+    """Return whether a process has ended; a zombie has."""
     try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] in "ZX"
     except OSError:
         return True

@@ -5,37 +5,12 @@ import os
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import rtcf
-
-BUILD_TREE = Path(str(rtcf.__file__)).parents[2]
-DEADLINE_S = 60.0
-# Prefix of a command that must react to Ctrl-C: under nohup or in the background it inherits an
-# ignored SIGINT.
-MINDS_CTRL_C = ("env", "--default-signal=INT")
-_POLL_S = 0.01
-
-
-def wait_for(condition: Callable[[], Any], what: str) -> Any:
-    """Return the condition's result once it is true; fail after the deadline."""
-    deadline = time.monotonic() + DEADLINE_S
-    while not (result := condition()):
-        assert time.monotonic() < deadline, f"waited {DEADLINE_S:g} s for {what}"
-        time.sleep(_POLL_S)
-    return result
-
-
-def is_alive(pid: int) -> bool:
-    """Return whether a process runs; a zombie does not."""
-    try:
-        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
-    except (FileNotFoundError, ProcessLookupError):
-        return False
-    return state not in "ZX"
+from daemon_process import BUILD_TREE, DEADLINE_S, MINDS_CTRL_C, wait_for
 
 
 class DaemonUnderTest:

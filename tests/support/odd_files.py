@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from types import FrameType
 
-from daemon_under_test import DEADLINE_S
+from daemon_process import DEADLINE_S
 
 
 def pipe(place: Path) -> None:

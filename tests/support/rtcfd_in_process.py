@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import grpc
-from daemon_under_test import DEADLINE_S
+from daemon_process import DEADLINE_S
 from peer_executor import Peer
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2

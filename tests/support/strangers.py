@@ -8,7 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from daemon_under_test import BUILD_TREE, DaemonUnderTest
+from daemon_process import BUILD_TREE
+from daemon_under_test import DaemonUnderTest
 
 STRANGER = 54321  # an unused uid
 root_only = pytest.mark.skipif(os.geteuid() != 0, reason="requires root to act as another user")

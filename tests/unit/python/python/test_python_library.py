@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from daemon_under_test import BUILD_TREE
+from daemon_process import BUILD_TREE
 from rtcf_compile.library import log_text, messages
 from rtcf_compile.rewriting.logs import LogCall
 from rtcf_compile.source.mistake import Mistake

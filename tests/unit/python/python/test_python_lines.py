@@ -10,7 +10,7 @@ from unittest import mock
 
 import pytest
 from crash_traces import find, trace_of
-from daemon_under_test import BUILD_TREE
+from daemon_process import BUILD_TREE
 from rtcf_compile.machine_code import lowering, source_lines
 from rtcf_compile.source import modules
 

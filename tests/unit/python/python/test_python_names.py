@@ -5,7 +5,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from daemon_under_test import BUILD_TREE
+from daemon_process import BUILD_TREE
 from rtcf.component import DeclarationError
 from rtcf_compile.comparison import verify
 from rtcf_compile.machine_code import lowering

@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from daemon_under_test import BUILD_TREE
+from daemon_process import BUILD_TREE
 from pages import SUPPORT, TREE
 from rtcf import checking
 from rtcf.errors import RtcfError

@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 import rtcf
-from daemon_under_test import BUILD_TREE, DaemonUnderTest
+from daemon_process import BUILD_TREE
+from daemon_under_test import DaemonUnderTest
 from pages import TREE
 from rtcfctl import completion
 from rtcfctl.main import parser

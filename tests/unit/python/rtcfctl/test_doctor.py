@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 import rtcf
-from daemon_under_test import DaemonUnderTest, wait_for
+from daemon_process import wait_for
+from daemon_under_test import DaemonUnderTest
 from rtcf.diagnosis import Finding, Grade, Host, Loop, cpu_of_next_loop, cpus, diagnose
 from rtcf.v1 import runner_pb2
 from rtcfctl.machine import doctor

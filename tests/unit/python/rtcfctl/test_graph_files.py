@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 import rtcf
 import yaml
-from daemon_under_test import BUILD_TREE, DaemonUnderTest
+from daemon_process import BUILD_TREE
+from daemon_under_test import DaemonUnderTest
 from hypothesis import example, given, seed, settings
 from hypothesis import strategies as st
 from rtcf.v1 import graph_pb2, runner_pb2

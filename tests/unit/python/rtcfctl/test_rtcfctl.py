@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 import rtcf
 import yaml
-from daemon_under_test import BUILD_TREE, MINDS_CTRL_C, DaemonUnderTest, wait_for
+from daemon_process import BUILD_TREE, MINDS_CTRL_C, wait_for
+from daemon_under_test import DaemonUnderTest
 from rtcf.v1 import graph_pb2, runner_pb2
 from rtcfctl.loop.runner import settings_of
 from rtcfctl.main import parser, verb_of

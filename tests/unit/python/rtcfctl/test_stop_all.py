@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 import rtcf
-from daemon_under_test import DEADLINE_S, DaemonUnderTest
+from daemon_process import DEADLINE_S
+from daemon_under_test import DaemonUnderTest
 from rtcf import direct_stop
 from rtcf.direct_stop import Stopped
 from rtcf.v1 import runner_pb2

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 import rtcf
-from daemon_under_test import BUILD_TREE, DEADLINE_S, DaemonUnderTest
+from daemon_process import BUILD_TREE, DEADLINE_S
+from daemon_under_test import DaemonUnderTest
 
 COLUMNS = 80
 # Each of a letter that occurs nowhere else.

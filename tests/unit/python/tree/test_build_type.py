@@ -5,7 +5,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from daemon_under_test import BUILD_TREE
+from daemon_process import BUILD_TREE
 from pages import TREE
 
 PACKAGE = TREE / "debian" / "tests" / "offset"

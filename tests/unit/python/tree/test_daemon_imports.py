@@ -4,7 +4,7 @@ import subprocess
 import sys
 
 import pytest
-from daemon_under_test import BUILD_TREE
+from daemon_process import BUILD_TREE
 
 _LIST = "import sys, {0}; print(*(name for name in sys.modules if name.startswith('{1}.')))"
 

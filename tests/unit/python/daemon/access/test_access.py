@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 import rtcf
-from daemon_under_test import wait_for
+from daemon_process import wait_for
 from rtcf.v1 import control_pb2, runner_pb2
 from rtcf_shared.enums import choices
 from rtcfd.access import calls, rights

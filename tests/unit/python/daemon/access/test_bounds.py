@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 import rtcf
-from daemon_under_test import DaemonUnderTest, wait_for
+from daemon_process import wait_for
+from daemon_under_test import DaemonUnderTest
 from rtcf.v1 import control_pb2
 from rtcf_shared.naming import suggestion
 from rtcfd.access import calls, peer

@@ -9,7 +9,8 @@ from pathlib import Path
 import grpc
 import pytest
 import rtcf
-from daemon_under_test import BUILD_TREE, DEADLINE_S, DaemonUnderTest, wait_for
+from daemon_process import BUILD_TREE, DEADLINE_S, wait_for
+from daemon_under_test import DaemonUnderTest
 from rtcf.v1 import control_pb2
 
 TIMES = [300, pytest.param(10_000, marks=pytest.mark.long)]

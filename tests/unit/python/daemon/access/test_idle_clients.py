@@ -7,7 +7,7 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 import pytest
-from daemon_under_test import DEADLINE_S
+from daemon_process import DEADLINE_S
 from rtcfd.access import clients
 from rtcfd.access.calls import Level
 from rtcfd.access.clients import Clients, GrpcSockets

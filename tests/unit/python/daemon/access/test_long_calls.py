@@ -7,7 +7,8 @@ from queue import SimpleQueue
 import grpc
 import pytest
 import rtcf
-from daemon_under_test import DEADLINE_S, DaemonUnderTest, wait_for
+from daemon_process import DEADLINE_S, wait_for
+from daemon_under_test import DaemonUnderTest
 from rtcf.v1 import control_pb2
 from rtcfctl.graph import component
 from rtcfctl.main import parser

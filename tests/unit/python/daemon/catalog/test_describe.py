@@ -9,7 +9,8 @@ from pathlib import Path
 import odd_files
 import pytest
 import rtcf
-from daemon_under_test import DaemonUnderTest, wait_for
+from daemon_process import wait_for
+from daemon_under_test import DaemonUnderTest
 from rtcfd.catalog import describe
 from rtcfd.catalog.describe import Describer
 

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 import rtcf
-from daemon_under_test import DaemonUnderTest, wait_for
+from daemon_process import wait_for
+from daemon_under_test import DaemonUnderTest
 
 
 @pytest.fixture

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 import rtcf
-from daemon_under_test import DEADLINE_S, DaemonUnderTest, wait_for
+from daemon_process import DEADLINE_S, wait_for
+from daemon_under_test import DaemonUnderTest
 from rtcf.v1 import control_pb2
 from rtcfd.operations import loaded_code
 from rtcfd_in_process import Rtcfd, spec

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from daemon_under_test import DEADLINE_S, wait_for
+from daemon_process import DEADLINE_S, wait_for
 from rtcfd.journal import JournalHandler, LogThread
 
 # A process that logs more than the journal's socket holds.

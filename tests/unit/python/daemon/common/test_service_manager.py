@@ -7,7 +7,8 @@ import threading
 from pathlib import Path
 
 import pytest
-from daemon_under_test import DaemonUnderTest, wait_for
+from daemon_process import wait_for
+from daemon_under_test import DaemonUnderTest
 from rtcfd import journal
 
 

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import grpc
 import pytest
-from daemon_under_test import DEADLINE_S, DaemonUnderTest, wait_for
+from daemon_process import DEADLINE_S, wait_for
+from daemon_under_test import DaemonUnderTest
 from rtcf.v1 import control_pb2, control_pb2_grpc
 
 

@@ -12,7 +12,8 @@ from pathlib import Path
 import odd_files
 import pytest
 import rtcf
-from daemon_under_test import BUILD_TREE, DaemonUnderTest
+from daemon_process import BUILD_TREE
+from daemon_under_test import DaemonUnderTest
 from rtcfd.common.errors import RequestError
 from rtcfd.configuration import options
 from rtcfd.configuration.last_good import Settings

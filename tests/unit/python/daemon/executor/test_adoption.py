@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 import rtcf
-from daemon_under_test import DaemonUnderTest, is_alive, wait_for
+from daemon_process import is_gone, wait_for
+from daemon_under_test import DaemonUnderTest
 from peer_executor import Peer
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
@@ -40,7 +41,7 @@ def left(daemon: DaemonUnderTest, client: rtcf.Client) -> int:
 def test_a_loop_continues_when_rtcfd_dies_and_is_adopted(
     daemon: DaemonUnderTest, left: int
 ) -> None:
-    assert is_alive(left)
+    assert not is_gone(left)
     daemon.start()
     assert daemon.executor_pid() == left
     assert "adopted: loop running, iteration " in daemon.log()
@@ -52,7 +53,7 @@ def test_a_loop_continues_when_rtcfd_dies_and_is_adopted(
         client.load(rtcf.component("demo", "Fine", name="c"))
     assert daemon.end() == 0
     # Not our child: its parent reaps it at any time.
-    wait_for(lambda: not is_alive(left), "its end")
+    wait_for(lambda: is_gone(left), "its end")
 
 
 def test_the_executors_graph_replaces_the_saved_one(daemon: DaemonUnderTest, left: int) -> None:
@@ -132,7 +133,7 @@ def test_the_death_of_an_adopted_executor_is_noticed(daemon: DaemonUnderTest, le
 
 def test_a_dead_socket_is_removed(daemon: DaemonUnderTest, left: int) -> None:
     os.kill(left, signal.SIGKILL)
-    wait_for(lambda: not is_alive(left), "its end")
+    wait_for(lambda: is_gone(left), "its end")
     stale = Path(f"{daemon.socket}.d/executors/old.sock")
     with socket.socket(socket.AF_UNIX) as listening:
         listening.bind(str(stale))
@@ -201,15 +202,15 @@ def test_an_executor_of_a_foreign_protocol_is_left_running_and_can_be_replaced(
             client.start()
         with pytest.raises(rtcf.RefusedError, match="speaks protocol"):
             client.load(rtcf.component("demo", "Fine"))
-        assert is_alive(pid)
+        assert not is_gone(pid)
         client.stop()
-        assert is_alive(pid)
+        assert not is_gone(pid)
         client.restart_runner("rt_runner")
         assert client.get_order() == ["/a"]
         status = client.get_status().runners[0]
         assert status.pid != pid
         assert (status.version, status.status) == (VERSION, "")
-        wait_for(lambda: not is_alive(pid), "its end")
+        wait_for(lambda: is_gone(pid), "its end")
 
 
 def loop_left_behind(daemon: DaemonUnderTest) -> int:
@@ -228,7 +229,7 @@ def test_a_private_rtcfd_ends_its_executors(daemon: DaemonUnderTest, client: rtc
     status = client.get_status().runners[0]
     assert status.settings.orphan_timeout_s == 2.0
     daemon.end(signal.SIGKILL)
-    wait_for(lambda: not is_alive(status.pid), "its end")
+    wait_for(lambda: is_gone(status.pid), "its end")
 
 
 def test_only_differing_settings_are_sent() -> None:

@@ -5,7 +5,7 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 import pytest
-from daemon_under_test import DEADLINE_S
+from daemon_process import DEADLINE_S
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcfd.common import errors
 from rtcfd.executor.link import MAX_MESSAGE, PROTOCOL, Link, pack_message, read_message

@@ -5,7 +5,8 @@ import signal
 
 import pytest
 import rtcf
-from daemon_under_test import DaemonUnderTest, is_alive, wait_for
+from daemon_process import is_gone, wait_for
+from daemon_under_test import DaemonUnderTest
 from flight_writer import FlightWriter
 from rtcf import refusals
 from rtcf.v1 import graph_pb2, runner_pb2
@@ -192,7 +193,7 @@ def restart_both(daemon: DaemonUnderTest) -> None:
     """Start rtcfd again after it and its executor were killed."""
     pid = daemon.executor_pid()
     daemon.end(signal.SIGKILL)
-    wait_for(lambda: not is_alive(pid), "the end of the executor")
+    wait_for(lambda: is_gone(pid), "the end of the executor")
     daemon.start()
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from daemon_under_test import DEADLINE_S
+from daemon_process import DEADLINE_S
 from rtcf.v1 import control_pb2
 from rtcf_shared.mcap_writer import McapWriter
 from rtcfd.common.limits import Limits

@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 import rtcf
-from daemon_under_test import DaemonUnderTest, wait_for
+from daemon_process import wait_for
+from daemon_under_test import DaemonUnderTest
 from rtcf.v1 import control_pb2, runner_pb2
 from rtcfd.state import store
 

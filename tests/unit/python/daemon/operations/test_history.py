@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 import rtcf
-from daemon_under_test import DaemonUnderTest, wait_for
+from daemon_process import wait_for
+from daemon_under_test import DaemonUnderTest
 from hypothesis import given, seed
 from hypothesis import strategies as st
 from rtcf.v1 import control_pb2, graph_pb2

@@ -13,7 +13,8 @@ from typing import Any
 
 import pytest
 import rtcf
-from daemon_under_test import BUILD_TREE, DEADLINE_S, DaemonUnderTest, wait_for
+from daemon_process import BUILD_TREE, DEADLINE_S, wait_for
+from daemon_under_test import DaemonUnderTest
 from rtcf.v1 import control_pb2, runner_pb2
 from rtcfd.common.errors import Unavailable
 from rtcfd_in_process import Machine, Rtcfd

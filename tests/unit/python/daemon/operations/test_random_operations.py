@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from daemon_under_test import DEADLINE_S
+from daemon_process import DEADLINE_S
 from failing_disk import MODES, FailingDisk
 from hypothesis import HealthCheck, Phase, example, given, seed, settings
 from hypothesis import strategies as st

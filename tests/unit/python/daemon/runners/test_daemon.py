@@ -9,7 +9,8 @@ from pathlib import Path
 
 import pytest
 import rtcf
-from daemon_under_test import DaemonUnderTest, is_alive, wait_for
+from daemon_process import is_gone, wait_for
+from daemon_under_test import DaemonUnderTest
 from peer_executor import CHATTER
 from rtcf.v1 import runner_pb2
 
@@ -19,7 +20,7 @@ def test_serves_the_default_runner_stopped(client: rtcf.Client) -> None:
     assert [runner.runner for runner in status.runners] == ["rt_runner"]
     assert status.runners[0].state == runner_pb2.RUNNER_STATE_STOPPED
     assert status.runners[0].settings.frequency_hz == 1000.0
-    assert is_alive(status.runners[0].pid)
+    assert not is_gone(status.runners[0].pid)
 
 
 def test_socket_permissions_depend_on_the_kind_of_daemon(
@@ -40,7 +41,7 @@ def test_a_signal_ends_it_with_its_executors(
 ) -> None:
     executor = daemon.executor_pid()
     assert daemon.end(number) == 0
-    assert not is_alive(executor)
+    assert is_gone(executor)
     assert not daemon.socket.exists()
     assert not Path(f"{daemon.socket}.d").exists()
 
@@ -158,7 +159,7 @@ def test_runners_are_added_and_removed(daemon: DaemonUnderTest, client: rtcf.Cli
     assert client.get_order("arm") == ["/Fine"]
     assert client.get_order() == []
     client.remove_runner("arm")
-    assert not is_alive(added.pid)
+    assert is_gone(added.pid)
     assert [runner.runner for runner in client.get_status().runners] == ["rt_runner"]
     assert not (daemon.state / "arm.json").exists()
 

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 import rtcf
-from daemon_under_test import DEADLINE_S, DaemonUnderTest, is_alive, wait_for
+from daemon_process import DEADLINE_S, is_gone, wait_for
+from daemon_under_test import DaemonUnderTest
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 from rtcfd_in_process import Refused, Rtcfd
 
@@ -77,7 +78,7 @@ def test_a_stop_still_ends_the_loop(service: DaemonUnderTest) -> None:
     pid = service.executor_pid()
     restart(service)
     assert service.end() == 0
-    wait_for(lambda: not is_alive(pid), "its end")
+    wait_for(lambda: is_gone(pid), "its end")
     assert list((service.folder / "run").iterdir()) == []
 
 

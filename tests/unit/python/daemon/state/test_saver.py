@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from daemon_under_test import DEADLINE_S
+from daemon_process import DEADLINE_S
 from rtcfd.state.desired import Desired
 from rtcfd.state.saver import Disk, Saver
 from rtcfd.state.store import Store
