@@ -32,7 +32,7 @@ def trace_of(library: Path, mapped: str, functions: tuple[str, ...]) -> Trace:
 
 
 def find(trace: Trace, *libraries: Path) -> source_lines.Found:
-    """Return what is found about a crash."""
+    """Return the source lines of a crash."""
 
     async def run() -> source_lines.Found:
         return await source_lines.find(

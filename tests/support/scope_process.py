@@ -1,4 +1,4 @@
-"""`rtcfctl scope` as a process, and requests to it."""
+"""`rtcfctl scope` as a process, requests to it, and loops to look at."""
 
 import http.client
 import json
@@ -6,13 +6,34 @@ import signal
 import socket
 import subprocess
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+import rtcf
 from daemon_process import BUILD_TREE, DEADLINE_S, MINDS_CTRL_C, Daemon, wait_for
 from rtcf.connection import Closing
+from rtcf.v1 import graph_pb2, runner_pb2
+
+
+@contextmanager
+def looping(
+    folder: Path, components: Sequence[graph_pb2.ComponentSpec], frequency_hz: float | None = None
+) -> Iterator[Daemon]:
+    """Run a daemon with a loop of components within the block."""
+    daemon = Daemon(folder)
+    daemon.start()
+    try:
+        with rtcf.Client(daemon.socket) as client:
+            if frequency_hz is not None:
+                client.set_runner(runner_pb2.RunnerSettings(frequency_hz=frequency_hz))
+            client.apply(components)
+            client.start()
+        yield daemon
+    finally:
+        daemon.end()
 
 
 class ScopeProcess(Closing):

@@ -12,28 +12,19 @@ import numpy as np
 import pytest
 import rtcf
 from daemon_process import DEADLINE_S, Daemon, wait_for
-from scope_process import ScopeProcess
+from scope_process import ScopeProcess, looping
 from scope_visit import CYCLES, HEAD, SHOT, Visit
 
 
 @pytest.fixture(scope="module")
-def looping(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+def loop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
     """Yield a daemon with a running loop, shared by all tests here."""
-    daemon = Daemon(tmp_path_factory.mktemp("loop"))
-    daemon.start()
-    with rtcf.Client(daemon.socket) as client:
-        client.load(rtcf.component("rtcf_examples", "Wave", name="wave", parameters=["rate:=1.0"]))
-        client.load(rtcf.component("rtcf_examples", "Mimo", name="mimo"))
-        client.start()
-    yield daemon
-    daemon.end()
-
-
-@pytest.fixture(scope="module")
-def scope(looping: Daemon) -> Iterator[ScopeProcess]:
-    """Yield a read-only scope."""
-    with ScopeProcess(looping) as scope:
-        yield scope
+    components = [
+        rtcf.component("rtcf_examples", "Wave", name="wave", parameters=["rate:=1.0"]),
+        rtcf.component("rtcf_examples", "Mimo", name="mimo"),
+    ]
+    with looping(tmp_path_factory.mktemp("loop"), components) as daemon:
+        yield daemon
 
 
 @pytest.mark.parametrize("path", ["/api/about", "/api/graph", "/api/mcap", "/stream", "/nowhere"])
@@ -52,9 +43,9 @@ def test_the_page_itself_needs_no_token(scope: ScopeProcess) -> None:
         assert status == 200 and text in said
 
 
-def test_a_page_without_the_token_of_a_file_names_the_file(looping: Daemon, tmp_path: Path) -> None:
+def test_a_page_without_the_token_of_a_file_names_the_file(loop: Daemon, tmp_path: Path) -> None:
     file = tmp_path / "token"
-    with ScopeProcess(looping, "--token-file", str(file)) as scope:
+    with ScopeProcess(loop, "--token-file", str(file)) as scope:
         status, text = scope.ask("/api/about", token="")
     assert (status, text.decode()) == (
         403, "access requires the token: open http://HOST:PORT/?token=TOKEN "
@@ -143,11 +134,11 @@ def test_without_the_right_parameters_cannot_be_set(scope: ScopeProcess) -> None
 
 
 def test_with_the_right_parameters_are_set_within_their_bounds(
-    looping: Daemon,
+    loop: Daemon,
 ) -> None:
     with (
-        ScopeProcess(looping, "--right", "tune") as scope,
-        rtcf.Client(looping.socket) as client,
+        ScopeProcess(loop, "--right", "tune") as scope,
+        rtcf.Client(loop.socket) as client,
     ):
 
         def change(component: str, parameter: str, value: Any) -> str:
@@ -195,9 +186,9 @@ def test_tabs_share_one_stream_and_miss_no_cycle_when_another_comes(scope: Scope
     asyncio.run(look())
 
 
-def test_events_and_log_records_are_sent(looping: Daemon, scope: ScopeProcess) -> None:
+def test_events_and_log_records_are_sent(loop: Daemon, scope: ScopeProcess) -> None:
     def tune(amplitude: str) -> None:
-        with rtcf.Client(looping.socket) as client:
+        with rtcf.Client(loop.socket) as client:
             client.set_parameters("wave", [rtcf.parse_parameter(f"amplitude:={amplitude}")])
 
     async def visit() -> list[dict[str, Any]]:
@@ -338,11 +329,11 @@ def test_the_last_cycles_can_be_saved_as_a_recording(scope: ScopeProcess, tmp_pa
     assert scope.ask("/api/mcap?first=1e15&last=2e15")[0] == 400
 
 
-def test_recordings_are_sent_unchanged(looping: Daemon, tmp_path: Path) -> None:
+def test_recordings_are_sent_unchanged(loop: Daemon, tmp_path: Path) -> None:
     file = tmp_path / "run.mcap"
-    done = looping.ctl("record", "-o", str(file), "wave", "--duration", "0.3s")
+    done = loop.ctl("record", "-o", str(file), "wave", "--duration", "0.3s")
     assert done.returncode == 0, done.stderr
-    with ScopeProcess(looping, str(file)) as scope, rtcf.read_recording(file) as recording:
+    with ScopeProcess(loop, str(file)) as scope, rtcf.read_recording(file) as recording:
         assert scope.told("/api/recordings") == ["run.mcap"]
         told = scope.told("/api/recordings/run.mcap")
         assert {each["name"] for each in told["signals"]} == set(recording.signals)
@@ -359,8 +350,8 @@ def test_recordings_are_sent_unchanged(looping: Daemon, tmp_path: Path) -> None:
         )  # fmt: skip
 
 
-def test_tabs_that_are_killed_leave_nothing(looping: Daemon, scope: ScopeProcess) -> None:
-    rtcfd = Path(f"/proc/{looping.pid}/fd")
+def test_tabs_that_are_killed_leave_nothing(loop: Daemon, scope: ScopeProcess) -> None:
+    rtcfd = Path(f"/proc/{loop.pid}/fd")
     scopes = Path(f"/proc/{scope.process.pid}/fd")
 
     async def one() -> None:
@@ -394,11 +385,11 @@ def test_tabs_that_are_killed_leave_nothing(looping: Daemon, scope: ScopeProcess
 
 
 def test_over_ssh_the_tunnel_command_is_printed(
-    looping: Daemon, monkeypatch: pytest.MonkeyPatch
+    loop: Daemon, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("SSH_CONNECTION", "10.0.0.2 50000 10.0.0.1 22")
     monkeypatch.setenv("USER", "alice")
-    with ScopeProcess(looping) as scope:
+    with ScopeProcess(loop) as scope:
         wait_for(lambda: "ssh" in scope.log.read_text(), "the tunnel command")
         said = scope.log.read_text().splitlines()[1]
     assert said == (
@@ -415,7 +406,7 @@ def test_over_ssh_the_tunnel_command_is_printed(
         (["--token-file", "/dev/null"], "rtcfctl: /dev/null: a token needs at least 16 letters"),
     ],
 )
-def test_a_wrong_command_line_is_rejected(looping: Daemon, arguments: list[str], said: str) -> None:
-    done = looping.ctl("scope", *arguments)
+def test_a_wrong_command_line_is_rejected(loop: Daemon, arguments: list[str], said: str) -> None:
+    done = loop.ctl("scope", *arguments)
     assert done.returncode in (1, 2)
     assert said in done.stderr and done.stderr.count("\n") == 1

@@ -21,7 +21,7 @@ import rtcf
 from browser import Browser, Page
 from daemon_process import DEADLINE_S, Daemon, wait_for
 from hypothesis import strategies as st
-from scope_process import ScopeProcess
+from scope_process import ScopeProcess, looping
 
 SEED = int(os.environ.get("RTCF_SEED", "1"))
 NOBODY = 65534
@@ -29,20 +29,16 @@ LAYOUT = '{"panes":[{"traces":["/wave.wave"]}],"span":2}'
 
 
 @pytest.fixture(scope="module")
-def looping(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+def loop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
     """Yield a daemon with a running loop, shared by all tests here."""
-    daemon = Daemon(tmp_path_factory.mktemp("loop"))
-    daemon.start()
-    with rtcf.Client(daemon.socket) as client:
-        client.load(rtcf.component("rtcf_examples", "Wave", name="wave", parameters=["rate:=1.0"]))
-        client.start()
-    yield daemon
-    daemon.end()
+    components = [rtcf.component("rtcf_examples", "Wave", name="wave", parameters=["rate:=1.0"])]
+    with looping(tmp_path_factory.mktemp("loop"), components) as daemon:
+        yield daemon
 
 
 @pytest.fixture(scope="module")
-def scope(looping: Daemon) -> Iterator[ScopeProcess]:
-    with ScopeProcess(looping, "--right", "tune") as scope:
+def scope(loop: Daemon) -> Iterator[ScopeProcess]:
+    with ScopeProcess(loop, "--right", "tune") as scope:
         yield scope
 
 
@@ -90,12 +86,12 @@ def test_a_session_opens_a_stream_and_a_cookie_opens_nothing(scope: ScopeProcess
             assert scope.ask("/api/about", token="", **asked_with)[0] == 403
 
 
-def test_a_session_ends_with_its_server(looping: Daemon, tmp_path: Path) -> None:
+def test_a_session_ends_with_its_server(loop: Daemon, tmp_path: Path) -> None:
     kept = ("--token-file", str(tmp_path / "token"))
-    with ScopeProcess(looping, *kept) as before:
+    with ScopeProcess(loop, *kept) as before:
         session, port = before.session(), before.port
     token = (tmp_path / "token").read_text().strip()
-    with ScopeProcess(looping, *kept, "--port", str(port)) as after:
+    with ScopeProcess(loop, *kept, "--port", str(port)) as after:
         assert after.ask("/api/about", token=token)[0] == 200
         assert after.ask("/api/about", token=session)[0] == 403
 
@@ -140,14 +136,14 @@ def test_a_page_without_a_session_explains_how_to_get_one(
 
 
 def test_a_page_of_a_restarted_server_explains_how_to_continue(
-    chromium: Browser, looping: Daemon, tmp_path: Path
+    chromium: Browser, loop: Daemon, tmp_path: Path
 ) -> None:
     kept = ("--token-file", str(tmp_path / "token"))
-    with ScopeProcess(looping, *kept) as before:
+    with ScopeProcess(loop, *kept) as before:
         page = chromium.page(f"{before.address}#{quote(LAYOUT)}")
         page.wait("scope.live.end > 10")
     page.wait("document.getElementById('trouble').textContent.includes('no connection')")
-    with ScopeProcess(looping, *kept, "--port", str(before.port)) as after:
+    with ScopeProcess(loop, *kept, "--port", str(before.port)) as after:
         page.wait("document.getElementById('trouble').textContent.includes('requires the token')")
         chromium.page(after.address).wait("scope.rate")
         page.wait("document.getElementById('trouble').hidden")
@@ -237,7 +233,7 @@ def _command_lines() -> str:
 
 
 def test_another_user_sees_no_token_when_a_browser_is_opened(
-    looping: Daemon, tmp_path: Path, chromium: Browser
+    loop: Daemon, tmp_path: Path, chromium: Browser
 ) -> None:
     run = tmp_path / "run"
     run.mkdir(mode=0o700)
@@ -248,7 +244,7 @@ def test_another_user_sees_no_token_when_a_browser_is_opened(
     )
     script.chmod(0o755)
     display = {"DISPLAY": ":99", "BROWSER": str(script), "XDG_RUNTIME_DIR": str(run)}
-    with ScopeProcess(looping, display=display) as scope:
+    with ScopeProcess(loop, display=display) as scope:
         wait_for(said.exists, "the browser")
         pid, address = said.read_text().split()
         try:
@@ -272,11 +268,11 @@ def test_another_user_sees_no_token_when_a_browser_is_opened(
     assert list(run.iterdir()) == []
 
 
-def test_an_unread_token_file_is_removed_with_the_scope(looping: Daemon, tmp_path: Path) -> None:
+def test_an_unread_token_file_is_removed_with_the_scope(loop: Daemon, tmp_path: Path) -> None:
     run = tmp_path / "run"
     run.mkdir(mode=0o700)
     display = {"DISPLAY": ":99", "BROWSER": "/bin/true", "XDG_RUNTIME_DIR": str(run)}
-    with ScopeProcess(looping, display=display):
+    with ScopeProcess(loop, display=display):
         wait_for(lambda: len(list(run.iterdir())) == 1, "the file")
     assert list(run.iterdir()) == []
 

@@ -1,56 +1,32 @@
 """Derived signals of the scope's page, and one signal over another."""
 
 import math
-from collections.abc import Callable, Iterator
-from urllib.parse import quote
+from collections.abc import Iterator
+from functools import partial
 
 import pytest
 import rtcf
-from browser import Browser, Page
+from browser import Page
 from daemon_process import Daemon
-from rtcf.v1 import runner_pb2
-from scope_process import ScopeProcess
+from scope_pages import Opener
+from scope_process import ScopeProcess, looping
 
 
 @pytest.fixture(scope="module")
 def loop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
-    """Give a daemon with a loop of 1 kHz, of two waves."""
-    daemon = Daemon(tmp_path_factory.mktemp("loop"))
-    daemon.start()
-    with rtcf.Client(daemon.socket) as client:
-        client.set_runner(runner_pb2.RunnerSettings(frequency_hz=1000.0))
-        client.apply(
-            [
-                rtcf.component("rtcf_examples", "Wave", name=name, parameters=[f"rate:={rate}"])
-                for name, rate in (("w0", 1.0), ("w1", 2.0))
-            ]
-        )
-        client.start()
-    yield daemon
-    daemon.end()
-
-
-@pytest.fixture(scope="module")
-def scope(loop: Daemon) -> Iterator[ScopeProcess]:
-    with ScopeProcess(loop) as scope:
-        yield scope
-
-
-Opener = Callable[..., Page]
+    """Yield a daemon with a loop of 1 kHz, of two waves."""
+    components = [
+        rtcf.component("rtcf_examples", "Wave", name=name, parameters=[f"rate:={rate}"])
+        for name, rate in (("w0", 1.0), ("w1", 2.0))
+    ]
+    with looping(tmp_path_factory.mktemp("loop"), components, 1000.0) as daemon:
+        yield daemon
 
 
 @pytest.fixture
-def visit(chromium: Browser, scope: ScopeProcess) -> Iterator[Opener]:
-    """Yield a function that opens a page with a layout, and close the pages afterwards."""
-    pages = []
-
-    def visit(layout: str = "") -> Page:
-        pages.append(chromium.page(scope.address + (f"#{quote(layout)}" if layout else "")))
-        return pages[-1]
-
-    yield visit
-    for page in pages:
-        page.close()
+def visit(visit: Opener, scope: ScopeProcess) -> Opener:
+    """Return a function that opens a page of `scope` with a layout."""
+    return partial(visit, scope)
 
 
 def _derive(page: Page, text: str) -> None:

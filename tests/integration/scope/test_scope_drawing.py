@@ -1,65 +1,42 @@
 """Drawing of the scope's page: each cycle is drawn, and the pixels do not depend on the path."""
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
-from urllib.parse import quote
 
 import pytest
 import rtcf
-from browser import Browser, Page
+from browser import Page
 from daemon_process import Daemon
-from pages import SUPPORT
-from rtcf.v1 import runner_pb2
 from rtcf_shared import spec
-from scope_process import ScopeProcess
-
-_HELPERS = (SUPPORT / "drawing.js").read_text()
-_NAMES = re.findall(r"^export (?:async )?(?:function|class) (\w+)", _HELPERS, re.MULTILINE)
+from scope_pages import Opener, add_drawing
+from scope_process import ScopeProcess, looping
 
 
 @pytest.fixture(scope="module")
 def loop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
     """Yield a daemon with a loop of 2 kHz whose values are hard to draw."""
-    daemon = Daemon(tmp_path_factory.mktemp("loop"))
-    daemon.start()
-    with rtcf.Client(daemon.socket) as client:
-        client.set_runner(runner_pb2.RunnerSettings(frequency_hz=2000.0))
-        client.apply([rtcf.component("rtcf_test", "Ragged", name="ragged")])
-        client.start()
-    yield daemon
-    daemon.end()
-
-
-@pytest.fixture(scope="module")
-def scope(loop: Daemon) -> Iterator[ScopeProcess]:
-    with ScopeProcess(loop) as scope:
-        yield scope
-
-
-Opener = Callable[..., Page]
+    components = [rtcf.component("rtcf_test", "Ragged", name="ragged")]
+    with looping(tmp_path_factory.mktemp("loop"), components, 2000.0) as daemon:
+        yield daemon
 
 
 @pytest.fixture
-def visit(chromium: Browser, scope: ScopeProcess) -> Iterator[Opener]:
-    """Yield a function that opens a page with a layout, with the helpers of `drawing`."""
-    pages = []
+def visit(visit: Opener, scope: ScopeProcess) -> Opener:
+    """Return a function that opens a page with a layout, with the helpers of `drawing`."""
 
-    def visit(layout: str = "", ratio: float = 1, width: int = 1280, height: int = 800) -> Page:
-        page = chromium.page(scope.address + (f"#{quote(layout)}" if layout else ""))
-        pages.append(page)
+    def visit_with_drawing(
+        layout: str = "", ratio: float = 1, width: int = 1280, height: int = 800
+    ) -> Page:
+        page = visit(scope, layout)
         page.call(
             "Emulation.setDeviceMetricsOverride", width=width, height=height,
             deviceScaleFactor=ratio, mobile=False,
         )  # fmt: skip
-        page.wait("window.scope && scope.panes.every((pane) => pane.size.height > 0)")
-        helpers = re.sub(r"^export ", "", _HELPERS, flags=re.MULTILINE)
-        page.ask(f"(() => {{ {helpers}\nwindow.drawing = {{ {', '.join(_NAMES)} }} }})()")
+        add_drawing(page)
         return page
 
-    yield visit
-    for page in pages:
-        page.close()
+    return visit_with_drawing
 
 
 @pytest.mark.parametrize(

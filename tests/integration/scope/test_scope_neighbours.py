@@ -15,7 +15,7 @@ import rtcf
 from daemon_process import Daemon
 from hypothesis import strategies as st
 from rtcf.v1 import graph_pb2
-from scope_process import ScopeProcess
+from scope_process import ScopeProcess, looping
 from scope_visit import CYCLES, SHOT, ScopePage, Visit
 
 SEED = int(os.environ.get("RTCF_SEED", "1"))
@@ -28,27 +28,16 @@ def _wave(name: str) -> graph_pb2.ComponentSpec:
 
 
 @pytest.fixture(scope="module")
-def looping(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
+def loop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
     """Yield a daemon with a running loop, shared by all tests here."""
-    daemon = Daemon(tmp_path_factory.mktemp("loop"))
-    daemon.start()
-    with rtcf.Client(daemon.socket) as client:
-        client.load(_wave("wave"))
-        client.load(rtcf.component("rtcf_examples", "Mimo", name="mimo"))
-        client.start()
-    yield daemon
-    daemon.end()
-
-
-@pytest.fixture(scope="module")
-def scope(looping: Daemon) -> Iterator[ScopeProcess]:
-    with ScopeProcess(looping) as scope:
-        yield scope
+    components = [_wave("wave"), rtcf.component("rtcf_examples", "Mimo", name="mimo")]
+    with looping(tmp_path_factory.mktemp("loop"), components) as daemon:
+        yield daemon
 
 
 @pytest.fixture
-def client(looping: Daemon) -> Iterator[rtcf.Client]:
-    with rtcf.Client(looping.socket) as client:
+def client(loop: Daemon) -> Iterator[rtcf.Client]:
+    with rtcf.Client(loop.socket) as client:
         yield client
 
 
@@ -384,9 +373,9 @@ async def _hear(page: ScopePage) -> None:
         await page.binary(CYCLES)
 
 
-def _check(looping: Daemon, scope: ScopeProcess, steps: list[tuple[str, int, Any]]) -> None:
+def _check(loop: Daemon, scope: ScopeProcess, steps: list[tuple[str, int, Any]]) -> None:
     async def look() -> None:
-        with rtcf.Client(looping.socket) as client, _Control(looping) as control:
+        with rtcf.Client(loop.socket) as client, _Control(loop) as control:
             others = _Others(scope, client)
             try:
                 async with _Healthy().watching(scope) as healthy:
@@ -419,15 +408,15 @@ def _seeded(most: int) -> Callable[[Any], Any]:
     steps=[("open", 0, ""), ("watch", 0, GHOSTS), ("arm", 0, LEVEL | {"signal": "/gone.x"})]
 )
 def test_other_pages_do_not_affect_a_healthy_page(
-    looping: Daemon, scope: ScopeProcess, steps: list[tuple[str, int, Any]]
+    loop: Daemon, scope: ScopeProcess, steps: list[tuple[str, int, Any]]
 ) -> None:
-    _check(looping, scope, steps)
+    _check(loop, scope, steps)
 
 
 @pytest.mark.long
 @_seeded(100)
 @hypothesis.given(steps=STEPS)
 def test_other_pages_do_not_affect_a_healthy_page_for_long(
-    looping: Daemon, scope: ScopeProcess, steps: list[tuple[str, int, Any]]
+    loop: Daemon, scope: ScopeProcess, steps: list[tuple[str, int, Any]]
 ) -> None:
-    _check(looping, scope, steps)
+    _check(loop, scope, steps)

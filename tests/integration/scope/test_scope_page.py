@@ -2,16 +2,15 @@
 
 import math
 import re
-from collections.abc import Callable, Iterator
-from urllib.parse import quote
+from collections.abc import Iterator
 
 import pytest
 import rtcf
-from browser import Browser, Page
+from browser import Page
 from daemon_process import Daemon, wait_for
-from rtcf.v1 import runner_pb2
 from rtcf_shared import spec
-from scope_process import ScopeProcess
+from scope_pages import Opener
+from scope_process import ScopeProcess, looping
 
 _WAVES = 8
 
@@ -19,48 +18,18 @@ _WAVES = 8
 @pytest.fixture(scope="module")
 def loop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
     """Yield a daemon with a loop of 2 kHz with sixteen changing numbers."""
-    daemon = Daemon(tmp_path_factory.mktemp("loop"))
-    daemon.start()
-    with rtcf.Client(daemon.socket) as client:
-        client.set_runner(runner_pb2.RunnerSettings(frequency_hz=2000.0))
-        client.apply(
-            [
-                rtcf.component(
-                    "rtcf_examples", "Wave", name=f"w{i}", parameters=[f"rate:={i + 1}.0"]
-                )
-                for i in range(_WAVES)
-            ]
-        )
-        client.start()
-    yield daemon
-    daemon.end()
+    components = [
+        rtcf.component("rtcf_examples", "Wave", name=f"w{i}", parameters=[f"rate:={i + 1}.0"])
+        for i in range(_WAVES)
+    ]
+    with looping(tmp_path_factory.mktemp("loop"), components, 2000.0) as daemon:
+        yield daemon
 
 
 @pytest.fixture(scope="module")
 def scope(loop: Daemon) -> Iterator[ScopeProcess]:
     with ScopeProcess(loop, "--right", "tune") as scope:
         yield scope
-
-
-Opener = Callable[..., Page]
-
-
-@pytest.fixture
-def visit(chromium: Browser) -> Iterator[Opener]:
-    """Yield a function that opens a scope's page with a layout, and closes it after the test."""
-    pages = []
-
-    def visit(scope: ScopeProcess, layout: str = "") -> Page:
-        pages.append(_open(chromium, scope, layout))
-        return pages[-1]
-
-    yield visit
-    for page in pages:
-        page.close()
-
-
-def _open(browser: Browser, scope: ScopeProcess, layout: str = "") -> Page:
-    return browser.page(scope.address + (f"#{quote(layout)}" if layout else ""))
 
 
 def _amplitude(client: rtcf.Client) -> float:

@@ -2,45 +2,33 @@
 
 import json
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from datetime import datetime
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote
 
 import pytest
 import rtcf
-from browser import Browser, Page
+from browser import Page
 from daemon_process import Daemon
-from pages import SUPPORT
-from rtcf.v1 import runner_pb2
-from scope_process import ScopeProcess
+from scope_pages import Opener, add_drawing
+from scope_process import ScopeProcess, looping
 
-_HELPERS = (SUPPORT / "drawing.js").read_text()
-_NAMES = re.findall(r"^export (?:async )?(?:function|class) (\w+)", _HELPERS, re.MULTILINE)
 _RATE_HZ = 1000.0
 
 
 @pytest.fixture(scope="module")
 def loop(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Daemon]:
-    """Give a daemon with a loop of two waves and a counter."""
-    daemon = Daemon(tmp_path_factory.mktemp("loop"))
-    daemon.start()
-    with rtcf.Client(daemon.socket) as client:
-        client.set_runner(runner_pb2.RunnerSettings(frequency_hz=_RATE_HZ))
-        client.apply(
-            [
-                rtcf.component("rtcf_examples", "Wave", name="w0", parameters=["rate:=1.0"]),
-                rtcf.component(
-                    "rtcf_examples", "Wave", name="w1",
-                    parameters=["rate:=2.0", "amplitude:=8.0"],
-                ),
-                rtcf.component("rtcf_test", "Counter", name="count"),
-            ]
-        )  # fmt: skip
-        client.start()
-    yield daemon
-    daemon.end()
+    """Yield a daemon with a loop of two waves and a counter."""
+    components = [
+        rtcf.component("rtcf_examples", "Wave", name="w0", parameters=["rate:=1.0"]),
+        rtcf.component(
+            "rtcf_examples", "Wave", name="w1", parameters=["rate:=2.0", "amplitude:=8.0"]
+        ),
+        rtcf.component("rtcf_test", "Counter", name="count"),
+    ]
+    with looping(tmp_path_factory.mktemp("loop"), components, _RATE_HZ) as daemon:
+        yield daemon
 
 
 @pytest.fixture(scope="module")
@@ -59,27 +47,16 @@ def scope(loop: Daemon, recordings: list[Path]) -> Iterator[ScopeProcess]:
         yield scope
 
 
-Opener = Callable[..., Page]
-
-
 @pytest.fixture
-def visit(chromium: Browser, scope: ScopeProcess) -> Iterator[Opener]:
-    """Yield a function that opens a page with a layout, with the helpers of `drawing`."""
-    pages = []
+def visit(visit: Opener, scope: ScopeProcess) -> Opener:
+    """Return a function that opens a page with a layout, with the helpers of `drawing`."""
 
-    def visit(layout: Any = None) -> Page:
-        page = chromium.page(
-            scope.address + (f"#{quote(json.dumps(layout))}" if layout is not None else "")
-        )
-        pages.append(page)
-        page.wait("window.scope && scope.panes.every((pane) => pane.size.height > 0)")
-        helpers = re.sub(r"^export ", "", _HELPERS, flags=re.MULTILINE)
-        page.ask(f"(() => {{ {helpers}\nwindow.drawing = {{ {', '.join(_NAMES)} }} }})()")
+    def visit_with_drawing(layout: Any = None) -> Page:
+        page = visit(scope, json.dumps(layout) if layout is not None else "")
+        add_drawing(page)
         return page
 
-    yield visit
-    for page in pages:
-        page.close()
+    return visit_with_drawing
 
 
 def _choose_axis(page: Page, pane: int, trace: int, axis: str) -> None:
