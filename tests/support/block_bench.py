@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+import numpy as np
+import pytest
 import rtcf
 from daemon_process import BUILD_TREE
 from rtcf.testing import Bench
@@ -14,6 +17,26 @@ from rtcf_shared.value_text import parse
 
 PATH = [BUILD_TREE / "lib" / "rtcf"]
 Values = dict[str, Any]
+
+
+@contextmanager
+def rejection(said: str) -> Iterator[None]:
+    """Check that a call within the `with` block is rejected with a text in one line."""
+    with pytest.raises(rtcf.RefusedError) as error:
+        yield
+    found = str(error.value)
+    assert said in found, found
+    assert "\n" not in found, found
+
+
+def text(matrix: Any) -> str:
+    """Return a matrix as a text that reads back exactly."""
+    return "; ".join(" ".join(repr(float(each)) for each in row) for row in np.atleast_2d(matrix))
+
+
+def columns(name: str, values: Any) -> Values:
+    """Return inputs NAME1, NAME2 ... of values with a row for each cycle."""
+    return {f"{name}{i + 1}": column for i, column in enumerate(np.asarray(values).T)}
 
 
 class Blocks:
@@ -34,6 +57,11 @@ class Blocks:
     def client(self) -> rtcf.Client:
         """Everything else that a client can ask."""
         return self._bench.client
+
+    @property
+    def logs(self) -> list[str]:
+        """The log records of components as "/component: text", oldest first."""
+        return self._bench.logs
 
     def __enter__(self) -> Self:
         return self
@@ -84,9 +112,22 @@ class Blocks:
         **parameters: Any,
     ) -> Any:
         """Run a new component as run() does, twice; return one output."""
-        first = self.run(type_, inputs, steps, **parameters)[output]
-        again = self.run(type_, inputs, steps, **parameters)[output]
-        assert again.tobytes() == first.tobytes(), "the same inputs gave other outputs"
+        return self.run_twice(type_, [output], inputs, steps, **parameters)[output]
+
+    def run_twice(
+        self,
+        type_: str,
+        compared: Iterable[str],
+        inputs: Mapping[str, Any] | None = None,
+        steps: int | None = None,
+        **parameters: Any,
+    ) -> Values:
+        """Run a new component as run() does, twice; check that outputs are equal; return all."""
+        first = self.run(type_, inputs, steps, **parameters)
+        again = self.run(type_, inputs, steps, **parameters)
+        for name in compared:
+            equal = again[name].tobytes() == first[name].tobytes()
+            assert equal, f"{name}: the same inputs gave other outputs"
         return first
 
     def _parameters(self, type_: str) -> Values:

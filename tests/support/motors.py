@@ -18,3 +18,9 @@ def load(
             parameters=[f"{key}:={value}" for key, value in more.items()],
         )
     )  # fmt: skip
+
+
+def gains(client: rtcf.Client) -> dict[str, float]:
+    """Return kp and ki of the controller `pid`."""
+    found = {p.name: p.value.double_value for p in client.get_component("pid").parameters}
+    return {name: found[name] for name in ("kp", "ki")}

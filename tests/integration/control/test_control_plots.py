@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from daemon_process import BUILD_TREE, Daemon
+from block_bench import PATH
+from daemon_process import Daemon
 from documentation_commands import typed
 from pages import TREE
 from rtcf.testing import Bench
 from rtcfctl.terminal import pictures
 
 PAGES = TREE / "docs" / "control"
-PATH = [BUILD_TREE / "lib" / "rtcf"]
 WIDTH = 72
 DT = 0.001  # s
 MASKED: Any = np.ma
@@ -33,7 +33,6 @@ components:
   - {name: plant, package: rtcf_control, type: Integrator,
      remaps: {in: /speed, out: /position}}
 """
-
 
 _LQG = """\
 components:
@@ -55,12 +54,17 @@ def drawn(title: str, values: Any, marks: Mapping[float, str]) -> str:
     return "\n".join(pictures.drawn(title, [values[np.isfinite(values)]], marks))
 
 
-def _pid(folder: Path) -> str:
+def _run(folder: Path, graph: str, inputs: Mapping[str, Any]) -> Any:
+    """Return the outputs of a graph."""
     file = folder / "loop.yaml"
-    file.write_text(_PID)
+    file.write_text(graph)
     with Bench(str(file), path=PATH) as bench:
-        setpoint = np.where(np.arange(4000) < 2000, 1.0, 0.0)
-        found = bench.run({"/pid.setpoint": setpoint})
+        return bench.run(inputs)
+
+
+def _pid(folder: Path) -> str:
+    setpoint = np.where(np.arange(4000) < 2000, 1.0, 0.0)
+    found = _run(folder, _PID, {"/pid.setpoint": setpoint})
     marks = {0.0: "0 s: setpoint 1", 0.5: "2 s: setpoint 0", 1.0: "4 s"}
     return "\n\n".join(
         [drawn("position", found["/plant.out"], marks), drawn("speed", found["/pid.effort"], marks)]
@@ -116,11 +120,8 @@ def _motor(_: Path) -> str:
 
 
 def _state_space(folder: Path) -> str:
-    file = folder / "loop.yaml"
-    file.write_text(_LQG)
-    with Bench(str(file), path=PATH) as bench:
-        setpoint = np.where(np.arange(16000) < 8000, 0.0, 0.3)
-        found = bench.run({"/controller.in1": setpoint})
+    setpoint = np.where(np.arange(16000) < 8000, 0.0, 0.3)
+    found = _run(folder, _LQG, {"/controller.in1": setpoint})
     marks = {0.0: "0 s: angle 0.05", 0.5: "8 s: setpoint 0.3", 1.0: "16 s"}
     names = {"position in m": "/plant.out1", "angle in rad": "/plant.out2"}
     return "\n\n".join(drawn(title, found[name], marks) for title, name in names.items())
@@ -191,13 +192,9 @@ components:
 
 
 def _joints(folder: Path) -> str:
-    file = folder / "loop.yaml"
-    file.write_text(_JOINTS)
-    with Bench(str(file), path=PATH) as bench:
-        target = MASKED.array(np.tile([-0.5, 1.0], (2500, 1)), mask=np.ones((2500, 2), bool))
-        target.mask[0] = False
-        found = bench.run({"/arm.target.position": target})
-    position = found["/state.state.position"]
+    target = MASKED.array(np.tile([-0.5, 1.0], (2500, 1)), mask=np.ones((2500, 2), bool))
+    target.mask[0] = False
+    position = _run(folder, _JOINTS, {"/arm.target.position": target})["/state.state.position"]
     marks = {0.0: "0 s: target -0.5, 1", 1.0: "2.5 s"}
     return "\n\n".join(
         drawn(name, position[:, index], marks) for index, name in enumerate(["shoulder", "elbow"])

@@ -11,12 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-import rtcf
-from block_bench import PATH
+from block_bench import PATH, Stepped
 from pages import TREE
 from rtcf.testing import Bench
 from rtcf.v1 import runner_pb2
-from rtcf_shared.value_text import parse
 
 DT = 0.001
 GRAVITY = 9.81
@@ -110,19 +108,14 @@ def test_an_input_that_is_not_finite_is_a_fault(pendulum: Bench) -> None:
 
 def test_a_new_period_is_taken_as_it_is() -> None:
     with Bench("rtcf_examples/Identity", path=PATH) as bench:
-        words = [f"{name}:={value}" for name, value in PARAMETERS.items()]
-        bench.client.load(rtcf.component("rtcf_test", "PendulumFilter", name="block", ns="/stepped",
-                                         parameters=words))  # fmt: skip
+        block = Stepped(bench, "PendulumFilter", package="rtcf_test", **PARAMETERS)
         periods = np.repeat([0.001, 0.004], 20)
         expected = filtered(np.zeros(40), np.ones(40), periods)[0]
         for k in range(40):
             frequency = round(1.0 / periods[k])
             bench.client.set_runner(runner_pb2.RunnerSettings(frequency_hz=frequency))
-            bench.client.write("/stepped/block.acceleration", 1.0)
-            bench.client.step(1)
-            states = bench.client.get_component("/stepped/block").states
-            found = next(each.value for each in states if each.name == "estimate")
-            assert parse(found) == pytest.approx(expected[k].tolist(), abs=ROUNDING)
+            found = block.step(acceleration=1.0)["estimate"]
+            assert found == pytest.approx(expected[k].tolist(), abs=ROUNDING)
 
 
 def test_the_page_shows_the_component() -> None:

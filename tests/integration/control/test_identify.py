@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 import rtcf
 from daemon_process import BUILD_TREE, MINDS_CTRL_C, Daemon, wait_for, wait_until_it_is
-from motors import LAG, load
+from motors import LAG, gains, load
 from values import iteration
 
 MODEL, POLES, RELAY = 0.02, 0.03, 0.05
@@ -146,12 +146,10 @@ def test_an_excitation_in_a_closed_loop_keeps_its_parameters(
                       "--closed-loop-time", "0.1", "--apply", "pid")  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert client.get_component("excitation").parameters == before
-    (kp,) = (p.value.double_value for p in client.get_component("pid").parameters if p.name == "kp")
-    assert kp == pytest.approx(0.00995, rel=0.1)
+    assert gains(client)["kp"] == pytest.approx(0.00995, rel=0.1)
     assert "`rtcfctl undo pid` reverts it" in done.stdout
     assert daemon.ctl("undo", "pid").returncode == 0
-    (kp,) = (p.value.double_value for p in client.get_component("pid").parameters if p.name == "kp")
-    assert kp == 0.004
+    assert gains(client)["kp"] == 0.004
 
 
 def test_a_limit_of_the_output_ends_it(daemon: Daemon, client: rtcf.Client) -> None:

@@ -7,7 +7,7 @@ import json
 import pytest
 import rtcf
 from daemon_process import Daemon
-from motors import LAG, load
+from motors import LAG, gains, load
 
 TUNE = ("tune", "pid", "--lower", "0", "--upper", "50", "--size", "5", "--duration", "2", "--step")
 SLOW = {"kp": 0.002, "ki": 0.02}
@@ -22,11 +22,6 @@ def controlled(daemon: Daemon, client: rtcf.Client) -> Daemon:
     client.write("pid.setpoint", 10.0)
     client.step(5000)
     return daemon
-
-
-def gains(client: rtcf.Client) -> dict[str, float]:
-    found = {p.name: p.value.double_value for p in client.get_component("pid").parameters}
-    return {name: found[name] for name in SLOW}
 
 
 def test_faster_gains_are_compared_and_kept(controlled: Daemon, client: rtcf.Client) -> None:
