@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 import pytest
 import rtcf
 from daemon_process import BUILD_TREE
+from rtcf.connection import Closing
 from rtcf.testing import Bench
 from rtcf_shared.value_text import parse
 
@@ -39,7 +39,7 @@ def columns(name: str, values: Any) -> Values:
     return {f"{name}{i + 1}": column for i, column in enumerate(np.asarray(values).T)}
 
 
-class Blocks:
+class Blocks(Closing):
     """One component of each type given, in the namespace /TYPE."""
 
     def __init__(
@@ -63,15 +63,7 @@ class Blocks:
         """The log records of components as "/component: text", oldest first."""
         return self._bench.logs
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
         self._bench.close()
 
     def set(self, type_: str, **parameters: Any) -> None:

@@ -57,7 +57,7 @@ def reference(torques: Array, *, key: int = -1, period_s: float = 1e-3, steps: i
 
 
 def motion(bench: Bench, torques: Array) -> Array:
-    """Return the same from the component."""
+    """Return time, positions and velocities from the component, a row for each cycle."""
     response = bench.run(dict(zip(MOTORS, torques.T, strict=True)))
     ports = [
         "time",
