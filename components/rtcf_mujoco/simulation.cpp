@@ -458,7 +458,6 @@ class Simulation final : public rtcf::Component {
             return RTCF_FAIL(this, "model {}: {}", file, error.what());
         }
         joint_states.reserve(plant_->jointStates());
-        joint_states.value() = plant_->jointStates();
         return true;
     }
 
