@@ -151,9 +151,9 @@ class Excitation final : public rtcf::Component {
         if (proposed[measured_lower] > proposed[measured_upper])
             return RTCF_FAIL(this, "measured_lower = {} is above measured_upper = {}",
                              proposed[measured_lower], proposed[measured_upper]);
-        if (proposed[shape] == ExcitationShape::LogChirp &&
-            (proposed[frequency_] <= 0.0 || proposed[end_frequency] <= 0.0))
-            return fail("log_chirp: frequency and end_frequency must be above 0 Hz");
+        if (const char* const error = frequencyError(waveOf(proposed[shape]), proposed[frequency_],
+                                                     proposed[end_frequency]))
+            return fail(error);
         if (proposed[shape] == ExcitationShape::Multisine)
             peak_.stage(peakOfMultisine(proposed[lines]));
         return true;

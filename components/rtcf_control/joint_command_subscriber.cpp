@@ -6,18 +6,18 @@
 #include <vector>
 
 #include <sensor_msgs/JointState.h>
-#include <std_msgs/String.h>
 
 #include <rtcf/component.hpp>
 
 #include "joint_names.hpp"
+#include "joint_status.hpp"
 #include "port_array.hpp"
+#include "words.hpp"
 
 namespace rtcf_control {
 namespace {
 
 class JointCommandSubscriber final : public rtcf::Component {
-    static constexpr std::array<const char*, 3> kQuantities{"position", "velocity", "effort"};
     // The longest text of a status without names of joints, with space to spare.
     static constexpr std::size_t kStatusSize = 96;
 
@@ -37,22 +37,7 @@ class JointCommandSubscriber final : public rtcf::Component {
         NotFinite
     };
 
-    // What a status is about.
-    struct Finding {
-        Kind kind = Kind::Unknown;
-        std::uint32_t quantity = 0;
-        std::uint32_t joints = 0;  // bit i is joint i
-
-        bool operator!=(const Finding& other) const {
-            return kind != other.kind || quantity != other.quantity || joints != other.joints;
-        }
-        template <typename Visit>
-        void fields(Visit&& visit) {
-            visit("kind", kind);
-            visit("quantity", quantity);
-            visit("joints", joints);
-        }
-    };
+    using Finding = JointFinding<Kind>;
 
     struct Setup {
         std::vector<std::string> joints;
@@ -62,7 +47,7 @@ class JointCommandSubscriber final : public rtcf::Component {
     std::array<Outputs, 3> out_{makeOutputs(0), makeOutputs(1), makeOutputs(2)};
     rtcf::Output<std::uint32_t> missing{this, "missing"};
     rtcf::Output<std::uint32_t> rejected{this, "rejected"};
-    rtcf::Output<std_msgs::String> status{this, "status"};
+    JointStatus<Kind> status_{this};
 
     rtcf::Parameter<std::string> joints{this, "joints", "joint1",
                                         rtcf::Doc("names of 1 to 16 joints; fixed after the load")};
@@ -75,7 +60,6 @@ class JointCommandSubscriber final : public rtcf::Component {
         rtcf::Doc("a message without some of the joints: reject it, or use it for the others")};
     rtcf::Derived<Setup> setup_{this};
 
-    rtcf::State<Finding> finding_{this, "finding", {}, rtcf::Doc("reason of the status")};
     rtcf::State<std::uint32_t> rejected_{this, "rejections", 0,
                                          rtcf::Doc("number of rejected messages")};
 
@@ -88,17 +72,16 @@ class JointCommandSubscriber final : public rtcf::Component {
 
     bool prepare(const rtcf::Values& proposed) override {
         Setup setup{words(proposed[joints])};
-        if (const std::string why = jointsError(setup.joints); !why.empty()) return fail(why);
-        if (configured_ && setup.joints != setup_->joints)
-            return fail("joints cannot change after the load; unload the component and load it");
+        if (const std::string why =
+                jointsError(setup.joints, configured_ ? &setup_->joints : nullptr);
+            !why.empty())
+            return fail(why);
         setup_.stage(std::move(setup));
         return true;
     }
 
     bool configure() override {
-        std_msgs::String text;
-        text.data.resize(kStatusSize + namesSize(setup_->joints));
-        status.reserve(text);
+        status_.reserve(kStatusSize, setup_->joints);
         configured_ = true;
         return true;
     }
@@ -106,7 +89,7 @@ class JointCommandSubscriber final : public rtcf::Component {
     void cleanup() override { configured_ = false; }
 
     bool start() override {
-        finding_ = Finding{};
+        status_.begin();
         rejected_ = 0;
         return true;
     }
@@ -180,20 +163,14 @@ class JointCommandSubscriber final : public rtcf::Component {
         return {Kind::Accepted, 0, lacking};
     }
 
-    // Writes a status that differs from the last one, and logs each one but the normal ones.
+    // Sets the status, and logs each one but the normal ones.
     void report(const Finding& found) {
-        std::string& text = status.value().data;
-        if (found != finding_.value()) {
-            finding_ = found;
-            text.clear();
-            write(found, text);
-            status.publish();
-        }
+        const std::string& text = status_.set(found, [&](std::string& to) { append(found, to); });
         if (found.kind != Kind::Waiting && (found.kind != Kind::Accepted || found.joints != 0))
             RTCF_WARN_THROTTLE(this, 1.0, "command {}", text);
     }
 
-    void write(const Finding& found, std::string& text) const {
+    void append(const Finding& found, std::string& text) const {
         const char* const quantity = kQuantities[found.quantity];
         switch (found.kind) {
             case Kind::Unknown:

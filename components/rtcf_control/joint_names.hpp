@@ -7,7 +7,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -19,29 +18,19 @@ constexpr std::size_t kMostJoints = 16;
 /// Of a message; bounds the work of a cycle.
 constexpr std::size_t kMostNames = 1024;
 
-/// Words separated by spaces or commas. Not real-time safe.
-inline std::vector<std::string> words(const std::string& text) {
-    std::vector<std::string> found;
-    std::string word;
-    for (const char c : text + " ") {
-        if (c != ',' && std::isspace(static_cast<unsigned char>(c)) == 0) {
-            word += c;
-        } else if (!word.empty()) {
-            found.push_back(word);
-            word.clear();
-        }
-    }
-    return found;
-}
-
 /// Reason why a list cannot be the parameter `joints`; empty if it can. Not real-time safe.
-inline std::string jointsError(const std::vector<std::string>& joints) {
+/// @param loaded joints of the loaded component, which cannot change; null before the load
+inline std::string jointsError(const std::vector<std::string>& joints,
+                               const std::vector<std::string>* loaded = nullptr) {
     if (joints.empty() || joints.size() > kMostJoints)
         return fmt::format("joints has {} names; write 1 to {}", joints.size(), kMostJoints);
     std::vector<std::string> sorted = joints;
     std::sort(sorted.begin(), sorted.end());
     const auto twice = std::adjacent_find(sorted.begin(), sorted.end());
-    return twice == sorted.end() ? std::string() : fmt::format("joints has {} twice", *twice);
+    if (twice != sorted.end()) return fmt::format("joints has {} twice", *twice);
+    if (loaded != nullptr && joints != *loaded)
+        return "joints cannot change after the load; unload the component and load it";
+    return {};
 }
 
 /// Places of joints in the arrays of a message.

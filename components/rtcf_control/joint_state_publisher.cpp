@@ -8,18 +8,18 @@
 #include <vector>
 
 #include <sensor_msgs/JointState.h>
-#include <std_msgs/String.h>
 
 #include <rtcf/component.hpp>
 
 #include "joint_names.hpp"
+#include "joint_status.hpp"
 #include "port_array.hpp"
+#include "words.hpp"
 
 namespace rtcf_control {
 namespace {
 
 class JointStatePublisher final : public rtcf::Component {
-    static constexpr std::array<const char*, 3> kQuantities{"position", "velocity", "effort"};
     // The longest text of a status without names of joints, with space to spare.
     static constexpr std::size_t kStatusSize = 64;
 
@@ -27,22 +27,7 @@ class JointStatePublisher final : public rtcf::Component {
 
     enum class Kind : std::int32_t { Unknown, Waiting, Complete, Missing, NotFinite };
 
-    // What a status is about.
-    struct Finding {
-        Kind kind = Kind::Unknown;
-        std::uint32_t quantity = 0;
-        std::uint32_t joints = 0;  // bit i is joint i
-
-        bool operator!=(const Finding& other) const {
-            return kind != other.kind || quantity != other.quantity || joints != other.joints;
-        }
-        template <typename Visit>
-        void fields(Visit&& visit) {
-            visit("kind", kind);
-            visit("quantity", quantity);
-            visit("joints", joints);
-        }
-    };
+    using Finding = JointFinding<Kind>;
 
     struct Setup {
         std::vector<std::string> joints;
@@ -53,7 +38,7 @@ class JointStatePublisher final : public rtcf::Component {
                               makePorts<rtcf::Input<double>, kMostJoints>(this, kQuantities[2])};
     rtcf::Output<sensor_msgs::JointState> state{this, "state", "", rtcf::Finite()};
     rtcf::Output<std::uint32_t> missing{this, "missing"};
-    rtcf::Output<std_msgs::String> status{this, "status"};
+    JointStatus<Kind> status_{this};
 
     rtcf::Parameter<std::string> joints{this, "joints", "joint1",
                                         rtcf::Doc("names of 1 to 16 joints; fixed after the load")};
@@ -62,15 +47,14 @@ class JointStatePublisher final : public rtcf::Component {
         rtcf::Min(0.0), rtcf::Unit("s"), rtcf::Doc("age from which a value counts as missing")};
     rtcf::Derived<Setup> setup_{this};
 
-    rtcf::State<Finding> finding_{this, "finding", {}, rtcf::Doc("reason of the status")};
-
     bool configured_ = false;
 
     bool prepare(const rtcf::Values& proposed) override {
         Setup setup{words(proposed[joints])};
-        if (const std::string why = jointsError(setup.joints); !why.empty()) return fail(why);
-        if (configured_ && setup.joints != setup_->joints)
-            return fail("joints cannot change after the load; unload the component and load it");
+        if (const std::string why =
+                jointsError(setup.joints, configured_ ? &setup_->joints : nullptr);
+            !why.empty())
+            return fail(why);
         setup_.stage(std::move(setup));
         return true;
     }
@@ -83,9 +67,7 @@ class JointStatePublisher final : public rtcf::Component {
         sample.velocity.resize(count);
         sample.effort.resize(count);
         state.reserve(sample);
-        std_msgs::String text;
-        text.data.resize(kStatusSize + namesSize(setup_->joints));
-        status.reserve(text);
+        status_.reserve(kStatusSize, setup_->joints);
         configured_ = true;
         return true;
     }
@@ -93,7 +75,7 @@ class JointStatePublisher final : public rtcf::Component {
     void cleanup() override { configured_ = false; }
 
     bool start() override {
-        finding_ = Finding{};
+        status_.begin();
         return true;
     }
 
@@ -158,31 +140,29 @@ class JointStatePublisher final : public rtcf::Component {
         return part;
     }
 
-    // Writes a status that differs from the last one, and logs each one but the normal ones.
+    // Sets the status, and logs each one but the normal ones.
     void report(const Finding& found) {
-        std::string& text = status.value().data;
-        if (found != finding_.value()) {
-            finding_ = found;
-            text.clear();
-            switch (found.kind) {
-                case Kind::Unknown:
-                case Kind::Waiting:
-                    text.append("waiting: no input has a value");
-                    break;
-                case Kind::Complete:
-                    text.append("complete");
-                    break;
-                case Kind::Missing:
-                case Kind::NotFinite:
-                    text.append(found.kind == Kind::Missing ? "no " : "not finite: ");
-                    text.append(kQuantities[found.quantity]).append(" of ");
-                    appendNames(text, setup_->joints, found.joints);
-                    break;
-            }
-            status.publish();
-        }
+        const std::string& text = status_.set(found, [&](std::string& to) { append(found, to); });
         if (found.kind == Kind::Missing || found.kind == Kind::NotFinite)
             RTCF_WARN_THROTTLE(this, 1.0, "state is not written: {}", text);
+    }
+
+    void append(const Finding& found, std::string& text) const {
+        switch (found.kind) {
+            case Kind::Unknown:
+            case Kind::Waiting:
+                text.append("waiting: no input has a value");
+                break;
+            case Kind::Complete:
+                text.append("complete");
+                break;
+            case Kind::Missing:
+            case Kind::NotFinite:
+                text.append(found.kind == Kind::Missing ? "no " : "not finite: ");
+                text.append(kQuantities[found.quantity]).append(" of ");
+                appendNames(text, setup_->joints, found.joints);
+                break;
+        }
     }
 };
 

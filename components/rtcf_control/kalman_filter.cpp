@@ -1,13 +1,10 @@
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 #include <algorithm>
 #include <cmath>
-#include <complex>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <optional>
 #include <string>
 #include <utility>
 
@@ -17,7 +14,8 @@
 
 #include "linear/discretisation.hpp"
 #include "linear/matrix_text.hpp"
-#include "linear/riccati.hpp"
+#include "linear/small_matrix.hpp"
+#include "linear/steady_filter.hpp"
 #include "port_array.hpp"
 
 namespace rtcf_control {
@@ -25,14 +23,7 @@ namespace {
 
 class KalmanFilter final : public rtcf::Component {
     static constexpr std::size_t kPorts = kMostStates;
-    // Steps of the model in one cycle, after missed cycles; bounds the work.
-    static constexpr std::int64_t kMostSteps = 10;
-
     using MatrixXd = Eigen::MatrixXd;
-    // In the cycle, without allocation.
-    using SmallMatrix =
-        Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostStates, kMostStates>;
-    using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostStates, 1>;
     // Declared state.
     using Numbers = Eigen::Matrix<double, kMostStates, 1>;
     using Square = Eigen::Matrix<double, kMostStates, kMostStates>;
@@ -150,18 +141,15 @@ class KalmanFilter final : public rtcf::Component {
         MatrixXd uncertain;
         MatrixXd first_covariance;
         Eigen::VectorXd first;
-        if (std::string error = readWeight(proposed[process_noise], n, false, noise);
-            !error.empty())
-            return "process_noise: " + error;
-        if (std::string error = readWeight(proposed[measurement_noise], p, true, uncertain);
-            !error.empty())
-            return "measurement_noise: " + error;
-        if (std::string error = readVector(proposed[initial], n, first); !error.empty())
-            return "initial: " + error;
-        if (std::string error =
-                readWeight(proposed[initial_covariance], n, false, first_covariance);
-            !error.empty())
-            return "initial_covariance: " + error;
+        std::string error = readWeight("process_noise", proposed[process_noise], n, false, noise);
+        if (error.empty())
+            error =
+                readWeight("measurement_noise", proposed[measurement_noise], p, true, uncertain);
+        if (error.empty()) error = readVector("initial", proposed[initial], n, first);
+        if (error.empty())
+            error = readWeight("initial_covariance", proposed[initial_covariance], n, false,
+                               first_covariance);
+        if (!error.empty()) return error;
         if (proposed[form] == Form::Zoh) {
             const double period_s = design_period_.proposedSeconds();
             noise = sampledNoise(a_given, noise, period_s);
@@ -186,31 +174,18 @@ class KalmanFilter final : public rtcf::Component {
     static std::string steadyState(Design& made) {
         const MatrixXd a = made.a;
         const MatrixXd c = made.c;
-        if (const auto mode = unstabilizableMode(a.transpose(), c.transpose()))
-            return "A, C: the measurements do not show the mode at z = " + text(*mode) +
-                   ", so there is no steady state";
-        if (const auto mode = unstabilizableMode(a, made.process_noise))
-            return "A, process_noise: no noise moves the mode at z = " + text(*mode) +
-                   ", so there is no steady state";
-        const auto found =
-            solveRiccati(a.transpose(), c.transpose(), made.process_noise, made.measurement_noise);
+        if (const std::string error = steadyFilterError(a, c, made.process_noise); !error.empty())
+            return error + ", so there is no steady state";
+        const auto found = steadyFilter(a, c, made.process_noise, made.measurement_noise);
         if (!found)
             return "the Riccati equation has no solution: scale the noises and the matrices";
-        const MatrixXd gain = (c * found->x * c.transpose() + MatrixXd(made.measurement_noise))
-                                  .llt()
-                                  .solve(c * found->x)
-                                  .transpose();
+        const MatrixXd& gain = found->gain;
         const MatrixXd kept = MatrixXd::Identity(a.rows(), a.rows()) - gain * c;
         made.gain = gain;
         made.corrected_covariance =
-            MatrixXd(kept * found->x * kept.transpose() +
+            MatrixXd(kept * found->predicted_covariance * kept.transpose() +
                      gain * MatrixXd(made.measurement_noise) * gain.transpose());
         return {};
-    }
-
-    static std::string text(const std::complex<double>& z) {
-        return z.imag() == 0.0 ? fmt::format("{:.6g}", z.real())
-                               : fmt::format("{:.6g}{:+.6g}j", z.real(), z.imag());
     }
 
     bool start() override {
@@ -310,9 +285,7 @@ class KalmanFilter final : public rtcf::Component {
             if (design.previous) x += design.b.lazyProduct(held);
             return;
         }
-        const std::int64_t steps =
-            std::clamp<std::int64_t>((elapsed() + period() / 2) / period(), 1, kMostSteps);
-        for (std::int64_t i = 0; i < steps; ++i) {
+        for (std::int64_t i = modelSteps(elapsed(), period()); i > 0; --i) {
             x = (design.a.lazyProduct(x) + design.b.lazyProduct(held)).eval();
             covariance = predictedCovariance(covariance);
         }

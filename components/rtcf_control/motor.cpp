@@ -255,12 +255,15 @@ class Motor final : public rtcf::Component {
         return std::clamp(free, -torque_limit.value(), torque_limit.value());
     }
 
+    // Torque of an elastic shaft against the rotor, N m.
+    double shaftTorque(const Motion& motion) const noexcept {
+        return stiffness * (motion.angle - motion.load_angle) +
+               damping * (motion.speed - motion.load_speed);
+    }
+
     // Torque on the rotor without its friction, N m.
     double applied(const Motion& motion, double wanted, double load) const noexcept {
-        const double shaft = stiffness > 0.0 ? stiffness * (motion.angle - motion.load_angle) +
-                                                   damping * (motion.speed - motion.load_speed)
-                                             : load;
-        return torqueOf(motion, wanted) - shaft;
+        return torqueOf(motion, wanted) - (stiffness > 0.0 ? shaftTorque(motion) : load);
     }
 
     // Rates of change. `direction` is that of the dry friction, 0 = the rotor sticks.
@@ -282,10 +285,8 @@ class Motor final : public rtcf::Component {
             rate.load_angle = rate.angle;
             rate.load_speed = rate.speed;
         } else {
-            const double shaft = stiffness * (motion.angle - motion.load_angle) +
-                                 damping * (motion.speed - motion.load_speed);
             rate.load_angle = motion.load_speed;
-            rate.load_speed = (shaft - load) / load_inertia;
+            rate.load_speed = (shaftTorque(motion) - load) / load_inertia;
         }
         if (drive == MotorCommand::Voltage && inductance > 0.0)
             rate.current = (wanted - resistance * motion.current - torque_constant * motion.speed) /

@@ -80,9 +80,9 @@ class SignalGenerator final : public rtcf::Component {
         if (proposed[lower] > proposed[upper])
             return RTCF_FAIL(this, "lower = {} is above upper = {}", proposed[lower],
                              proposed[upper]);
-        if (proposed[shape] == Shape::LogChirp &&
-            (proposed[frequency_] <= 0.0 || proposed[end_frequency] <= 0.0))
-            return fail("log_chirp: frequency and end_frequency must be above 0 Hz");
+        if (const char* const error =
+                frequencyError(proposed[shape], proposed[frequency_], proposed[end_frequency]))
+            return fail(error);
         if (proposed[shape] == Shape::Multisine) peak_.stage(peakOfMultisine(proposed[lines]));
         return true;
     }

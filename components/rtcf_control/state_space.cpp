@@ -22,6 +22,8 @@
 #include "linear/matrix_text.hpp"
 #include "linear/pole_placement.hpp"
 #include "linear/riccati.hpp"
+#include "linear/small_matrix.hpp"
+#include "linear/steady_filter.hpp"
 #include "port_array.hpp"
 
 namespace rtcf_control {
@@ -30,10 +32,6 @@ namespace {
 class StateSpace final : public rtcf::Component {
     static constexpr std::size_t kPorts = kMostStates;
     using MatrixXd = Eigen::MatrixXd;
-    // In the cycle, without allocation.
-    using SmallMatrix =
-        Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMostStates, kMostStates>;
-    using SmallVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMostStates, 1>;
     // Declared state.
     using Numbers = Eigen::Matrix<double, kMostStates, 1>;
 
@@ -41,9 +39,6 @@ class StateSpace final : public rtcf::Component {
     enum class Role { System, Observer, Regulator, Lqg };
     enum class Gain { Kalman, Poles };
     enum class InputTime { Present, Previous };
-
-    // Steps of the model in one cycle, after missed cycles; bounds the work.
-    static constexpr std::int64_t kMostSteps = 10;
 
     // For one period of the loop.
     struct Design {
@@ -220,10 +215,9 @@ class StateSpace final : public rtcf::Component {
 
         std::string initialState() {
             Eigen::VectorXd first;
-            const std::string error = readVector(proposed[of.initial], states(), first);
-            if (!error.empty()) return "initial: " + error;
-            made.initial = first;
-            return {};
+            std::string error = readVector("initial", proposed[of.initial], states(), first);
+            if (error.empty()) made.initial = first;
+            return error;
         }
 
         std::string discretise() {
@@ -268,25 +262,20 @@ class StateSpace final : public rtcf::Component {
         std::string kalmanGain() {
             MatrixXd noise;
             MatrixXd uncertain;
-            if (std::string error = readWeight(proposed[of.process_noise], states(), false, noise);
-                !error.empty())
-                return "process_noise: " + error;
-            if (std::string error =
-                    readWeight(proposed[of.measurement_noise], outputs(), true, uncertain);
-                !error.empty())
-                return "measurement_noise: " + error;
+            std::string error =
+                readWeight("process_noise", proposed[of.process_noise], states(), false, noise);
+            if (error.empty())
+                error = readWeight("measurement_noise", proposed[of.measurement_noise], outputs(),
+                                   true, uncertain);
+            if (!error.empty()) return error;
             if (form() != Form::Discrete) noise = sampledNoise(a, noise, period_s);
-            if (const auto mode = unstabilizableMode(moved.transpose(), c.transpose()))
-                return "A, C: the measurements do not show the mode at z = " + text(*mode);
-            if (const auto mode = unstabilizableMode(moved, noise))
-                return "A, process_noise: no noise moves the mode at z = " + text(*mode);
-            const auto found = solveRiccati(moved.transpose(), c.transpose(), noise, uncertain);
+            error = steadyFilterError(moved, c, noise);
+            if (!error.empty()) return error;
+            const auto found = steadyFilter(moved, c, noise, uncertain);
             if (!found)
                 return "the Riccati equation of the observer has no solution: scale the noises "
                        "and the matrices";
-            const MatrixXd& p = found->x;
-            made.correction =
-                MatrixXd((c * p * c.transpose() + uncertain).llt().solve(c * p).transpose());
+            made.correction = found->gain;
             return {};
         }
 
@@ -301,7 +290,7 @@ class StateSpace final : public rtcf::Component {
                 const std::complex<double> given = pole;
                 if (form() != Form::Discrete) pole = std::exp(period_s * pole);
                 if (std::abs(pole) >= 1.0)
-                    return fmt::format("observer_poles: {} is not stable", text(given));
+                    return fmt::format("observer_poles: {} is not stable", complexText(given));
             }
             // The error of the estimate moves by (1 - M C) A.
             const auto gain = placePoles(moved.transpose(), (c * moved).transpose(), poles);
@@ -318,27 +307,26 @@ class StateSpace final : public rtcf::Component {
             if (inputs() == 0) return "B is empty: LQR needs an input";
             MatrixXd q;
             MatrixXd r;
-            if (std::string error = readWeight(proposed[of.state_cost], states(), false, q);
-                !error.empty())
-                return "state_cost: " + error;
-            if (std::string error = readWeight(proposed[of.input_cost], inputs(), true, r);
-                !error.empty())
-                return "input_cost: " + error;
+            std::string error =
+                readWeight("state_cost", proposed[of.state_cost], states(), false, q);
+            if (error.empty())
+                error = readWeight("input_cost", proposed[of.input_cost], inputs(), true, r);
+            if (!error.empty()) return error;
             SampledCost cost{q, MatrixXd::Zero(states(), inputs()), r};
             if (form() != Form::Discrete) cost = sampledCost(a, b, q, r, period_s);
             if (const auto mode = unstabilizableMode(moved, driven))
-                return "A, B: the inputs do not move the mode at z = " + text(*mode);
+                return "A, B: the inputs do not move the mode at z = " + complexText(*mode);
             const MatrixXd without = cost.r.ldlt().solve(cost.n.transpose());
             if (const auto mode = unstabilizableMode((moved - driven * without).transpose(),
                                                      cost.q - cost.n * without))
-                return "A, state_cost: no cost weighs the mode at z = " + text(*mode);
+                return "A, state_cost: no cost weighs the mode at z = " + complexText(*mode);
             const auto found = solveRiccati(moved, driven, cost.q, cost.r, &cost.n);
             if (!found)
                 return "the Riccati equation of the regulator has no solution: scale the costs "
                        "and the matrices";
             made.feedback = found->k;
-            if (std::string error = designTargets(); !error.empty()) return error;
-            return readLimits();
+            error = designTargets();
+            return error.empty() ? readLimits() : error;
         }
 
         // State and input that hold the tracked outputs at their setpoints.
@@ -390,13 +378,11 @@ class StateSpace final : public rtcf::Component {
             Eigen::VectorXd low;
             Eigen::VectorXd high;
             Eigen::VectorXd safe;
-            if (std::string error = readVector(proposed[of.lower], inputs(), low); !error.empty())
-                return "lower: " + error;
-            if (std::string error = readVector(proposed[of.upper], inputs(), high); !error.empty())
-                return "upper: " + error;
-            if (std::string error = readVector(proposed[of.safe_value], inputs(), safe);
-                !error.empty())
-                return "safe_value: " + error;
+            std::string error = readVector("lower", proposed[of.lower], inputs(), low);
+            if (error.empty()) error = readVector("upper", proposed[of.upper], inputs(), high);
+            if (error.empty())
+                error = readVector("safe_value", proposed[of.safe_value], inputs(), safe);
+            if (!error.empty()) return error;
             for (int i = 0; i < inputs(); ++i) {
                 if (low[i] > high[i])
                     return fmt::format("out{}: lower = {} is above upper = {}", i + 1, low[i],
@@ -440,11 +426,6 @@ class StateSpace final : public rtcf::Component {
                     add(*each);
             }
             made.identity = hash;
-        }
-
-        static std::string text(const std::complex<double>& z) {
-            return z.imag() == 0.0 ? fmt::format("{:.6g}", z.real())
-                                   : fmt::format("{:.6g}{:+.6g}j", z.real(), z.imag());
         }
     };
 
@@ -570,9 +551,7 @@ class StateSpace final : public rtcf::Component {
             if (design.previous) x += design.b.lazyProduct(held);
             return x;
         }
-        const std::int64_t steps =
-            std::clamp<std::int64_t>((elapsed() + period() / 2) / period(), 1, kMostSteps);
-        for (std::int64_t i = 0; i < steps; ++i)
+        for (std::int64_t i = modelSteps(elapsed(), period()); i > 0; --i)
             x = (design.a.lazyProduct(x) + design.b.lazyProduct(held)).eval();
         return x;
     }

@@ -19,6 +19,7 @@
 #include "trajectory/stop_motion.hpp"
 #include "trajectory/synchronized_motion.hpp"
 #include "trajectory/trajectory_points.hpp"
+#include "words.hpp"
 
 namespace rtcf_control {
 namespace {
@@ -251,9 +252,9 @@ class TrajectoryGenerator final : public rtcf::Component {
         Setup setup;
         setup.joints = words(proposed[joints]);
         const std::size_t count = setup.joints.size();
-        if (const std::string why = jointsError(setup.joints); !why.empty()) return fail(why);
-        if (memory_ && setup.joints != setup_->joints)
-            return fail("joints cannot change after the load; unload the component and load it");
+        if (const std::string why = jointsError(setup.joints, memory_ ? &setup_->joints : nullptr);
+            !why.empty())
+            return fail(why);
         Numbers numbers{};
         constexpr Condition kLimit{[](double x) { return std::isfinite(x) && x > 0.0; },
                                    "finite and above 0"};

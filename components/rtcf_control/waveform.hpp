@@ -35,10 +35,16 @@ inline double peakOfMultisine(int lines) {
     return peak;
 }
 
+/// Reason why the frequencies of a signal do not fit its form; null if they do.
+inline const char* frequencyError(Shape shape, double frequency, double end_frequency) noexcept {
+    const bool is_wrong = shape == Shape::LogChirp && (frequency <= 0.0 || end_frequency <= 0.0);
+    return is_wrong ? "log_chirp: frequency and end_frequency must be above 0 Hz" : nullptr;
+}
+
 /// Nanoseconds of a time in s.
 inline std::int64_t nanoseconds(double seconds) noexcept { return std::llround(seconds * 1e9); }
 
-/// What a signal is, from the parameters of its component.
+/// A signal, from the parameters of its component.
 struct Waveform {
     Shape shape = Shape::Sine;
     double frequency = 1.0;      ///< Hz; of a chirp the first, of a PRBS the bits per second

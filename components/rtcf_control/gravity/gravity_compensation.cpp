@@ -9,6 +9,7 @@
 #include <fstream>
 #include <memory>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -19,6 +20,7 @@
 
 #include "gravity/robot_chain.hpp"
 #include "joint_names.hpp"
+#include "words.hpp"
 
 namespace rtcf_control {
 namespace {
@@ -215,12 +217,11 @@ class GravityCompensation final : public rtcf::Component {
     }
 
     static std::uint64_t hash(const std::string& text, std::uint64_t seed) {
-        // FNV-1a; a NUL separates texts.
-        for (const char c : text) seed = (seed ^ static_cast<unsigned char>(c)) * 0x100000001b3ULL;
-        return seed * 0x100000001b3ULL;
+        // The final NUL separates texts.
+        return rtcf::detail::stateHash(std::string_view(text.c_str(), text.size() + 1), seed);
     }
     Identity identityOf(const std::string& text) const {
-        constexpr std::uint64_t kSeed = 0xcbf29ce484222325ULL;
+        constexpr std::uint64_t kSeed = rtcf::detail::stateHash("");
         Identity identity;
         identity.robot =
             hash(setup_->selection.tip, hash(setup_->selection.base, hash(text, kSeed)));

@@ -5,10 +5,11 @@
 #include <Eigen/Eigenvalues>
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstdlib>
 #include <sstream>
+
+#include "words.hpp"
 
 namespace rtcf_control {
 namespace {
@@ -16,13 +17,8 @@ namespace {
 // Relative to the largest element: symmetry of a matrix, and eigenvalues that count as 0.
 constexpr double kRounding = 1e-9;
 
-std::vector<std::string> words(const std::string& text) {
-    std::string spaced = text;
-    std::replace(spaced.begin(), spaced.end(), ',', ' ');
-    std::istringstream stream(spaced);
-    std::vector<std::string> found;
-    for (std::string word; stream >> word;) found.push_back(word);
-    return found;
+std::string named(const char* name, const std::string& error) {
+    return fmt::format("{}: {}", name, error);
 }
 
 // Returns empty, or the text that is not a finite number.
@@ -67,7 +63,7 @@ std::string readSystem(const SystemText& text, Eigen::MatrixXd& a, Eigen::Matrix
                        Eigen::MatrixXd& c, Eigen::MatrixXd& d) {
     const auto read = [](const char* name, const std::string& given, Eigen::MatrixXd& matrix) {
         const std::string error = readMatrix(given, matrix);
-        return error.empty() ? error : fmt::format("{}: {}", name, error);
+        return error.empty() ? error : named(name, error);
     };
     if (std::string error = read("A", text.a, a); !error.empty()) return error;
     if (std::string error = read("B", text.b, b); !error.empty()) return error;
@@ -94,9 +90,11 @@ std::string readSystem(const SystemText& text, Eigen::MatrixXd& a, Eigen::Matrix
     return {};
 }
 
-std::string readWeight(const std::string& text, int size, bool definite, Eigen::MatrixXd& matrix) {
+std::string readWeight(const char* name, const std::string& text, int size, bool definite,
+                       Eigen::MatrixXd& matrix) {
     Eigen::MatrixXd given;
-    if (std::string error = readMatrix(text, given); !error.empty()) return error;
+    if (const std::string error = readMatrix(text, given); !error.empty())
+        return named(name, error);
     if (given.rows() == size && given.cols() == size) {
         matrix = given;
     } else if (given.rows() == 1 && given.cols() == size) {
@@ -104,31 +102,33 @@ std::string readWeight(const std::string& text, int size, bool definite, Eigen::
     } else if (given.size() == 1) {
         matrix = given(0, 0) * Eigen::MatrixXd::Identity(size, size);
     } else {
-        return fmt::format("{} x {} numbers; write 1, {} or {} x {}", given.rows(), given.cols(),
-                           size, size, size);
+        return fmt::format("{}: {} x {} numbers; write 1, {} or {} x {}", name, given.rows(),
+                           given.cols(), size, size, size);
     }
     if (size == 0) return {};
     const double scale = matrix.cwiseAbs().maxCoeff();
     if ((matrix - matrix.transpose()).cwiseAbs().maxCoeff() > kRounding * scale)
-        return "the matrix is not symmetric";
+        return named(name, "the matrix is not symmetric");
     matrix = (0.5 * (matrix + matrix.transpose())).eval();
     const double lowest =
         Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(matrix, Eigen::EigenvaluesOnly)
             .eigenvalues()
             .minCoeff();
     if (definite && lowest <= 0.0)
-        return fmt::format("the eigenvalue {:.6g} is not above 0", lowest);
-    if (lowest < -kRounding * scale) return fmt::format("the eigenvalue {:.6g} is below 0", lowest);
+        return fmt::format("{}: the eigenvalue {:.6g} is not above 0", name, lowest);
+    if (lowest < -kRounding * scale)
+        return fmt::format("{}: the eigenvalue {:.6g} is below 0", name, lowest);
     return {};
 }
 
-std::string readVector(const std::string& text, int size, Eigen::VectorXd& vector) {
+std::string readVector(const char* name, const std::string& text, int size,
+                       Eigen::VectorXd& vector) {
     std::vector<double> numbers;
     if (const std::string wrong = readNumbers(text, numbers); !wrong.empty())
-        return fmt::format("{} is not a number", wrong);
+        return fmt::format("{}: {} is not a number", name, wrong);
     const auto count = static_cast<std::size_t>(size);
     if (numbers.size() != 1 && numbers.size() != count)
-        return fmt::format("{} numbers; write {}, or one for all", numbers.size(), size);
+        return fmt::format("{}: {} numbers; write {}, or one for all", name, numbers.size(), size);
     vector.resize(size);
     for (Eigen::Index i = 0; i < size; ++i)
         vector[i] = numbers[numbers.size() == 1 ? 0 : static_cast<std::size_t>(i)];
@@ -162,6 +162,11 @@ std::string readPoles(const std::string& text, std::vector<std::complex<double>>
                                pole.real(), -pole.imag());
     }
     return {};
+}
+
+std::string complexText(const std::complex<double>& z) {
+    return z.imag() == 0.0 ? fmt::format("{:.6g}", z.real())
+                           : fmt::format("{:.6g}{:+.6g}j", z.real(), z.imag());
 }
 
 }  // namespace rtcf_control

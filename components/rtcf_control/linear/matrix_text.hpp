@@ -33,16 +33,23 @@ std::string readSystem(const SystemText& text, Eigen::MatrixXd& a, Eigen::Matrix
 
 /// Reads a symmetric matrix of `size` rows without negative eigenvalues: in full, or its diagonal
 /// as one row, or one number for all elements of the diagonal.
+/// @param name of the parameter, with which an error begins
 /// @param definite true = eigenvalues of 0 are errors, too
 /// @return empty, or the error
-std::string readWeight(const std::string& text, int size, bool definite, Eigen::MatrixXd& matrix);
+std::string readWeight(const char* name, const std::string& text, int size, bool definite,
+                       Eigen::MatrixXd& matrix);
 
 /// Reads `size` numbers, or one number for all of them.
+/// @param name of the parameter, with which an error begins
 /// @return empty, or the error
-std::string readVector(const std::string& text, int size, Eigen::VectorXd& vector);
+std::string readVector(const char* name, const std::string& text, int size,
+                       Eigen::VectorXd& vector);
 
 /// Reads complex numbers such as "-3 -2+1j -2-1j"; they must be pairs of conjugates.
 /// @return empty, or the error
 std::string readPoles(const std::string& text, std::vector<std::complex<double>>& poles);
+
+/// A number as in messages, such as "-2" or "-2+1j".
+std::string complexText(const std::complex<double>& z);
 
 }  // namespace rtcf_control

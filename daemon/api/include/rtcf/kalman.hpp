@@ -8,14 +8,14 @@
 ///     class PendulumFilter final : public rtcf::ExtendedKalmanFilter<2, 1, 1> {
 ///        public:
 ///         PendulumFilter()
-///             : ExtendedKalmanFilter({{{"angle", "rad"}, {"rate", "rad/s"}}}, {{{"torque", "N
-///             m"}}},
-///                                    {{{"encoder", "rad"}}}) {}
+///             : ExtendedKalmanFilter({{{"angle", "rad"}, {"rate", "rad/s"}}},
+///                                    {{{"torque", "N m"}}}, {{{"encoder", "rad"}}}) {}
 ///
 ///        private:
-///         void predict(State& x, const Input& u, double dt, StateMatrix& jacobian) const override;
-///         void measure(const State& x, Measurement& y, MeasurementMatrix& jacobian) const
-///         override;
+///         void predict(State& x, const Input& u, double dt,
+///                      StateMatrix& jacobian) const override;
+///         void measure(const State& x, Measurement& y,
+///                      MeasurementMatrix& jacobian) const override;
 ///     };
 #pragma once
 
@@ -90,8 +90,8 @@ void solveBackward(const Factor& l, Matrix& b) noexcept {
 struct KalmanCorrection {
     bool valid = true;       ///< false = the covariance is not positive definite; nothing changed
     std::uint32_t used = 0;  ///< number of measurements used
-    double squared_error =
-        0.0;  ///< innovation' S^-1 innovation: about `used` if the noises are right
+    /// innovation' S^-1 innovation: about `used` if the noises are right
+    double squared_error = 0.0;
 };
 
 /// Corrects an estimate by the measurements that are present, in Joseph's form, which keeps the
