@@ -44,6 +44,12 @@ class Biquad(Component):
         return 1.0, 0.0, 1.0
 
     def update(self):
+        self.run()
+
+    def safe(self):
+        self.run()  # passes on the safe command of a component in front
+
+    def run(self):
         if not self.u.valid:
             return
         x = self.u.value

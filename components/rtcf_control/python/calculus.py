@@ -16,7 +16,17 @@ class Method(enum.IntEnum):
     trapezoid = 1
 
 
-class Integrator(Component):
+class _Block(Component):
+    """In the last cycle as in any other: passes on the safe command of a component in front."""
+
+    def update(self):
+        self.run()
+
+    def safe(self):
+        self.run()
+
+
+class Integrator(_Block):
     """Integral over time within limits, with a reset."""
 
     u: Input[float]
@@ -40,7 +50,7 @@ class Integrator(Component):
         self.sum = self.initial
         self.last = None
 
-    def update(self):
+    def run(self):
         rate = self.gain * self.u.value if self.u.valid else 0.0
         is_reset = self.reset.valid and self.reset.value
         if not is_reset and not math.isfinite(rate):
@@ -56,7 +66,7 @@ class Integrator(Component):
         self.y.write(self.sum)
 
 
-class Derivative(Component):
+class Derivative(_Block):
     """Rate of change with a first-order filter, by backward differences (Åström & Hägglund,
     Advanced PID Control, 2006, chapter 13).
     """
@@ -76,7 +86,7 @@ class Derivative(Component):
         self.gap = 0.0
         self.last = None
 
-    def update(self):
+    def run(self):
         if not self.u.valid:
             return
         value = self.u.value
@@ -97,7 +107,7 @@ class Derivative(Component):
             self.rate = 0.0
 
 
-class MovingAverage(Component):
+class MovingAverage(_Block):
     """Mean of the last values; while the window is not full, of all values.
 
     Unlike the component in C++, it begins again after a change of its length.
@@ -116,7 +126,7 @@ class MovingAverage(Component):
     def start(self):
         self.ring = 0
 
-    def update(self):
+    def run(self):
         if not self.u.valid:
             return
         value = self.u.value

@@ -6,7 +6,17 @@ import numpy as np
 from rtcf.component import Component, Input, Output, Parameter, State
 
 
-class Saturation(Component):
+class _Block(Component):
+    """In the last cycle as in any other: passes on the safe command of a component in front."""
+
+    def update(self):
+        self.run()
+
+    def safe(self):
+        self.run()
+
+
+class Saturation(_Block):
     """Limits a value to a range."""
 
     u: Input[float]
@@ -19,7 +29,7 @@ class Saturation(Component):
         if self.lower > self.upper:
             raise ValueError("lower is above upper")
 
-    def update(self):
+    def run(self):
         if not self.u.valid:
             return
         value = self.u.value
@@ -31,7 +41,7 @@ class Saturation(Component):
         self.saturated.write(limited != value)
 
 
-class RateLimiter(Component):
+class RateLimiter(_Block):
     """Limits the rate of change; the first value passes unlimited."""
 
     u: Input[float]
@@ -48,7 +58,7 @@ class RateLimiter(Component):
     def start(self):
         self.last = None
 
-    def update(self):
+    def run(self):
         if not self.u.valid:
             return
         value = self.u.value
@@ -61,7 +71,7 @@ class RateLimiter(Component):
         self.limited.write(self.last != value)
 
 
-class DeadBand(Component):
+class DeadBand(_Block):
     """0 within a band, else the distance to the nearer end of the band."""
 
     u: Input[float]
@@ -73,7 +83,7 @@ class DeadBand(Component):
         if self.lower > self.upper:
             raise ValueError("lower is above upper")
 
-    def update(self):
+    def run(self):
         if self.u.valid:
             value = self.u.value
             self.y.write(
@@ -81,7 +91,7 @@ class DeadBand(Component):
             )
 
 
-class Backlash(Component):
+class Backlash(_Block):
     """Mechanical play: the play operator (Brokate & Sprekels, Hysteresis and Phase Transitions)."""
 
     u: Input[float]
@@ -92,7 +102,7 @@ class Backlash(Component):
     def start(self):
         self.position = None
 
-    def update(self):
+    def run(self):
         if not self.u.valid:
             return
         drive = self.u.value
@@ -104,7 +114,7 @@ class Backlash(Component):
         self.y.write(self.position)
 
 
-class Hysteresis(Component):
+class Hysteresis(_Block):
     """Schmitt trigger: true above high, false below low, else unchanged."""
 
     u: Input[float]
@@ -122,7 +132,7 @@ class Hysteresis(Component):
     def start(self):
         self.begun = False
 
-    def update(self):
+    def run(self):
         if not self.u.valid:
             return
         if not self.begun:

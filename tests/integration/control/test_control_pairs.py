@@ -12,6 +12,7 @@ import pytest
 from daemon_process import BUILD_TREE
 from pages import TREE
 from rtcf.testing import Bench
+from values import wait_until_after
 
 SOURCES = TREE / "components" / "rtcf_control" / "python"
 ROUNDING = 1e-12  # relative, of values of size 1
@@ -20,7 +21,8 @@ STEPS = 2000
 SIGNAL = np.repeat(np.random.default_rng(7).normal(0.0, 2.0, STEPS // 50), 50)
 SIGNAL = SIGNAL + 0.2 * np.random.default_rng(8).normal(size=STEPS)
 SIGNAL[[100, 101, 700, 1500]] = np.nan, np.inf, -np.inf, np.nan
-RESET = np.arange(STEPS) % 600 > 590
+CYCLE = np.arange(STEPS)
+RESET = CYCLE % 600 > 590
 
 # By pair: the parameters of both, and of the one in C++ if they differ.
 PAIRS: list[tuple[str, str, Mapping[str, Any], Mapping[str, Any] | None]] = [
@@ -42,6 +44,10 @@ PAIRS: list[tuple[str, str, Mapping[str, Any], Mapping[str, Any] | None]] = [
     ("Biquads", "Biquad", {"kind": "bandpass", "f": 30.0, "q": 3.0}, {"sections": "bandpass 30 3"}),
     ("Biquads", "Biquad", {"kind": "notch", "f": 90.0, "q": 5.0}, {"sections": "notch 90 5"}),
 ]
+# By component in C++: its ports and those in Python, and the values of inputs.
+INPUTS: dict[str, dict[str, tuple[str, Any]]] = {
+    "Integrator": {"in": ("u", SIGNAL), "reset": ("reset", RESET)},
+}
 OUTPUTS = {
     "Saturation": {"out": "y", "saturated": "saturated"},
     "RateLimiter": {"out": "y", "limited": "limited"},
@@ -61,10 +67,19 @@ def compiled(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     yield folder
 
 
-def _line(name: str, package: str, type_: str, parameters: Mapping[str, Any]) -> str:
+def _line(
+    name: str,
+    package: str,
+    type_: str,
+    parameters: Mapping[str, Any],
+    remaps: Mapping[str, str] | None = None,
+) -> str:
+    """Return a component of a graph file, in its own namespace."""
     given = ", ".join(f"{key}: {value!r}" for key, value in parameters.items())
-    return f"  - {{name: {name}, ns: /{name}, package: {package}, type: {type_}, " \
-           f"parameters: {{{given}}}}}\n"  # fmt: skip
+    named = ", ".join(f"{key}: {value}" for key, value in (remaps or {}).items())
+    line = f"  - {{name: {name}, ns: /{name}, package: {package}, type: {type_}, " \
+           f"parameters: {{{given}}}, remaps: {{{named}}}}}\n"  # fmt: skip
+    return line.replace("True", "true")
 
 
 @pytest.mark.parametrize(("cpp", "python", "parameters", "other"), PAIRS)
@@ -79,20 +94,47 @@ def test_both_have_the_same_outputs(
     file = tmp_path / "pair.yaml"
     file.write_text(
         "components:\n"
-        + _line("cpp", "rtcf_control", cpp, other or parameters).replace("True", "true")
-        + _line("python", "pairs", python, parameters).replace("True", "true")
+        + _line("cpp", "rtcf_control", cpp, other or parameters)
+        + _line("python", "pairs", python, parameters)
     )
-    inputs: dict[str, Any] = {"/cpp/cpp.in": SIGNAL, "/python/python.u": SIGNAL}
-    if cpp == "Integrator":
-        inputs |= {"/cpp/cpp.reset": RESET, "/python/python.reset": RESET}
+    inputs: dict[str, Any] = {}
+    for ours, (theirs, values) in INPUTS.get(cpp, {"in": ("u", SIGNAL)}).items():
+        inputs |= {f"/cpp/cpp.{ours}": values, f"/python/python.{theirs}": values}
     with Bench(str(file), path=[BUILD_TREE / "lib" / "rtcf", compiled]) as bench:
         found = bench.run(inputs)
     for ours, theirs in OUTPUTS.get(cpp, {"out": "y"}).items():
         one, two = found[f"/cpp/cpp.{ours}"], found[f"/python/python.{theirs}"]
         assert np.allclose(
             one.astype(float), two.astype(float), rtol=0, atol=ROUNDING, equal_nan=True
-        )
-    assert len(np.unique(one.astype(float))) > 1 or not parameters
+        ), ours
+        assert len(np.unique(one.astype(float))) > 1 or not parameters, ours
+
+
+def test_both_are_the_same_in_the_last_cycle(compiled: Path, tmp_path: Path) -> None:
+    safe = 0.25
+    source = {"in_manual": True, "manual_value": 0.1, "safe_effort": safe}
+    lines = [_line("source", "rtcf_control", "Pid", source, {"effort": "/command"})]
+    by_type = {cpp: (python, parameters, other) for cpp, python, parameters, other in PAIRS}
+    for cpp, (python, parameters, other) in by_type.items():
+        one, (two, _) = next(iter(INPUTS.get(cpp, {"in": ("u", 0.0)}).items()))
+        lines += [
+            _line(f"cpp_{cpp}", "rtcf_control", cpp, other or parameters, {one: "/command"}),
+            _line(f"python_{cpp}", "pairs", python, parameters, {two: "/command"}),
+        ]
+    file = tmp_path / "pairs.yaml"
+    file.write_text("components:\n" + "".join(lines))
+    found: dict[str, str] = {}
+    with Bench(str(file), path=[BUILD_TREE / "lib" / "rtcf", compiled]) as bench:
+        bench.client.start()
+        wait_until_after(bench.client, 2)
+        bench.client.stop()
+        for each in bench.client.list_components():
+            for port in bench.client.get_component(each.full_name).ports:
+                found[f"{each.full_name.rpartition('/')[2]}.{port.name}"] = port.value
+    for cpp in by_type:
+        for ours, theirs in OUTPUTS.get(cpp, {"out": "y"}).items():
+            assert found[f"cpp_{cpp}.{ours}"] == found[f"python_{cpp}.{theirs}"] != "", cpp
+    assert found["cpp_Saturation.out"] == f"data: {safe}"
 
 
 def test_the_sources_are_the_compiled_pairs() -> None:
@@ -100,6 +142,6 @@ def test_the_sources_are_the_compiled_pairs() -> None:
         line.removeprefix("class ").split("(")[0]
         for file in SOURCES.glob("*.py")
         for line in file.read_text().splitlines()
-        if line.startswith("class ") and "(Component)" in line
+        if line.startswith("class ") and line.endswith(("(Component):", "(_Block):"))
     }
-    assert written == {python for _, python, _, _ in PAIRS}
+    assert written - {"_Block"} == {python for _, python, _, _ in PAIRS}

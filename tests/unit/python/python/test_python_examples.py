@@ -2,25 +2,27 @@
 and interpreted.
 """
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from pages import TREE
 from rtcf_compile.main import main
 from rtcf_compile.rewriting import numpy_functions
 
-FOLDER = TREE / "components" / "rtcf_examples" / "python"
-EXAMPLES = sorted(each.stem for each in FOLDER.glob("*.py"))
+EXAMPLES = sorted((TREE / "components").glob("*/python/*.py"))
+NAMES = [each.stem for each in EXAMPLES]
 
 
-@pytest.mark.parametrize("name", EXAMPLES)
-def test_an_example_gives_the_same_results_compiled_and_interpreted(name: str) -> None:
-    assert main([str(FOLDER / f"{name}.py"), "--verify", "400"]) == 0
+@pytest.mark.parametrize("file", EXAMPLES, ids=NAMES)
+def test_an_example_gives_the_same_results_compiled_and_interpreted(file: Path) -> None:
+    assert main([str(file), "--verify", "400"]) == 0
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", EXAMPLES)
-def test_an_example_gives_the_same_results_over_20000_cycles(name: str) -> None:
-    assert main([str(FOLDER / f"{name}.py"), "--verify", "20000"]) == 0
+@pytest.mark.parametrize("file", EXAMPLES, ids=NAMES)
+def test_an_example_gives_the_same_results_over_20000_cycles(file: Path) -> None:
+    assert main([str(file), "--verify", "20000"]) == 0
 
 
 def test_functions_of_numpy_are_in_the_documentation() -> None:
