@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import subprocess
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -12,7 +13,7 @@ import pytest
 from daemon_process import BUILD_TREE
 from pages import TREE
 from rtcf.testing import Bench
-from values import wait_until_after
+from values import port_value, wait_until_after
 
 SOURCES = TREE / "components" / "rtcf_control" / "python"
 ROUNDING = 1e-12  # relative, of values of size 1
@@ -23,6 +24,7 @@ SIGNAL = SIGNAL + 0.2 * np.random.default_rng(8).normal(size=STEPS)
 SIGNAL[[100, 101, 700, 1500]] = np.nan, np.inf, -np.inf, np.nan
 CYCLE = np.arange(STEPS)
 RESET = CYCLE % 600 > 590
+LAW: dict[str, Any] = {"coulomb": 2.0, "breakaway": 3.5, "viscous": 0.8, "stribeck_velocity": 0.05}
 
 # By pair: the parameters of both, and of the one in C++ if they differ.
 PAIRS: list[tuple[str, str, Mapping[str, Any], Mapping[str, Any] | None]] = [
@@ -43,14 +45,20 @@ PAIRS: list[tuple[str, str, Mapping[str, Any], Mapping[str, Any] | None]] = [
     ("Biquads", "Biquad", {"kind": "highpass", "f": 5.0, "q": 0.6}, {"sections": "highpass 5 0.6"}),
     ("Biquads", "Biquad", {"kind": "bandpass", "f": 30.0, "q": 3.0}, {"sections": "bandpass 30 3"}),
     ("Biquads", "Biquad", {"kind": "notch", "f": 90.0, "q": 5.0}, {"sections": "notch 90 5"}),
-]
+    ("FrictionCompensation", "FrictionCompensation", LAW, None),
+    ("FrictionCompensation", "FrictionCompensation", {}, None),
+    ("FrictionCompensation", "FrictionCompensation",
+     {**LAW, "breakaway": 0.0, "stribeck_exponent": 0.7, "share": 0.8, "max_effort": 2.2}, None),
+]  # fmt: skip
 # By component in C++: its ports and those in Python, and the values of inputs.
 INPUTS: dict[str, dict[str, tuple[str, Any]]] = {
     "Integrator": {"in": ("u", SIGNAL), "reset": ("reset", RESET)},
+    "FrictionCompensation": {"velocity": ("velocity", SIGNAL)},
 }
 OUTPUTS = {
     "Saturation": {"out": "y", "saturated": "saturated"},
     "RateLimiter": {"out": "y", "limited": "limited"},
+    "FrictionCompensation": {"effort": "effort"},
 }
 
 
@@ -108,6 +116,30 @@ def test_both_have_the_same_outputs(
             one.astype(float), two.astype(float), rtol=0, atol=ROUNDING, equal_nan=True
         ), ours
         assert len(np.unique(one.astype(float))) > 1 or not parameters, ours
+
+
+def test_both_fade_after_a_change_of_parameters(compiled: Path, tmp_path: Path) -> None:
+    type_ = "FrictionCompensation"
+    file = tmp_path / "pair.yaml"
+    file.write_text(
+        "components:\n"
+        + _line("cpp", "rtcf_control", type_, {**LAW, "fade": 0.02})
+        + _line("python", "pairs", type_, {**LAW, "fade": 0.02})
+    )
+    changes = {10: {"coulomb": 3.0}, 20: {"viscous": 2.0}, 50: {"fade": 0.0, "share": 0.5}}
+    efforts = []
+    with Bench(str(file), path=[BUILD_TREE / "lib" / "rtcf", compiled]) as bench:
+        for cycle in range(60):
+            for name in ("/cpp/cpp", "/python/python"):
+                bench.client.write(f"{name}.velocity", 1.0 + 0.5 * math.sin(0.1 * cycle))
+                if cycle in changes:
+                    bench.set(name, **changes[cycle])
+            bench.client.step(1)
+            efforts.append([port_value(bench.client, name, "effort")
+                            for name in ("/cpp/cpp", "/python/python")])  # fmt: skip
+    one, two = np.array(efforts).T
+    assert np.allclose(one, two, rtol=0, atol=ROUNDING)
+    assert abs(one[50] - one[49]) > 1.0 > np.max(np.abs(np.diff(one[5:50])))
 
 
 def test_both_are_the_same_in_the_last_cycle(compiled: Path, tmp_path: Path) -> None:
