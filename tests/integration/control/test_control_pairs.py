@@ -24,7 +24,12 @@ SIGNAL = SIGNAL + 0.2 * np.random.default_rng(8).normal(size=STEPS)
 SIGNAL[[100, 101, 700, 1500]] = np.nan, np.inf, -np.inf, np.nan
 CYCLE = np.arange(STEPS)
 RESET = CYCLE % 600 > 590
+LOAD = np.where(CYCLE > 900, 0.3, 0.0)
 LAW: dict[str, Any] = {"coulomb": 2.0, "breakaway": 3.5, "viscous": 0.8, "stribeck_velocity": 0.05}
+MOTOR: dict[str, Any] = {"inertia": 0.05, "viscous": 0.5, "step": 5e-4}
+ELASTIC: dict[str, Any] = {**MOTOR, "load_inertia": 0.1, "stiffness": 200.0, "damping": 0.5}
+DRY: dict[str, Any] = {"coulomb": 0.5, "static_friction": 0.9, "stribeck_velocity": 0.5}
+WINDING: dict[str, Any] = {"drive": "voltage", "torque_constant": 0.5, "resistance": 0.4}
 
 # By pair: the parameters of both, and of the one in C++ if they differ.
 PAIRS: list[tuple[str, str, Mapping[str, Any], Mapping[str, Any] | None]] = [
@@ -49,16 +54,25 @@ PAIRS: list[tuple[str, str, Mapping[str, Any], Mapping[str, Any] | None]] = [
     ("FrictionCompensation", "FrictionCompensation", {}, None),
     ("FrictionCompensation", "FrictionCompensation",
      {**LAW, "breakaway": 0.0, "stribeck_exponent": 0.7, "share": 0.8, "max_effort": 2.2}, None),
+    ("Motor", "Motor", {**MOTOR, "load_inertia": 0.1}, None),
+    ("Motor", "Motor", {**ELASTIC, **DRY}, None),
+    ("Motor", "Motor", {**MOTOR, **DRY, "torque_limit": 3.0, "encoder": 4096.0}, None),
+    ("Motor", "Motor", {**MOTOR, **WINDING}, None),
+    ("Motor", "Motor", {**ELASTIC, **DRY, **WINDING, "inductance": 0.01}, None),
 ]  # fmt: skip
 # By component in C++: its ports and those in Python, and the values of inputs.
 INPUTS: dict[str, dict[str, tuple[str, Any]]] = {
     "Integrator": {"in": ("u", SIGNAL), "reset": ("reset", RESET)},
     "FrictionCompensation": {"velocity": ("velocity", SIGNAL)},
+    "Motor": {"command": ("command", SIGNAL), "load_torque": ("load_torque", LOAD)},
 }
 OUTPUTS = {
     "Saturation": {"out": "y", "saturated": "saturated"},
     "RateLimiter": {"out": "y", "limited": "limited"},
     "FrictionCompensation": {"effort": "effort"},
+    "Motor": {
+        name: name for name in ("position", "velocity", "load_position", "load_velocity", "torque")
+    },
 }
 
 
