@@ -25,11 +25,15 @@ SIGNAL[[100, 101, 700, 1500]] = np.nan, np.inf, -np.inf, np.nan
 CYCLE = np.arange(STEPS)
 RESET = CYCLE % 600 > 590
 LOAD = np.where(CYCLE > 900, 0.3, 0.0)
+_MASKED: Any = np.ma
+# A caller that renews `run` each 20 cycles, begins each 500, and is silent from cycle 1200 on.
+RUN = _MASKED.array(CYCLE % 500 >= 20, mask=(CYCLE % 20 > 0) | ((CYCLE > 1200) & (CYCLE < 1500)))
 LAW: dict[str, Any] = {"coulomb": 2.0, "breakaway": 3.5, "viscous": 0.8, "stribeck_velocity": 0.05}
 MOTOR: dict[str, Any] = {"inertia": 0.05, "viscous": 0.5, "step": 5e-4}
 ELASTIC: dict[str, Any] = {**MOTOR, "load_inertia": 0.1, "stiffness": 200.0, "damping": 0.5}
 DRY: dict[str, Any] = {"coulomb": 0.5, "static_friction": 0.9, "stribeck_velocity": 0.5}
 WINDING: dict[str, Any] = {"drive": "voltage", "torque_constant": 0.5, "resistance": 0.4}
+EXCITED: dict[str, Any] = {"lower": -9.0, "upper": 9.0, "duration": 0.3}
 
 # By pair: the parameters of both, and of the one in C++ if they differ.
 PAIRS: list[tuple[str, str, Mapping[str, Any], Mapping[str, Any] | None]] = [
@@ -59,12 +63,27 @@ PAIRS: list[tuple[str, str, Mapping[str, Any], Mapping[str, Any] | None]] = [
     ("Motor", "Motor", {**MOTOR, **DRY, "torque_limit": 3.0, "encoder": 4096.0}, None),
     ("Motor", "Motor", {**MOTOR, **WINDING}, None),
     ("Motor", "Motor", {**ELASTIC, **DRY, **WINDING, "inductance": 0.01}, None),
+    ("Excitation", "Excitation", {**EXCITED, "shape": "step", "delay": 0.05}, None),
+    ("Excitation", "Excitation", {**EXCITED, "shape": "relay", "hysteresis": 0.3}, None),
+    ("Excitation", "Excitation", {**EXCITED, "shape": "step", "mode": "replace", "lease": 0.1,
+     "measured_lower": -0.9}, None),
+    ("Excitation", "Excitation", {**EXCITED, "shape": "multisine", "lines": 7}, None),
+    *(("Excitation", "Excitation", {**EXCITED, "shape": shape, "frequency_hz": 30.0},
+       {**EXCITED, "shape": shape, "frequency": 30.0})
+      for shape in ("prbs", "linear_chirp", "log_chirp")),
+    ("Excitation", "Excitation", {}, None),
 ]  # fmt: skip
 # By component in C++: its ports and those in Python, and the values of inputs.
 INPUTS: dict[str, dict[str, tuple[str, Any]]] = {
     "Integrator": {"in": ("u", SIGNAL), "reset": ("reset", RESET)},
     "FrictionCompensation": {"velocity": ("velocity", SIGNAL)},
     "Motor": {"command": ("command", SIGNAL), "load_torque": ("load_torque", LOAD)},
+    "Excitation": {
+        "in": ("u", SIGNAL),
+        "measured": ("measured", np.sin(0.02 * CYCLE)),
+        "run": ("run", RUN),
+        "stop": ("stop_now", CYCLE % 900 > 890),
+    },
 }
 OUTPUTS = {
     "Saturation": {"out": "y", "saturated": "saturated"},
@@ -73,6 +92,7 @@ OUTPUTS = {
     "Motor": {
         name: name for name in ("position", "velocity", "load_position", "load_velocity", "torque")
     },
+    "Excitation": {"signal": "signal", "state": "state", "running": "running", "out": "y"},
 }
 
 
