@@ -22,7 +22,7 @@ namespace rtcf::executor {
 class SimulatedClock;
 
 /// A parameter's declaration and value.
-struct ParameterSnapshot {
+struct ParameterView {
     ParameterDeclaration declaration;
     ParameterValue value;
 };
@@ -30,7 +30,7 @@ struct ParameterSnapshot {
 /// The parameters of a component. Immutable: a new value makes a new object.
 struct ParameterSet {
     std::string full_name;  ///< the component's full name
-    std::vector<ParameterSnapshot> parameters;
+    std::vector<ParameterView> parameters;
 };
 
 /// The mapped connections and the components with parameters of one generation of the graph. The

@@ -13,7 +13,7 @@
 
 #include "bridge/bridge.hpp"
 #include "check/undeclared_members.hpp"
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 #include "faults/crash_handler.hpp"
 #include "faults/flight_recorder.hpp"
 #include "graph/definition.hpp"
@@ -83,8 +83,8 @@ ComponentDefinition definitionOf(const CheckRequest& request) {
     for (const std::string& parameter : request.parameters) {
         const std::size_t at = parameter.find(":=");
         if (at == std::string::npos) {
-            throw Refusal(RefusalKind::InvalidArgument,
-                          fmt::format("'{}' is not of the form name:=value", parameter));
+            throw Error(ErrorKind::InvalidArgument,
+                        fmt::format("'{}' is not of the form name:=value", parameter));
         }
         definition.parameters.emplace_back(parameter.substr(0, at),
                                            parseValue(parameter.substr(at + 2)));
@@ -116,7 +116,7 @@ void run(const CheckRequest& request, Runner& runner, ValueSource& values) {
         if (!members) members.emplace(runner.component(name));
         members->look();
         if (runner.loop().fault().kind != LoopFault::Kind::None) {
-            throw Refusal(RefusalKind::LoopFailed, runner.status().loop_fault);
+            throw Error(ErrorKind::LoopFailed, runner.status().loop_fault);
         }
     }
     say("stopping");
@@ -139,16 +139,16 @@ int checkComponent(const CheckRequest& request) {
     auto bridge = std::make_unique<ValueSource>();
     ValueSource& values = *bridge;
     Runner runner("check", log, [](const RunnerEvent&) {}, std::move(bridge), recorder);
-    std::promise<std::string> refusal;
+    std::promise<std::string> outcome;
     runner.post([&] {
         try {
             run(request, runner, values);
-            refusal.set_value({});
+            outcome.set_value({});
         } catch (const std::exception& error) {
-            refusal.set_value(error.what());
+            outcome.set_value(error.what());
         }
     });
-    const std::string why = refusal.get_future().get();
+    const std::string why = outcome.get_future().get();
     log.drain();
     if (why.empty()) {
         fmt::print(stderr, "{}/{}: {} cycles\n", request.package, request.type, request.cycles);

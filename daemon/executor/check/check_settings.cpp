@@ -2,7 +2,7 @@
 
 #include <unistd.h>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 #include "messages/known_values.hpp"
 #include "messages/settings_messages.hpp"
 #include "rtcf/v1/runner.pb.h"
@@ -13,8 +13,7 @@ namespace rtcf::executor {
 int checkSettings() {
     ::rtcf::v1::RunnerSettings message;
     if (!message.ParseFromFileDescriptor(STDIN_FILENO)) {
-        throw Refusal(RefusalKind::InvalidArgument,
-                      "standard input is not a RunnerSettings message");
+        throw Error(ErrorKind::InvalidArgument, "standard input is not a RunnerSettings message");
     }
     requireKnownValues(message);
     RunnerSettings settings = settingsFrom(message, {});

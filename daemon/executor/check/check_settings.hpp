@@ -7,7 +7,7 @@ namespace rtcf::executor {
 
 /// Reads a RunnerSettings message from standard input; unset fields have their defaults.
 /// @return exit status of the process
-/// @throws Refusal if a setting is invalid
+/// @throws Error if a setting is invalid
 int checkSettings();
 
 }  // namespace rtcf::executor

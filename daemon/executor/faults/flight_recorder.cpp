@@ -12,7 +12,7 @@
 #include <new>
 #include <system_error>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 
 namespace rtcf::executor {
 
@@ -80,9 +80,9 @@ std::uint32_t FlightRecorder::addSlot(const std::string& name) {
     } else if (next_ < kSlots) {
         ++next_;
     } else {
-        throw Refusal(RefusalKind::ResourceExhausted,
-                      fmt::format("{}: a runner holds at most {} components; add another runner",
-                                  name, kSlots - 1));
+        throw Error(ErrorKind::ResourceExhausted,
+                    fmt::format("{}: a runner holds at most {} components; add another runner",
+                                name, kSlots - 1));
     }
     auto& text = page_->names[slot];
     std::strncpy(text, name.c_str(), sizeof text - 1);

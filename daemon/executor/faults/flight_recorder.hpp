@@ -52,7 +52,7 @@ class FlightRecorder {
 
     /// @name Slots with the names of components; graph thread
     /// @{
-    /// @throws Refusal if there are too many components
+    /// @throws Error if there are too many components
     std::uint32_t addSlot(const std::string& name);
     void removeSlot(std::uint32_t slot) noexcept;
     /// @}

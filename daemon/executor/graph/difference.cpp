@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <set>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 
 namespace rtcf::executor {
 
@@ -72,8 +72,8 @@ std::vector<Difference> compare(const Graph& graph, const std::vector<WantedComp
     std::set<std::string> names;
     for (const WantedComponent& component : wanted) {
         if (names.insert(component.definition.fullName()).second) continue;
-        throw Refusal(RefusalKind::ComponentTwice,
-                      fmt::format("{} is in the graph twice", component.definition.fullName()));
+        throw Error(ErrorKind::ComponentTwice,
+                    fmt::format("{} is in the graph twice", component.definition.fullName()));
     }
     std::vector<Difference> differences;
     for (const GraphNode& node : graph.nodes()) {

@@ -31,7 +31,7 @@ struct Difference {
 
 /// Compares a graph with the wanted one. Components to unload come first, the others in the order
 /// of `wanted`. A parameter without a wanted value shall have its default.
-/// @throws Refusal if a name is given twice
+/// @throws Error if a name is given twice
 std::vector<Difference> compare(const Graph& graph, const std::vector<WantedComponent>& wanted);
 
 }  // namespace rtcf::executor

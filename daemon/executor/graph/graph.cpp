@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 
 namespace rtcf::executor {
 
@@ -24,8 +24,8 @@ std::size_t Graph::indexOf(const std::string& full_name) const {
         names += (i == 0 ? "" : ", ") + nodes_[i].instance->fullName();
     }
     if (nodes_.size() > kListed) names += fmt::format(" and {} more", nodes_.size() - kListed);
-    throw Refusal(RefusalKind::NotFound, fmt::format("no component {} in this runner; loaded: {}",
-                                                     full_name, names.empty() ? "none" : names));
+    throw Error(ErrorKind::NotFound, fmt::format("no component {} in this runner; loaded: {}",
+                                                 full_name, names.empty() ? "none" : names));
 }
 
 const GraphNode& Graph::get(const std::string& full_name) const {
@@ -35,8 +35,8 @@ const GraphNode& Graph::get(const std::string& full_name) const {
 void Graph::requireFree(const std::string& full_name) const {
     if (const GraphNode* node = find(full_name)) {
         const ComponentDefinition& present = node->instance->definition();
-        throw Refusal(
-            RefusalKind::AlreadyExists,
+        throw Error(
+            ErrorKind::AlreadyExists,
             fmt::format(
                 "{} is loaded already ({}/{}): give another --name, or use rtcfctl replace {}",
                 full_name, present.package, present.type, full_name));

@@ -23,10 +23,10 @@ class Graph {
 
     /// @param full_name with namespace. @return null if there is none
     const GraphNode* find(const std::string& full_name) const noexcept;
-    /// @throws Refusal that lists the components
+    /// @throws Error that lists the components
     const GraphNode& get(const std::string& full_name) const;
 
-    /// @name Changes; if one throws Refusal, it has changed nothing
+    /// @name Changes; if one throws Error, it has changed nothing
     /// @{
     void add(GraphNode node);  ///< the name must be free
     void remove(const std::string& full_name);
@@ -37,7 +37,7 @@ class Graph {
     /// @}
 
     /// Checks that a name is free, before a component is constructed.
-    /// @throws Refusal if it is taken
+    /// @throws Error if it is taken
     void requireFree(const std::string& full_name) const;
 
    private:

@@ -6,7 +6,7 @@
 #include <exception>
 #include <utility>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 
 namespace rtcf::executor {
 
@@ -21,9 +21,9 @@ const ComponentRecord& findRecord(const Library& library, const ComponentDefinit
     std::string names;
     for (const ComponentRecord* record : library.types())
         names += (names.empty() ? "" : ", ") + std::string(record->type);
-    throw Refusal(RefusalKind::TypeNotFound,
-                  fmt::format("{} has no component type {}; it has {}", library.path(),
-                              definition.type, names.empty() ? "none" : names));
+    throw Error(ErrorKind::TypeNotFound,
+                fmt::format("{} has no component type {}; it has {}", library.path(),
+                            definition.type, names.empty() ? "none" : names));
 }
 
 std::string parameterNames(const Component& component) {
@@ -88,7 +88,7 @@ Instance::Instance(ComponentDefinition definition, std::shared_ptr<const Library
     context_.clock = &clock;
     context_.period_ns = clock.period_ns * definition_.every;
     context_.recorder_slot = slot();
-    context_.device = &figures_->device;
+    context_.device = &statistics_->device;
     context_.log = &log;
     level_.emplace(log.levels(), context_);
     context_.gate = gate;
@@ -142,35 +142,35 @@ void Instance::setFirstParameters() {
     definition_.inherited.clear();
 }
 
-// Calls a hook. If it fails, throws a Refusal with the hook's error text, or the text of its
+// Calls a hook. If it fails, throws an Error with the hook's error text, or the text of its
 // exception.
 void Instance::callHook(Hook hook, const std::function<bool()>& call) {
     HookNote note(recorder_, slot(), hook, gate_, context_.full_name);
-    RefusalKind kind = RefusalKind::HookFailed;
+    ErrorKind kind = ErrorKind::HookFailed;
     std::string why;
     try {
         const bool passed = call();
         why = note.unanswered();
         if (!why.empty()) {
-            kind = RefusalKind::NoMaster;
+            kind = ErrorKind::NoMaster;
         } else if (passed) {
             return;
         } else {
             why = component_->failure().empty() ? "it returned false without an error text"
                                                 : component_->failure();
         }
-    } catch (const Refusal&) {
+    } catch (const Error&) {
         throw;
     } catch (const NoMaster& error) {
-        kind = RefusalKind::NoMaster;
+        kind = ErrorKind::NoMaster;
         why = error.what();
     } catch (const std::exception& error) {
         why = fmt::format("it threw: {}", error.what());
     } catch (...) {
         why = "it threw an exception of unknown type";
     }
-    throw Refusal(kind, fmt::format("{} ({}/{}): {} failed: {}", context_.full_name,
-                                    definition_.package, definition_.type, hookName(hook), why));
+    throw Error(kind, fmt::format("{} ({}/{}): {} failed: {}", context_.full_name,
+                                  definition_.package, definition_.type, hookName(hook), why));
 }
 
 void Instance::callLastHook(Hook hook, const std::function<void()>& call) noexcept {
@@ -221,8 +221,8 @@ void Instance::freezePorts() {
     }
     for (const std::string& port : definition_.breaks) {
         if (findInput(port) != nullptr) continue;
-        throw Refusal(RefusalKind::PortNotFound,
-                      fmt::format("{} has no input {} to break", context_.full_name, port));
+        throw Error(ErrorKind::PortNotFound,
+                    fmt::format("{} has no input {} to break", context_.full_name, port));
     }
 }
 
@@ -283,9 +283,8 @@ const InputBase& Instance::requireInput(const std::string& port) const {
     std::string names;
     for (const InputBase* input : component_->inputs())
         names += (names.empty() ? "" : ", ") + input->name();
-    throw Refusal(RefusalKind::PortNotFound,
-                  fmt::format("{} has no input {}; it has {}", fullName(), port,
-                              names.empty() ? "none" : names));
+    throw Error(ErrorKind::PortNotFound, fmt::format("{} has no input {}; it has {}", fullName(),
+                                                     port, names.empty() ? "none" : names));
 }
 
 void Instance::restoreParameterValues(std::vector<ParameterValue> values) {
@@ -308,14 +307,13 @@ std::vector<StagedValue*> Instance::stageParameters(
                                             return parameter->declaration().name == name;
                                         });
         if (found == declared.end()) {
-            throw Refusal(RefusalKind::ParameterNotFound,
-                          fmt::format("{} has no parameter {}; it has {}", context_.full_name, name,
-                                      parameterNames(*component_)));
+            throw Error(ErrorKind::ParameterNotFound,
+                        fmt::format("{} has no parameter {}; it has {}", context_.full_name, name,
+                                    parameterNames(*component_)));
         }
         ParameterValue value = given;
         if (const std::string why = (*found)->check(value); !why.empty()) {
-            throw Refusal(RefusalKind::InvalidArgument,
-                          fmt::format("{}: {}", context_.full_name, why));
+            throw Error(ErrorKind::InvalidArgument, fmt::format("{}: {}", context_.full_name, why));
         }
         checked.emplace_back(found - declared.begin(), std::move(value));
     }

@@ -1,6 +1,6 @@
 /// @file
 /// One loaded component: the object, its names, its lifecycle. Owned by the graphs that contain it;
-/// all calls come from the graph thread. A hook that throws or fails makes the call throw a Refusal
+/// all calls come from the graph thread. A hook that throws or fails makes the call throw an Error
 /// that names component and hook.
 #pragma once
 
@@ -24,7 +24,7 @@ class Instance {
    public:
     /// Constructs the component and checks and sets its load-time parameters.
     /// @param gate access of hooks to ROS; null = none
-    /// @throws Refusal if that fails; nothing is left behind then
+    /// @throws Error if that fails; nothing is left behind then
     Instance(ComponentDefinition definition, std::shared_ptr<const Library> library,
              const std::string& runner, const LoopClock& clock, Log& log, FlightRecorder& recorder,
              HookGate* gate = nullptr);
@@ -35,10 +35,10 @@ class Instance {
 
     /// @name Lifecycle; idempotent
     /// @{
-    void configure();  ///< Configures and freezes the ports. @throws Refusal, after cleanup()
+    void configure();  ///< Configures and freezes the ports. @throws Error, after cleanup()
     /// Freezes and resolves the ports without configure(), to show how they would be wired.
     void freezePorts();
-    void start();  ///< @throws Refusal
+    void start();  ///< @throws Error
     void stop() noexcept;
     void cleanup() noexcept;
     /// @}
@@ -52,7 +52,7 @@ class Instance {
     const NamePattern& ignore() const noexcept { return ignore_; }
     Component& component() const noexcept { return *component_; }
     ComponentContext& context() noexcept { return context_; }
-    const std::shared_ptr<ComponentFigures>& figures() const noexcept { return figures_; }
+    const std::shared_ptr<ComponentStatistics>& statistics() const noexcept { return statistics_; }
 
     /// Mapped names in the order of the component's inputs() and outputs(); after configure().
     const std::vector<std::string>& inputNames() const noexcept { return input_names_; }
@@ -73,7 +73,7 @@ class Instance {
     /// Frees staged values and values that an adopted batch has replaced.
     void releaseStaged() noexcept;
     InputBase* findInput(const std::string& port) const noexcept;
-    /// @throws Refusal that lists the inputs
+    /// @throws Error that lists the inputs
     const InputBase& requireInput(const std::string& port) const;
 
     /// The parameters' values as last staged, in the order of declaration.
@@ -90,7 +90,7 @@ class Instance {
     void restoreParameterValues(std::vector<ParameterValue> values);
     /// Checks and stages a batch, and calls prepare().
     /// @return the values to commit at the boundary
-    /// @throws Refusal naming the first invalid parameter; nothing is staged then
+    /// @throws Error naming the first invalid parameter; nothing is staged then
     std::vector<StagedValue*> stageParameters(
         const std::vector<std::pair<std::string, ParameterValue>>& batch);
 
@@ -149,7 +149,7 @@ class Instance {
     };
     const Slot slot_;
     ComponentContext context_;
-    std::shared_ptr<ComponentFigures> figures_ = std::make_shared<ComponentFigures>();
+    std::shared_ptr<ComponentStatistics> statistics_ = std::make_shared<ComponentStatistics>();
     const Drained drained_;
     std::optional<const Level> level_;
     std::unique_ptr<Component> component_;

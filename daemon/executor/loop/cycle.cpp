@@ -25,12 +25,12 @@ class HookNote {
     const FlightRecorder::RealtimeNotes& notes_;
 };
 
-// Replaces a component's device statistics for one update, unless `figures` is null.
+// Replaces a component's device statistics for one update, unless `statistics` is null.
 class DeviceLoan {
    public:
-    DeviceLoan(ComponentContext& context, DeviceFigures* figures) noexcept
+    DeviceLoan(ComponentContext& context, DeviceFigures* statistics) noexcept
         : context_(context), own_(context.device) {
-        if (figures != nullptr) context.device = figures;
+        if (statistics != nullptr) context.device = statistics;
     }
     ~DeviceLoan() { context_.device = own_; }
     DeviceLoan(const DeviceLoan&) = delete;
@@ -58,12 +58,12 @@ void Cycle::begin(std::int64_t period_ns, std::uint64_t warmup_cycles) {
         step.context->period_ns = period_ns * step.every;
         step.context->updated_ns = -1;
         step.context->disabled = false;
-        step.figures->faults.clear();
+        step.statistics->faults.clear();
     }
     noteSchedule();
     // Hooks may have written outputs since the last cycle.
     if (frames_ != nullptr) frames_->setBase();
-    figures_.iteration.store(0, std::memory_order_relaxed);
+    statistics_.iteration.store(0, std::memory_order_relaxed);
     fault_ = {};
     active_ = true;
 }
@@ -80,7 +80,7 @@ bool Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NON
     const std::uint64_t iteration = clock_.iteration;
     notes_.setIteration(iteration);
     if (schedule.selective) total_elapsed_ns_ += clock_.elapsed_ns;
-    counted_ = iteration >= warmup_cycles_ && figures_.counting.counts();
+    counted_ = iteration >= warmup_cycles_ && statistics_.counting.counts();
     if (counted_) {
         for (const Stretch& stretch : schedule.stretches) {
             before = stretch.plain ? update<true>(stretch.begin, stretch.end, before)
@@ -101,8 +101,8 @@ bool Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NON
     if (frames != nullptr) frames->take();
     const std::int64_t duration = readCycleCounter() - begin;
     if (counted_) {
-        figures_.duration.add(duration);
-        figures_.latency.add(latency_ns);
+        statistics_.duration.add(duration);
+        statistics_.latency.add(latency_ns);
     }
     const CycleRecord cycle{iteration, clock_.stamp_ns, latency_ns, counter_.toNs(duration)};
     if (CycleRecord* record = records_.claim()) {
@@ -111,7 +111,7 @@ bool Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NON
     }
     if (frames != nullptr) frames->commit(cycle, false);
     clock_.iteration = iteration + 1;
-    figures_.iteration.store(iteration + 1, std::memory_order_relaxed);
+    statistics_.iteration.store(iteration + 1, std::memory_order_relaxed);
     return true;
 }
 
@@ -155,10 +155,10 @@ template <bool Plain>
                     const DeviceLoan loan(*next->context, counted_ ? nullptr : &uncounted_);
                     next->component->update();
                 }
-                if (!Plain) commit(*next->component, *next->figures, OnBadOutput::End);
+                if (!Plain) commit(*next->component, *next->statistics, OnBadOutput::End);
                 const std::int64_t after = readCycleCounter();
                 next->ended_ticks = after;
-                if (Plain || counted_) next->figures->duration.add(after - before);
+                if (Plain || counted_) next->statistics->duration.add(after - before);
                 before = after;
             }
             return before;
@@ -195,7 +195,7 @@ bool Cycle::due(const Step& step) const noexcept RTCF_NONBLOCKING {
 }
 
 // Publishes a component's staged outputs. @throws any exception of a copy
-void Cycle::commit(Component& component, ComponentFigures& figures, OnBadOutput may) {
+void Cycle::commit(Component& component, ComponentStatistics& statistics, OnBadOutput may) {
     for (OutputBase* output : component.stagedOutputs()) {
         if (output->commit()) continue;
         if (output->nonFinitePolicy() == OnNonFinite::Stop && may == OnBadOutput::End &&
@@ -203,9 +203,9 @@ void Cycle::commit(Component& component, ComponentFigures& figures, OnBadOutput 
             endLoop(LoopFault::Kind::NotFinite, &component, output->name().c_str());
             continue;
         }
-        figures.faults.not_finite.note(clock_.iteration, output->name().c_str());
-        figures.faults.count.add(1);
-        figures_.faults.add(1);
+        statistics.faults.not_finite.note(clock_.iteration, output->name().c_str());
+        statistics.faults.count.add(1);
+        statistics_.faults.add(1);
     }
 }
 
@@ -217,10 +217,10 @@ bool Cycle::threw(const Step& step, const char* text) noexcept {
         endLoop(LoopFault::Kind::Exception, step.component, text);
         return false;
     }
-    step.figures->faults.taken_out.note(clock_.iteration, text);
-    step.figures->faults.count.add(1);
-    figures_.faults.add(1);
-    makeSafe(*step.component, *step.figures, OnBadOutput::End);
+    step.statistics->faults.taken_out.note(clock_.iteration, text);
+    step.statistics->faults.count.add(1);
+    statistics_.faults.add(1);
+    makeSafe(*step.component, *step.statistics, OnBadOutput::End);
     return true;
 }
 
@@ -235,18 +235,19 @@ void Cycle::endLoop(LoopFault::Kind kind, const Component* component, const char
     std::strncpy(fault_.text.data(), text, fault_.text.size() - 1);
 }
 
-void Cycle::makeSafe(Component& component, ComponentFigures& figures, OnBadOutput may) noexcept {
+void Cycle::makeSafe(Component& component, ComponentStatistics& statistics,
+                     OnBadOutput may) noexcept {
     {
         const HookNote note(notes_, component, Hook::Safe);
         component.safe();
     }
     const auto keepBefore = [&](const char* text) {
-        figures.faults.unsafe.note(clock_.iteration, text);
-        figures.faults.count.add(1);
-        figures_.faults.add(1);
+        statistics.faults.unsafe.note(clock_.iteration, text);
+        statistics.faults.count.add(1);
+        statistics_.faults.add(1);
     };
     try {
-        commit(component, figures, may);
+        commit(component, statistics, may);
     } catch (const std::exception& error) {
         keepBefore(error.what());
     } catch (...) {
@@ -324,7 +325,7 @@ void Cycle::makeSafe(std::int64_t time_ns) noexcept {
     for (const Step& step : schedule_->steps) {
         // safe() of a component that was taken out has already run.
         if (step.optional && step.context->disabled) continue;
-        makeSafe(*step.component, *step.figures, OnBadOutput::GoOn);
+        makeSafe(*step.component, *step.statistics, OnBadOutput::GoOn);
     }
     for (Tap* tap : schedule_->taps) tap->push(clock_.stamp_ns);
     if (frames_ != nullptr) {
@@ -356,7 +357,7 @@ void Cycle::apply(Adoption& adoption) noexcept {
         for (const Step& step : schedule_->steps)
             step.context->period_ns = adoption.period_ns * step.every;
     }
-    figures_.adoption.add(readCycleCounter() - begin);
+    statistics_.adoption.add(readCycleCounter() - begin);
 }
 
 // Rewires connections and calls the hooks of new and leaving components. They see the time of the
@@ -381,7 +382,7 @@ void Cycle::changeComponents(Adoption& adoption) noexcept {
             // If the component threw, its safe() has already run. A fault of a leaving component
             // does not end the loop.
             if (!leaving.component->context().disabled)
-                makeSafe(*leaving.component, *leaving.figures, OnBadOutput::GoOn);
+                makeSafe(*leaving.component, *leaving.statistics, OnBadOutput::GoOn);
             for (const Latch& latch : leaving.latches) copy(latch);
             for (Tap* tap : leaving.taps) tap->push(clock_.stamp_ns);
         }
@@ -419,8 +420,8 @@ bool Cycle::restore(Restoration& restoration) noexcept {
     }
     for (const StateCopy& state : restoration.states) state.copy();
     for (const Restoration::Value& value : restoration.values) value.put();
-    const ClockImage& image = restoration.clock;
-    const std::int64_t later = restoration.sets_time ? 0 : clock_.time_ns - image.time_ns;
+    const ClockState& saved = restoration.clock;
+    const std::int64_t later = restoration.sets_time ? 0 : clock_.time_ns - saved.time_ns;
     for (SlotHeader* header : restoration.headers) header->time_ns += later;
     for (OutputBase* output : restoration.staged) output->discard();
     for (Restoration::Topic& topic : restoration.topics) {
@@ -444,14 +445,14 @@ bool Cycle::restore(Restoration& restoration) noexcept {
         turn.context->updated_ns = turn.updated_ns;
         turn.context->elapsed_ns = turn.elapsed_ns;
     }
-    clock_.iteration = image.iteration;
-    figures_.iteration.store(image.iteration, std::memory_order_relaxed);
-    total_elapsed_ns_ = image.total_elapsed_ns;
+    clock_.iteration = saved.iteration;
+    statistics_.iteration.store(saved.iteration, std::memory_order_relaxed);
+    total_elapsed_ns_ = saved.total_elapsed_ns;
     if (restoration.sets_time) {
-        clock_.time_ns = image.time_ns;
-        clock_.stamp_ns = image.stamp_ns;
-        clock_.elapsed_ns = image.elapsed_ns;
-        setStampOffset(image.stamp_ns - image.time_ns);
+        clock_.time_ns = saved.time_ns;
+        clock_.stamp_ns = saved.stamp_ns;
+        clock_.elapsed_ns = saved.elapsed_ns;
+        setStampOffset(saved.stamp_ns - saved.time_ns);
     }
     return true;
 }
@@ -476,16 +477,16 @@ void Cycle::blame(std::int64_t begin_ticks, std::int64_t limit_ticks) noexcept R
         for (const Step& step : schedule_->steps) {
             if (step.ended_ticks < begin_ticks || step.ended_ticks <= limit_ticks)
                 continue;  // did not run in this cycle, or ended in time
-            bump(step.figures->overruns);
+            bump(step.statistics->overruns);
             return;
         }
         // All components ended in time: frames or exchange caused the overrun.
         if (frames_ != nullptr && (!exchanges_ || given_ticks_ <= limit_ticks)) {
-            figures_.frame_overruns.add(1);
+            statistics_.frame_overruns.add(1);
             return;
         }
     }
-    figures_.exchange_overruns.add(1);
+    statistics_.exchange_overruns.add(1);
 }
 
 }  // namespace rtcf::executor

@@ -21,7 +21,7 @@
 namespace rtcf::executor {
 
 /// Statistics of the loop. Written by the cycle thread only.
-struct LoopFigures {
+struct LoopStatistics {
     Histogram duration;  ///< ticks
     Histogram latency;   ///< ns
     Histogram adoption;  ///< ticks; time of adopting a change
@@ -105,12 +105,12 @@ class Cycle {
     /// `begin_ticks` should have ended, and counts the overrun there.
     void blame(std::int64_t begin_ticks, std::int64_t limit_ticks) noexcept RTCF_NONBLOCKING;
     void endLoop(LoopFault::Kind kind, const Component* component, const char* text) noexcept;
-    LoopFigures& figures() noexcept { return figures_; }
+    LoopStatistics& statistics() noexcept { return statistics_; }
     /// @}
 
     /// @name Any thread
     /// @{
-    const LoopFigures& figures() const noexcept { return figures_; }
+    const LoopStatistics& statistics() const noexcept { return statistics_; }
     const LoopClock& clock() const noexcept { return clock_; }
     void setStampOffset(std::int64_t offset_ns) noexcept {
         stamp_offset_ns_.store(offset_ns, std::memory_order_relaxed);
@@ -142,9 +142,9 @@ class Cycle {
     /// Effect of a non-finite value on an output declared Finite(OnNonFinite::Stop): end the loop,
     /// or go on.
     enum class OnBadOutput { End, GoOn };
-    void commit(Component& component, ComponentFigures& figures, OnBadOutput may);
+    void commit(Component& component, ComponentStatistics& statistics, OnBadOutput may);
     bool threw(const Step& step, const char* text) noexcept;
-    void makeSafe(Component& component, ComponentFigures& figures, OnBadOutput may) noexcept;
+    void makeSafe(Component& component, ComponentStatistics& statistics, OnBadOutput may) noexcept;
     void noteSchedule() noexcept RTCF_NONBLOCKING;
     bool restore(Restoration& restoration) noexcept;
 
@@ -170,7 +170,7 @@ class Cycle {
     bool timed_ = false;            // a watch takes the components' times of each cycle
     std::int64_t given_ticks_ = 0;  // when the taps were last filled
     LoopFault fault_;
-    LoopFigures figures_;
+    LoopStatistics statistics_;
     DeviceFigures uncounted_;  // device statistics of cycles that are not counted
     SpscRing<CycleRecord, 16384> records_;
     const Schedule empty_{};

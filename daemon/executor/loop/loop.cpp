@@ -7,7 +7,7 @@
 
 #include <cstring>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 #include "faults/crash_handler.hpp"
 #include "logging/log.hpp"
 #include "realtime/floating_point.hpp"
@@ -54,7 +54,7 @@ class ProbeWork final : public BoundaryWork {
 
 Loop::Loop(Log& log, FlightRecorder& recorder, std::string cpu_claims)
     : cycle_(recorder), log_(log), recorder_(recorder), cpu_claims_(std::move(cpu_claims)) {
-    log_.setIteration(&cycle_.figures().iteration);
+    log_.setIteration(&cycle_.statistics().iteration);
 }
 
 Loop::~Loop() {
@@ -66,8 +66,8 @@ Loop::~Loop() {
 void Loop::reset(const LoopSettings& settings, std::uint64_t stops_known) {
     stops_known_ = stops_known;
     if (stopRequested()) {
-        throw Refusal(RefusalKind::LoopStopped,
-                      "the loop is not started: a stop was requested after the start");
+        throw Error(ErrorKind::LoopStopped,
+                    "the loop is not started: a stop was requested after the start");
     }
     cycle_.begin(settings.period_ns, settings.warmup_cycles);
     bucket_ = 0;
@@ -96,10 +96,9 @@ RealtimeProblems Loop::start(const LoopSettings& settings, std::uint64_t stops_k
         joinable_.store(true, std::memory_order_release);
         const int error = pthread_create(&thread_, attributes.get(), &Loop::threadMain, this);
         if (error != 0) {
-            throw Refusal(
-                RefusalKind::NoRealtime,
-                fmt::format("cannot create the real-time thread: {} (CPU {}, priority {})",
-                            std::strerror(error), realtime.cpu, realtime.priority));
+            throw Error(ErrorKind::NoRealtime,
+                        fmt::format("cannot create the real-time thread: {} (CPU {}, priority {})",
+                                    std::strerror(error), realtime.cpu, realtime.priority));
         }
     } catch (...) {
         cycle_.abandon();

@@ -59,7 +59,7 @@ class Loop {
     /// Starts the thread, which executes the adopted schedule.
     /// @param stops_known value of stops() when this start was requested
     /// @return missing prerequisites of real time
-    /// @throws Refusal if the thread cannot be created, or if a stop was requested since; the loop
+    /// @throws Error if the thread cannot be created, or if a stop was requested since; the loop
     /// does not run then
     RealtimeProblems start(const LoopSettings& settings, std::uint64_t stops_known);
     /// Waits for the end of a loop that was stopped or ended by itself.
@@ -73,7 +73,7 @@ class Loop {
     std::uint64_t step(std::uint64_t cycles, const std::atomic<bool>* given_up = nullptr) noexcept;
     /// Resets counters and clock as start() does, for step().
     /// @param stamp_ns ROS time of the first cycle
-    /// @throws Refusal if a stop was requested since, as start() does
+    /// @throws Error if a stop was requested since, as start() does
     void beginStepping(const LoopSettings& settings, std::uint64_t stops_known,
                        std::int64_t stamp_ns = 0);
     /// Runs the last cycle with safe() of all components, as at the end of a running loop.
@@ -138,16 +138,16 @@ class Loop {
     bool inComponent() const noexcept { return recorder_.runningSlot() != 0; }
     /// Grows with each cycle and with each return of a Source's wait().
     std::uint64_t progress() const noexcept {
-        return figures().iteration.load(std::memory_order_relaxed) + waits_.value();
+        return statistics().iteration.load(std::memory_order_relaxed) + waits_.value();
     }
     /// CPU that the thread is pinned to; -1 = none.
     int cpu() const noexcept { return cpu_.load(std::memory_order_relaxed); }
     int threadId() const noexcept { return thread_id_.load(std::memory_order_relaxed); }
-    const LoopFigures& figures() const noexcept { return cycle_.figures(); }
+    const LoopStatistics& statistics() const noexcept { return cycle_.statistics(); }
     /// Excludes cycles that begin from here on from the statistics, so that these can be read as of
     /// one instant; or includes them again. One thread only.
-    void holdFigures(bool held) noexcept {
-        held ? cycle_.figures().counting.hold() : cycle_.figures().counting.release();
+    void holdStatistics(bool held) noexcept {
+        held ? cycle_.statistics().counting.hold() : cycle_.statistics().counting.release();
     }
     const CycleCounter& counter() const noexcept { return cycle_.counter(); }
     const Cycle& cycle() const noexcept { return cycle_; }

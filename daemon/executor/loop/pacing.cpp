@@ -45,7 +45,7 @@ std::uint64_t Loop::step(std::uint64_t cycles, const std::atomic<bool>* given_up
     const CrashRole crash_role(ThreadRole::Realtime);
     Log::setRealtimeThread(true);
     for (; done < cycles && goesOn() && wanted(); ++done) {
-        const Counting::Turn turn(cycle_.figures().counting);
+        const Counting::Turn turn(cycle_.statistics().counting);
         if (!cycle_.run(nextStep(), 0)) break;
         // Also after a snapshot with another elapsed time, and after a change of the period.
         cycle_.setElapsed(cycle_.clock().period_ns);
@@ -86,7 +86,7 @@ void Loop::followRealTime() noexcept {
             deadline = wake_up.wake_ns + cycle_.clock().period_ns;
             continue;
         }
-        const Counting::Turn turn(cycle_.figures().counting);
+        const Counting::Turn turn(cycle_.statistics().counting);
         noteMissed(wake_up.missed);
         const std::int64_t begin = readCycleCounter();
         const std::int64_t time = device != nullptr ? wake_up.wake_ns : wake_up.deadline_ns;
@@ -125,7 +125,7 @@ void Loop::followClock() noexcept {
         }
         const std::int64_t now = nextStep();
         cycle_.setStampOffset(due->time_ns - now);
-        const Counting::Turn turn(cycle_.figures().counting);
+        const Counting::Turn turn(cycle_.statistics().counting);
         cycle_.run(now, 0);
         cycle_.setElapsed(cycle_.clock().period_ns);
     }
@@ -162,20 +162,20 @@ Loop::WakeUp Loop::waitForClock(std::int64_t deadline_ns) noexcept {
     }
     for (const void* line : cycle_.schedule().footprint) __builtin_prefetch(line);
     std::int64_t now = monotonicNow();
-    cycle_.figures().wake_up.add(now - deadline_ns + spin);
+    cycle_.statistics().wake_up.add(now - deadline_ns + spin);
     while (now < deadline_ns) now = monotonicNow();
     beat_ns_ = 0;  // no device paces this cycle
     return {true, deadline_ns, now};
 }
 
 void Loop::noteMissed(std::int64_t periods) noexcept RTCF_NONBLOCKING {
-    if (periods > 0 && cycle_.figures().counting.counts())
-        bump(cycle_.figures().missed, static_cast<std::uint64_t>(periods));
+    if (periods > 0 && cycle_.statistics().counting.counts())
+        bump(cycle_.statistics().missed, static_cast<std::uint64_t>(periods));
 }
 
 void Loop::noteOverrun(const WakeUp& wake_up, std::int64_t begin_ticks, std::int64_t end_ns,
                        bool behind) noexcept RTCF_NONBLOCKING {
-    if (cycle_.figures().counting.counts()) countOverrun(wake_up, begin_ticks, end_ns, behind);
+    if (cycle_.statistics().counting.counts()) countOverrun(wake_up, begin_ticks, end_ns, behind);
     const std::uint32_t limit = max_overruns_.load(std::memory_order_relaxed);
     if (limit != 0 && ++bucket_ > limit && !cycle_.faulted())
         cycle_.endLoop(LoopFault::Kind::Overruns, nullptr, "too many overruns");
@@ -185,15 +185,15 @@ void Loop::noteOverrun(const WakeUp& wake_up, std::int64_t begin_ticks, std::int
 // if it had begun in time.
 void Loop::countOverrun(const WakeUp& wake_up, std::int64_t begin_ticks, std::int64_t end_ns,
                         bool behind) noexcept RTCF_NONBLOCKING {
-    LoopFigures& figures = cycle_.figures();
-    bump(figures.overruns);
+    LoopStatistics& statistics = cycle_.statistics();
+    bump(statistics.overruns);
     const std::int64_t period = cycle_.clock().period_ns;
     if (end_ns - wake_up.wake_ns >= period) {
         cycle_.blame(begin_ticks, begin_ticks + cycle_.counter().toTicks(period));
     } else if (behind) {
-        figures.catching_up.add(1);
+        statistics.catching_up.add(1);
     } else {
-        figures.late_wake_ups.add(1);
+        statistics.late_wake_ups.add(1);
     }
 }
 

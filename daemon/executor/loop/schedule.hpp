@@ -12,14 +12,14 @@
 #include "frames/frame_ring.hpp"
 #include "loop/faults.hpp"
 #include "rtcf/component.hpp"
-#include "state/image_work.hpp"
+#include "state/snapshot_work.hpp"
 #include "state/state_copy.hpp"
 #include "statistics/histogram.hpp"
 
 namespace rtcf::executor {
 
 /// Statistics of one component. Outlives the schedules that contain the component.
-struct ComponentFigures {
+struct ComponentStatistics {
     Histogram duration;  ///< of update(), in ticks of the cycle counter
     /// Cycles whose next deadline passed during this component's update().
     std::atomic<std::uint64_t> overruns{0};
@@ -31,7 +31,7 @@ struct ComponentFigures {
 struct Step {
     Component* component;
     ComponentContext* context;
-    ComponentFigures* figures;
+    ComponentStatistics* statistics;
     std::uint32_t slot;       ///< in the flight recorder
     std::uint32_t every = 1;  ///< runs in every n-th cycle,
     std::uint32_t phase = 0;  ///< when the iteration modulo n equals this
@@ -136,7 +136,7 @@ struct HandOver {
 /// A component that leaves the running loop: its last cycle is at the boundary.
 struct Leaving {
     Component* component;
-    ComponentFigures* figures;
+    ComponentStatistics* statistics;
     std::vector<Latch> latches;  ///< latches of its outputs
     std::vector<Tap*> taps;      ///< taps of its outputs
 };

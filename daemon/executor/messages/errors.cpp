@@ -8,71 +8,71 @@ namespace pb = ::rtcf::v1;
 
 namespace {
 
-std::pair<v1::Error::Code, pb::Reason> codeAndReason(RefusalKind kind) {
+std::pair<v1::Error::Code, pb::Reason> codeAndReason(ErrorKind kind) {
     switch (kind) {
-        case RefusalKind::RequestMalformed:
+        case ErrorKind::RequestMalformed:
             return {v1::Error::CODE_INVALID_ARGUMENT, pb::REASON_REQUEST_MALFORMED};
-        case RefusalKind::InvalidArgument:
+        case ErrorKind::InvalidArgument:
             return {v1::Error::CODE_INVALID_ARGUMENT, pb::REASON_VALUE_INVALID};
-        case RefusalKind::NameMissing:
+        case ErrorKind::NameMissing:
             return {v1::Error::CODE_INVALID_ARGUMENT, pb::REASON_NAME_MISSING};
-        case RefusalKind::NameInvalid:
+        case ErrorKind::NameInvalid:
             return {v1::Error::CODE_INVALID_ARGUMENT, pb::REASON_NAME_INVALID};
-        case RefusalKind::TextTooLong:
+        case ErrorKind::TextTooLong:
             return {v1::Error::CODE_INVALID_ARGUMENT, pb::REASON_TEXT_TOO_LONG};
-        case RefusalKind::ExpressionInvalid:
+        case ErrorKind::ExpressionInvalid:
             return {v1::Error::CODE_INVALID_ARGUMENT, pb::REASON_EXPRESSION_INVALID};
-        case RefusalKind::ComponentTwice:
+        case ErrorKind::ComponentTwice:
             return {v1::Error::CODE_INVALID_ARGUMENT, pb::REASON_COMPONENT_TWICE};
-        case RefusalKind::RatesConflict:
+        case ErrorKind::RatesConflict:
             return {v1::Error::CODE_INVALID_ARGUMENT, pb::REASON_RATES_CONFLICT};
-        case RefusalKind::RecordingInvalid:
+        case ErrorKind::RecordingInvalid:
             return {v1::Error::CODE_INVALID_ARGUMENT, pb::REASON_RECORDING_INVALID};
-        case RefusalKind::NotFound:
+        case ErrorKind::NotFound:
             return {v1::Error::CODE_NOT_FOUND, pb::REASON_COMPONENT_NOT_FOUND};
-        case RefusalKind::PortNotFound:
+        case ErrorKind::PortNotFound:
             return {v1::Error::CODE_NOT_FOUND, pb::REASON_PORT_NOT_FOUND};
-        case RefusalKind::ParameterNotFound:
+        case ErrorKind::ParameterNotFound:
             return {v1::Error::CODE_NOT_FOUND, pb::REASON_PARAMETER_NOT_FOUND};
-        case RefusalKind::TypeNotFound:
+        case ErrorKind::TypeNotFound:
             return {v1::Error::CODE_NOT_FOUND, pb::REASON_TYPE_NOT_FOUND};
-        case RefusalKind::AlreadyExists:
+        case ErrorKind::AlreadyExists:
             return {v1::Error::CODE_ALREADY_EXISTS, pb::REASON_COMPONENT_EXISTS};
-        case RefusalKind::FailedPrecondition:
+        case ErrorKind::FailedPrecondition:
             return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_COMPONENT_REFUSED};
-        case RefusalKind::TypesDiffer:
+        case ErrorKind::TypesDiffer:
             return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_TYPES_DIFFER};
-        case RefusalKind::ConnectionsFormLoop:
+        case ErrorKind::ConnectionsFormLoop:
             return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_CONNECTIONS_FORM_LOOP};
-        case RefusalKind::TwoWriters:
+        case ErrorKind::TwoWriters:
             return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_TWO_WRITERS};
-        case RefusalKind::TwoPacers:
+        case ErrorKind::TwoPacers:
             return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_TWO_PACERS};
-        case RefusalKind::LibraryRefused:
+        case ErrorKind::LibraryRejected:
             return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_LIBRARY_REFUSED};
-        case RefusalKind::HookFailed:
+        case ErrorKind::HookFailed:
             return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_HOOK_FAILED};
-        case RefusalKind::NoMaster:
+        case ErrorKind::NoMaster:
             return {v1::Error::CODE_NO_MASTER, pb::REASON_NO_MASTER};
-        case RefusalKind::NoRealtime:
+        case ErrorKind::NoRealtime:
             return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_NO_REALTIME};
-        case RefusalKind::NoState:
+        case ErrorKind::NoState:
             return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_NO_STATE};
-        case RefusalKind::LoopRuns:
+        case ErrorKind::LoopRuns:
             return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_LOOP_RUNS};
-        case RefusalKind::LoopFailed:
+        case ErrorKind::LoopFailed:
             return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_LOOP_FAILED};
-        case RefusalKind::LoopStopped:
+        case ErrorKind::LoopStopped:
             return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_LOOP_STOPPED};
-        case RefusalKind::ReplayRuns:
+        case ErrorKind::ReplayRuns:
             return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_REPLAY_RUNS};
-        case RefusalKind::NoReplay:
+        case ErrorKind::NoReplay:
             return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_NO_REPLAY};
-        case RefusalKind::Unavailable:
+        case ErrorKind::Unavailable:
             return {v1::Error::CODE_UNAVAILABLE, pb::REASON_LOOP_STUCK};
-        case RefusalKind::ResourceExhausted:
+        case ErrorKind::ResourceExhausted:
             return {v1::Error::CODE_RESOURCE_EXHAUSTED, pb::REASON_LIMIT_REACHED};
-        case RefusalKind::StateTooLarge:
+        case ErrorKind::StateTooLarge:
             return {v1::Error::CODE_RESOURCE_EXHAUSTED, pb::REASON_STATE_TOO_LARGE};
     }
     return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_COMPONENT_REFUSED};
@@ -80,7 +80,7 @@ std::pair<v1::Error::Code, pb::Reason> codeAndReason(RefusalKind kind) {
 
 }  // namespace
 
-v1::Error errorTo(RefusalKind kind, const std::string& message) {
+v1::Error errorTo(ErrorKind kind, const std::string& message) {
     v1::Error error;
     const auto [code, reason] = codeAndReason(kind);
     error.set_code(code);
@@ -89,7 +89,7 @@ v1::Error errorTo(RefusalKind kind, const std::string& message) {
     return error;
 }
 
-v1::Response errorResponse(std::uint64_t id, RefusalKind kind, const std::string& message) {
+v1::Response errorResponse(std::uint64_t id, ErrorKind kind, const std::string& message) {
     v1::Response response;
     response.set_id(id);
     *response.mutable_error() = errorTo(kind, message);

@@ -4,7 +4,7 @@
 
 #include <set>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 #include "messages/parameter_value.hpp"
 #include "messages/settings_messages.hpp"
 #include "messages/to_wire.hpp"
@@ -20,11 +20,11 @@ ComponentDefinition definitionFrom(const pb::ComponentSpec& spec) {
     requireLength("package", spec.package());
     requireLength("type", spec.type());
     if (!isBaseName(definition.name)) {
-        throw Refusal(RefusalKind::NameInvalid,
-                      fmt::format("'{}' is not a legal component name: a letter, then letters, "
-                                  "digits and _; give the "
-                                  "namespace by --ns",
-                                  definition.name));
+        throw Error(ErrorKind::NameInvalid,
+                    fmt::format("'{}' is not a legal component name: a letter, then letters, "
+                                "digits and _; give the "
+                                "namespace by --ns",
+                                definition.name));
     }
     definition.ns = canonicalNamespace(spec.ns());
     requireLength("component name", definition.fullName());
@@ -34,9 +34,9 @@ ComponentDefinition definitionFrom(const pb::ComponentSpec& spec) {
         for (const std::string& name : {remap.source(), remap.target()}) {
             requireLength("remap", name);
             if (isGraphName(name)) continue;
-            throw Refusal(RefusalKind::NameInvalid,
-                          fmt::format("remap {}:={}: '{}' is not a legal ROS name", remap.source(),
-                                      remap.target(), name));
+            throw Error(ErrorKind::NameInvalid,
+                        fmt::format("remap {}:={}: '{}' is not a legal ROS name", remap.source(),
+                                    remap.target(), name));
         }
         definition.remaps.emplace_back(remap.source(), remap.target());
     }
@@ -49,16 +49,16 @@ ComponentDefinition definitionFrom(const pb::ComponentSpec& spec) {
     definition.optional = spec.optional();
     constexpr std::uint32_t kSlowest = 100000;
     if (definition.every > kSlowest) {
-        throw Refusal(RefusalKind::InvalidArgument,
-                      fmt::format("{}: every {} cycles is out of range: 1 to {}",
-                                  definition.fullName(), definition.every, kSlowest));
+        throw Error(ErrorKind::InvalidArgument,
+                    fmt::format("{}: every {} cycles is out of range: 1 to {}",
+                                definition.fullName(), definition.every, kSlowest));
     }
     if (spec.has_phase()) {
         if (spec.phase() >= definition.every) {
-            throw Refusal(RefusalKind::InvalidArgument,
-                          fmt::format("{}: phase {} is out of range: 0 to {} with --every {}",
-                                      definition.fullName(), spec.phase(), definition.every - 1,
-                                      definition.every));
+            throw Error(ErrorKind::InvalidArgument,
+                        fmt::format("{}: phase {} is out of range: 0 to {} with --every {}",
+                                    definition.fullName(), spec.phase(), definition.every - 1,
+                                    definition.every));
         }
         definition.phase = spec.phase();
     }
@@ -89,9 +89,9 @@ std::vector<std::pair<std::string, ParameterValue>> parametersFrom(
     for (const auto& setting : settings) {
         requireLength("parameter", setting.name());
         if (!names.insert(setting.name()).second) {
-            throw Refusal(RefusalKind::InvalidArgument,
-                          fmt::format("parameter {} is set twice in one change: give it one value",
-                                      setting.name()));
+            throw Error(ErrorKind::InvalidArgument,
+                        fmt::format("parameter {} is set twice in one change: give it one value",
+                                    setting.name()));
         }
         parameters.emplace_back(setting.name(),
                                 parameterValueFrom(setting.value(), setting.name()));
@@ -107,10 +107,10 @@ ReplayChunk replayFrom(const pb::ReplayRequest& request) {
         chunk.topics.push_back({topic.topic(), topic.type(), topic.md5(), {}});
     for (const pb::RecordedMessage& message : request.messages()) {
         if (!chunk.messages.empty() && message.time_ns() < chunk.messages.back().time_ns) {
-            throw Refusal(RefusalKind::RecordingInvalid,
-                          fmt::format("a message of {} is earlier than the one before it: "
-                                      "messages of a replay must be in order of time",
-                                      message.topic()));
+            throw Error(ErrorKind::RecordingInvalid,
+                        fmt::format("a message of {} is earlier than the one before it: "
+                                    "messages of a replay must be in order of time",
+                                    message.topic()));
         }
         chunk.messages.push_back({message.topic(), message.time_ns(), message.data()});
     }

@@ -1,6 +1,6 @@
 /// @file
 /// Conversion of the wire's messages to the executor's types. Only this folder and the server use
-/// generated types. Pure functions, which throw Refusal on invalid values.
+/// generated types. Pure functions, which throw Error on invalid values.
 #pragma once
 
 #include "graph/definition.hpp"

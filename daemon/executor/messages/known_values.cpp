@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 
 namespace rtcf::executor {
 
@@ -25,8 +25,8 @@ void requireKnown(const FieldDescriptor& field, int value) {
         if (type.value(i)->number() == 0) continue;
         known += (known.empty() ? "" : ", ") + type.value(i)->name();
     }
-    throw Refusal(RefusalKind::InvalidArgument,
-                  fmt::format("{} {} is not known: choose of {}", field.name(), value, known));
+    throw Error(ErrorKind::InvalidArgument,
+                fmt::format("{} {} is not known: choose of {}", field.name(), value, known));
 }
 
 }  // namespace

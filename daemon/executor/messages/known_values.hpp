@@ -8,7 +8,7 @@
 namespace rtcf::executor {
 
 /// Requires that all enumerators of a message are known, at any depth. Not real-time safe.
-/// @throws Refusal InvalidArgument
+/// @throws Error InvalidArgument
 void requireKnownValues(const google::protobuf::Message& message);
 
 }  // namespace rtcf::executor

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 
 namespace rtcf::executor {
 
@@ -21,7 +21,7 @@ ParameterValue parameterValueFrom(const pb::ParameterValue& value, const std::st
         case pb::ParameterValue::KIND_NOT_SET:
             break;
     }
-    throw Refusal(RefusalKind::InvalidArgument, fmt::format("parameter {} has no value", name));
+    throw Error(ErrorKind::InvalidArgument, fmt::format("parameter {} has no value", name));
 }
 
 pb::ParameterValue parameterValueTo(const ParameterValue& value) {

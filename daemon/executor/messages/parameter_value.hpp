@@ -11,7 +11,7 @@
 namespace rtcf::executor {
 
 /// @param name name of the parameter, for errors
-/// @throws Refusal if the message has no value
+/// @throws Error if the message has no value
 ParameterValue parameterValueFrom(const ::rtcf::v1::ParameterValue& value, const std::string& name);
 ::rtcf::v1::ParameterValue parameterValueTo(const ParameterValue& value);
 

@@ -1,5 +1,5 @@
 #include "messages/settings_messages.hpp"
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 
 #include <fmt/format.h>
 

@@ -10,7 +10,7 @@
 namespace rtcf::executor {
 
 /// Returns `base` with the fields that the message sets.
-/// @throws Refusal on invalid values
+/// @throws Error on invalid values
 RunnerSettings settingsFrom(const ::rtcf::v1::RunnerSettings& message, RunnerSettings base);
 ::rtcf::v1::RunnerSettings settingsTo(const RunnerSettings& settings);
 AccessRules rulesFrom(const v1::AccessRules& message);

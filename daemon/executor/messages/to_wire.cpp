@@ -2,9 +2,9 @@
 
 #include <fmt/format.h>
 
-#include "common/refusal.hpp"
-#include "messages/image_file.hpp"
+#include "common/error.hpp"
 #include "messages/parameter_value.hpp"
+#include "messages/snapshot_file.hpp"
 
 namespace rtcf::executor {
 
@@ -162,18 +162,17 @@ pb::ChangeResult outcomeTo(const ChangeOutcome& outcome) {
     return result;
 }
 
-v1::Snapshot snapshotTo(const ImageOutcome& outcome) {
+v1::Snapshot snapshotTo(const SnapshotOutcome& outcome) {
     constexpr std::size_t kLargest = 15 * 1024 * 1024;
     v1::Snapshot message;
-    message.set_snapshot(imageToFile(outcome.image));
+    message.set_snapshot(snapshotToFile(outcome.snapshot));
     if (message.snapshot().size() > kLargest) {
-        throw Refusal(
-            RefusalKind::ResourceExhausted,
-            fmt::format("the snapshot of {} has {} bytes, at most {}: declare less state, "
-                        "or divide the graph among runners",
-                        outcome.image.runner, message.snapshot().size(), kLargest));
+        throw Error(ErrorKind::ResourceExhausted,
+                    fmt::format("the snapshot of {} has {} bytes, at most {}: declare less state, "
+                                "or divide the graph among runners",
+                                outcome.snapshot.runner, message.snapshot().size(), kLargest));
     }
-    message.set_iteration(outcome.image.clock.iteration);
+    message.set_iteration(outcome.snapshot.clock.iteration);
     for (const std::string& line : outcome.notes) message.add_notes(line);
     return message;
 }
@@ -228,9 +227,8 @@ v1::Event eventTo(const RunnerEvent& event) {
     return message;
 }
 
-pb::ComponentInfo componentTo(const GraphSnapshot& snapshot, std::size_t position,
-                              RunnerState state) {
-    const ComponentSnapshot& component = *snapshot.components[position];
+pb::ComponentInfo componentTo(const GraphView& graph, std::size_t position, RunnerState state) {
+    const ComponentView& component = *graph.components[position];
     pb::ComponentInfo info;
     info.set_full_name(component.full_name);
     *info.mutable_spec() = specTo(component.definition);
@@ -238,30 +236,30 @@ pb::ComponentInfo componentTo(const GraphSnapshot& snapshot, std::size_t positio
     info.set_library(component.library);
     info.set_doc(component.doc);
     info.set_fault(component.fault);
-    info.set_faults(component.figures->faults.count.value());
+    info.set_faults(component.statistics->faults.count.value());
     const pb::ComponentState healthy = state == RunnerState::Running
                                            ? pb::COMPONENT_STATE_RUNNING
                                            : pb::COMPONENT_STATE_CONFIGURED;
     info.set_state(component.fault.empty() ? healthy : pb::COMPONENT_STATE_FAULTED);
-    for (const PortSnapshot& port : component.ports) {
+    for (const PortView& port : component.ports) {
         pb::PortInfo& message = *info.add_ports();
         setPortType(message, port.name, port.output, *port.type);
         message.set_mapped_name(port.mapped_name);
         message.set_unit(port.unit);
-        const ConnectionSnapshot& connection = snapshot.connections.at(port.mapped_name);
+        const ConnectionView& connection = graph.connections.at(port.mapped_name);
         message.set_connected(connection.writer.has_value() && !connection.readers.empty());
         message.set_mapped(port.output ? connection.published : connection.subscribed);
-        for (const EndpointSnapshot& reader : connection.readers) {
+        for (const EndpointView& reader : connection.readers) {
             if (!port.output && reader.component == component.full_name &&
                 reader.port == port.name) {
                 message.set_broken(reader.broken);
             }
         }
     }
-    for (const ParameterSnapshot& parameter : component.parameters) {
+    for (const ParameterView& parameter : component.parameters) {
         *info.add_parameters() = parameterTo(parameter.declaration, parameter.value);
     }
-    for (const StateSnapshot& declared : component.states) {
+    for (const StateView& declared : component.states) {
         pb::StateInfo& message = *info.add_states();
         message.set_name(declared.name);
         message.set_type(declared.type);
@@ -289,22 +287,21 @@ void addValues(pb::ComponentInfo& info, const std::vector<Probe::Value>& values)
     }
 }
 
-v1::ListConnectionsResult connectionsTo(const GraphSnapshot& snapshot) {
+v1::ListConnectionsResult connectionsTo(const GraphView& graph) {
     v1::ListConnectionsResult result;
-    const auto set = [](pb::Endpoint& message, const EndpointSnapshot& endpoint) {
+    const auto set = [](pb::Endpoint& message, const EndpointView& endpoint) {
         message.set_component(endpoint.component);
         message.set_port(endpoint.port);
         message.set_broken(endpoint.broken);
     };
-    for (const auto& [name, connection] : snapshot.connections) {
+    for (const auto& [name, connection] : graph.connections) {
         pb::Connection& message = *result.add_connections();
         message.set_name(name);
         message.set_type(connection.type);
         if (connection.writer) set(*message.mutable_writer(), *connection.writer);
-        for (const EndpointSnapshot& writer : connection.other_writers)
+        for (const EndpointView& writer : connection.other_writers)
             set(*message.add_other_writers(), writer);
-        for (const EndpointSnapshot& reader : connection.readers)
-            set(*message.add_readers(), reader);
+        for (const EndpointView& reader : connection.readers) set(*message.add_readers(), reader);
         message.set_published(connection.published);
         message.set_subscribed(connection.subscribed);
     }

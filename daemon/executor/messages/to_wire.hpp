@@ -11,7 +11,7 @@
 #include "runner/runner_event.hpp"
 #include "runner/snapshots.hpp"
 #include "runner/value_changes.hpp"
-#include "view/snapshot.hpp"
+#include "view/graph_view.hpp"
 
 namespace rtcf::executor {
 
@@ -20,19 +20,19 @@ namespace rtcf::executor {
 /// Sets the runner's state in a response.
 void setState(v1::Response& response, const NumberedState& state);
 ::rtcf::v1::ChangeResult outcomeTo(const ChangeOutcome& outcome);
-/// @throws Refusal if it is too large for the wire
-v1::Snapshot snapshotTo(const ImageOutcome& outcome);
+/// @throws Error if it is too large for the wire
+v1::Snapshot snapshotTo(const SnapshotOutcome& outcome);
 v1::InputType inputTypeTo(const WritableInput& input);
 v1::LogRecord logTo(const LogEntry& entry);
 v1::ServiceCall callTo(std::uint64_t number, const OutsideCall& call);
 v1::Event eventTo(const RunnerEvent& event);
-::rtcf::v1::ComponentInfo componentTo(const GraphSnapshot& snapshot, std::size_t position,
+::rtcf::v1::ComponentInfo componentTo(const GraphView& graph, std::size_t position,
                                       RunnerState state);
 /// Adds values of Runner::probe(), inputs first.
 void addValues(::rtcf::v1::ComponentInfo& info, const std::vector<Probe::Value>& values);
 /// Adds values of Runner::states().
 void addStates(::rtcf::v1::ComponentInfo& info, const std::vector<std::string>& values);
-v1::ListConnectionsResult connectionsTo(const GraphSnapshot& snapshot);
+v1::ListConnectionsResult connectionsTo(const GraphView& graph);
 /// Describes a component that is not loaded; its ports have no mapped names.
 ::rtcf::v1::ComponentType typeTo(const std::string& package, const std::string& library,
                                  const ComponentRecord& record, const Component& component);

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <regex>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 #include "names/names.hpp"
 
 namespace rtcf::executor {
@@ -60,9 +60,9 @@ NamePattern::NamePattern(const std::string& what, const std::string& expression)
         expression_ =
             std::make_shared<const Expression>(Expression{std::regex(expression, kSyntax)});
     } catch (const std::regex_error& error) {
-        throw Refusal(RefusalKind::ExpressionInvalid,
-                      fmt::format("{}: bad regular expression '{}': {}", what, expression,
-                                  reason(error.code(), expression)));
+        throw Error(ErrorKind::ExpressionInvalid,
+                    fmt::format("{}: bad regular expression '{}': {}", what, expression,
+                                reason(error.code(), expression)));
     }
 }
 
@@ -70,9 +70,9 @@ bool NamePattern::matches(const std::string& name) const {
     try {
         return expression_ != nullptr && std::regex_match(name, expression_->regex);
     } catch (const std::regex_error& error) {
-        throw Refusal(RefusalKind::ExpressionInvalid,
-                      fmt::format("a regular expression takes too long on '{}': {}", name,
-                                  reason(error.code())));
+        throw Error(ErrorKind::ExpressionInvalid,
+                    fmt::format("a regular expression takes too long on '{}': {}", name,
+                                reason(error.code())));
     }
 }
 

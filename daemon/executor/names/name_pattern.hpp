@@ -13,7 +13,7 @@ class NamePattern {
     NamePattern() = default;
     /// @param what purpose of the expression, for errors, e.g. "ignore of /H1"
     /// @param expression empty = matches nothing
-    /// @throws Refusal that names the purpose, the expression and its error
+    /// @throws Error that names the purpose, the expression and its error
     NamePattern(const std::string& what, const std::string& expression);
 
     bool matches(const std::string& name) const;

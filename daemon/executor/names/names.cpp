@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cctype>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 
 namespace rtcf::executor {
 
@@ -31,9 +31,9 @@ std::string cleaned(const std::string& name) {
 void requireLength(const char* what, const std::string& text, std::size_t longest) {
     if (text.size() <= longest) return;
     constexpr std::size_t kShown = 40;
-    throw Refusal(RefusalKind::TextTooLong,
-                  fmt::format("{} '{}…' has {} characters: at most {} are allowed", what,
-                              text.substr(0, kShown), text.size(), longest));
+    throw Error(ErrorKind::TextTooLong,
+                fmt::format("{} '{}…' has {} characters: at most {} are allowed", what,
+                            text.substr(0, kShown), text.size(), longest));
 }
 
 bool isBaseName(const std::string& name) {
@@ -52,8 +52,8 @@ std::string canonicalNamespace(const std::string& ns) {
     requireLength("namespace", ns);
     const std::string absolute = cleaned(ns[0] == '/' ? ns : "/" + ns);
     if (!isGraphName(absolute)) {
-        throw Refusal(
-            RefusalKind::NameInvalid,
+        throw Error(
+            ErrorKind::NameInvalid,
             "namespace '" + ns + "' is not a legal ROS name: letters, digits, _ and / only");
     }
     return absolute;
@@ -84,7 +84,7 @@ std::string mappedName(const std::string& port, const std::string& ns, const std
 std::string fullNameOf(const std::string& given) {
     requireLength("component name", given);
     if (!isGraphName(given) || given[0] == '~') {
-        throw Refusal(RefusalKind::NameInvalid, "'" + given + "' is not a component's name");
+        throw Error(ErrorKind::NameInvalid, "'" + given + "' is not a component's name");
     }
     return cleaned(given[0] == '/' ? given : "/" + given);
 }

@@ -18,7 +18,7 @@ constexpr std::size_t kLongestPattern = 1000;  ///< characters of a regular expr
 
 /// Checks a length.
 /// @param what name of the text, for the error
-/// @throws Refusal if the text is too long
+/// @throws Error if the text is too long
 void requireLength(const char* what, const std::string& text, std::size_t longest = kLongestName);
 
 /// True for a letter followed by letters, digits and underscores.
@@ -28,7 +28,7 @@ bool isBaseName(const std::string& name);
 bool isGraphName(const std::string& name);
 
 /// Canonical form of a namespace, e.g. "/arm" for "arm//".
-/// @throws Refusal if it is not a legal namespace
+/// @throws Error if it is not a legal namespace
 std::string canonicalNamespace(const std::string& ns);
 
 /// Full name of a component: "/" + "H1" = "/H1".
@@ -43,7 +43,7 @@ std::string mappedName(const std::string& port, const std::string& ns, const std
                        const Remaps& remaps);
 
 /// Full name of a component from user input ("H1", "/arm/H1"); relative names are in "/".
-/// @throws Refusal if it is not a legal name
+/// @throws Error if it is not a legal name
 std::string fullNameOf(const std::string& given);
 
 }  // namespace rtcf::executor

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <set>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 #include "ordering/footprint.hpp"
 
 namespace rtcf::executor {
@@ -116,8 +116,8 @@ class Builder {
     void requireRoom(std::size_t ring_bytes) {
         tap_bytes_ += ring_bytes;
         if (tap_bytes_ <= kAllTaps) return;
-        throw Refusal(
-            RefusalKind::ResourceExhausted,
+        throw Error(
+            ErrorKind::ResourceExhausted,
             fmt::format("the rings of all published outputs (taps) would take more than the {} MiB "
                         "of locked memory allowed: reduce the whitelist, the frequency or the "
                         "largest message",
@@ -220,7 +220,7 @@ class Builder {
             Instance& instance = *plan_.graph.nodes()[index].instance;
             const ComponentDefinition& definition = instance.definition();
             plan_.schedule.steps.push_back(
-                {&instance.component(), &instance.context(), instance.figures().get(),
+                {&instance.component(), &instance.context(), instance.statistics().get(),
                  instance.slot(), definition.every, instance.phase(), definition.optional});
             if (Source* source = instance.source(); source != nullptr)
                 plan_.schedule.source = source;
@@ -234,7 +234,7 @@ class Builder {
         for (const std::size_t index : previous_.wiring.order) {
             const Instance& instance = *previous_.graph.nodes()[index].instance;
             if (staying.count(&instance) != 0) continue;
-            Leaving leaving{&instance.component(), instance.figures().get(), {}, {}};
+            Leaving leaving{&instance.component(), instance.statistics().get(), {}, {}};
             for (const OutputBase* output : instance.component().outputs()) {
                 const SlotHeader* const slot = output->slot().get();
                 if (const auto found = previous_.latches.find(slot);

@@ -47,7 +47,7 @@ struct Plan {
 /// @param frequency_hz the loop's frequency, for the sizes of taps
 /// @param adoption receives the schedule and the inputs to rewire
 /// @param bridge decimation and sizes of values that leave and enter the loop
-/// @throws Refusal if the taps' rings would take too much memory
+/// @throws Error if the taps' rings would take too much memory
 std::unique_ptr<Plan> buildPlan(Graph graph, Wiring wiring, const Plan& previous,
                                 double frequency_hz, Adoption& adoption,
                                 const BridgeSettings& bridge = {});

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 
 namespace rtcf::executor {
 
@@ -47,8 +47,8 @@ void requireHarmonic(const Graph& graph, const std::string& loading) {
                     others.push_back(each.instance->definition().every);
             }
             const std::uint32_t every = blamed->definition().every;
-            throw Refusal(
-                RefusalKind::RatesConflict,
+            throw Error(
+                ErrorKind::RatesConflict,
                 fmt::format("{} runs {}, but {} runs {}: one rate must divide the other; "
                             "try --every {}",
                             blamed->fullName(), suffix(every), other->fullName(),

@@ -12,7 +12,7 @@ namespace rtcf::executor {
 /// Checks that the rates of a graph are harmonic (of any two, one divides the other). Assigns each
 /// slower component without a phase the cycle with the fewest components so far.
 /// @param loading full name of the component to name first if two conflict; may be empty
-/// @throws Refusal naming both components and the nearest rates that work
+/// @throws Error naming both components and the nearest rates that work
 void assignPhases(const Graph& graph, const std::string& loading);
 
 }  // namespace rtcf::executor

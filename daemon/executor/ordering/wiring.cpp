@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 #include "ordering/order.hpp"
 #include "ordering/rates.hpp"
 
@@ -28,8 +28,8 @@ std::string describe(const TypeInfo& type, const TypeInfo& other) {
 [[noreturn]] void refuseTypes(const std::string& name, const std::string& present,
                               const TypeInfo& present_type, const std::string& added,
                               const TypeInfo& added_type) {
-    throw Refusal(
-        RefusalKind::TypesDiffer,
+    throw Error(
+        ErrorKind::TypesDiffer,
         fmt::format("types differ on {}: {} is {}, {} is {}; remap one of them to another name",
                     name, present, describe(present_type, added_type), added,
                     describe(added_type, present_type)));
@@ -132,8 +132,8 @@ std::string breakCommand(const Graph& graph, const std::vector<Edge>& cut,
         advice += (advice.empty() ? "" : ", or ") + breakCommand(graph, result.cuts[i], loading);
     }
     if (result.cuts.size() > kListedCuts) advice += ", or elsewhere in the loop";
-    throw Refusal(
-        RefusalKind::ConnectionsFormLoop,
+    throw Error(
+        ErrorKind::ConnectionsFormLoop,
         fmt::format("the connections form a loop: {}; let one input read the previous cycle: {}",
                     loop, advice));
 }
@@ -162,8 +162,8 @@ void requireOneWriter(const Graph& graph, const std::string& name, const Connect
     if (!plan.writer || plan.others.empty() || plan.readers.empty()) return;
     const Writer& other = plan.others.front();
     const std::string& port = other.output->name();
-    throw Refusal(
-        RefusalKind::TwoWriters,
+    throw Error(
+        ErrorKind::TwoWriters,
         fmt::format("{} has two writers and a reader: {} and {} write it, {} reads it; remap one "
                     "writer, e.g. --remap {}:=~{}",
                     name, portName(graph, plan.writer->node, plan.writer->output->name()),
@@ -180,8 +180,8 @@ bool onRos(const TypeInfo& type) { return *type.ros_type != '\0'; }
 void requirePublishable(const Graph& graph, const std::string& name, const Writer& writer) {
     const TypeInfo& type = writer.output->type();
     if (!allocatesMessage(type)) return;
-    throw Refusal(
-        RefusalKind::FailedPrecondition,
+    throw Error(
+        ErrorKind::FailedPrecondition,
         fmt::format("{} cannot be published as {}: values of {} own memory, and so do "
                     "messages of {}, which would be allocated in the cycle; exclude {} from the "
                     "whitelist, or store the values in a std::array",
@@ -195,8 +195,8 @@ void requireOneSource(const Graph& graph) {
     for (const GraphNode& node : graph.nodes()) {
         if (node.instance->source() == nullptr) continue;
         if (present != nullptr) {
-            throw Refusal(
-                RefusalKind::TwoPacers,
+            throw Error(
+                ErrorKind::TwoPacers,
                 fmt::format("{} and {} both pace the loop: put one of them into another runner",
                             present->fullName(), node.instance->fullName()));
         }

@@ -57,7 +57,7 @@ struct Wiring {
 /// Connects and orders a graph.
 /// @param loading full name of a component that is not part of the running graph yet, for the
 /// advice on loops; may be empty
-/// @throws Refusal if a name has two types, if a name with a reader has two writers, if a type
+/// @throws Error if a name has two types, if a name with a reader has two writers, if a type
 /// cannot be published, and for a loop
 Wiring wire(const Graph& graph, const MappingFilter& filter, const std::string& loading);
 

@@ -12,7 +12,7 @@
 #include <cstring>
 #include <filesystem>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 #include "plugins/elf_file.hpp"
 #include "plugins/linked_files.hpp"
 #include "plugins/trusted_file.hpp"
@@ -38,7 +38,7 @@ class FileDescriptor {
 };
 
 [[noreturn]] void refuse(const std::string& path, const std::string& why) {
-    throw Refusal(RefusalKind::LibraryRefused, fmt::format("library {}: {}", path, why));
+    throw Error(ErrorKind::LibraryRejected, fmt::format("library {}: {}", path, why));
 }
 
 std::string systemError() { return std::strerror(errno); }

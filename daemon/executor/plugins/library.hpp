@@ -20,7 +20,7 @@ class Library {
    public:
     /// @param path name of the file, for errors
     /// @param file the file, open for reading
-    /// @throws Refusal naming the missing symbol, or both ABI versions
+    /// @throws Error naming the missing symbol, or both ABI versions
     Library(const std::string& path, int file);
 
     const std::string& path() const noexcept { return path_; }
@@ -45,7 +45,7 @@ class LibraryStore {
     /// Trusts libraries of this user, in addition to those of root and the executor's own user.
     void trust(uid_t owner) { owners_.insert(owner); }
     /// Opens a library, unless the same file is open already.
-    /// @throws Refusal like openTrusted() and Library
+    /// @throws Error like openTrusted() and Library
     std::shared_ptr<const Library> open(const std::string& path);
 
    private:

@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 #include "plugins/elf_file.hpp"
 #include "plugins/trusted_file.hpp"
 
@@ -51,7 +51,7 @@ class LinkCheck {
             path, owners_, fmt::format("library {}, which links against {}", library_, path));
         try {
             check(file, std::filesystem::path(path).parent_path(), inherited);
-        } catch (const Refusal&) {
+        } catch (const Error&) {
             ::close(file);
             throw;
         }
@@ -90,8 +90,8 @@ class LinkCheck {
     }
 
     [[noreturn]] void refuse(const std::string& why) const {
-        throw Refusal(RefusalKind::LibraryRefused,
-                      fmt::format("library {}: {}: build the library without it", library_, why));
+        throw Error(ErrorKind::LibraryRejected,
+                    fmt::format("library {}: {}: build the library without it", library_, why));
     }
 
     const std::string& library_;

@@ -15,7 +15,7 @@ namespace rtcf::executor {
 /// against. Libraries in the system's folders (ld.so.conf) are not checked.
 /// @param path name of the library, for errors
 /// @param file the library, open for reading
-/// @throws Refusal naming the library and the untrusted folder or file
+/// @throws Error naming the library and the untrusted folder or file
 void requireTrustedLinks(const std::string& path, int file, const std::set<uid_t>& owners);
 
 /// The library files loaded into this process.

@@ -13,7 +13,7 @@
 #include <system_error>
 #include <utility>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 
 namespace rtcf::executor {
 
@@ -78,7 +78,7 @@ class Walk {
 
    private:
     [[noreturn]] void refuse(const std::string& why) const {
-        throw Refusal(RefusalKind::LibraryRefused, fmt::format("{}: {}", subject_, why));
+        throw Error(ErrorKind::LibraryRejected, fmt::format("{}: {}", subject_, why));
     }
 
     // Opens the next part of the path. All symbolic links were resolved before, so a link now is an

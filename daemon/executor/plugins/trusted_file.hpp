@@ -16,13 +16,13 @@ namespace rtcf::executor {
 /// detected.
 /// @param subject name of the file for errors; empty = the library at `path`
 /// @return a descriptor that the caller closes
-/// @throws Refusal naming the untrusted path and its owner or writers
+/// @throws Error naming the untrusted path and its owner or writers
 int openTrusted(const std::string& path, const std::set<uid_t>& owners,
                 const std::string& subject = {});
 
 /// Requires the same of a folder: only trusted users can put files there, or create it if it does
 /// not exist.
-/// @throws Refusal naming the untrusted path and its owner or writers
+/// @throws Error naming the untrusted path and its owner or writers
 void requireTrustedFolder(const std::string& path, const std::set<uid_t>& owners,
                           const std::string& subject);
 

@@ -14,7 +14,7 @@ void BridgeLink::configure(const BridgeSettings& settings) {
     if (bridge_) bridge_->configure(settings);
 }
 
-void BridgeLink::setTable(const Plan& plan, const GraphSnapshot& graph) {
+void BridgeLink::setTable(const Plan& plan, const GraphView& graph) {
     if (!bridge_) return;
     auto table = std::make_shared<BridgeTable>();
     if (served_) {
@@ -26,7 +26,7 @@ void BridgeLink::setTable(const Plan& plan, const GraphSnapshot& graph) {
     bridge_->setTable(std::move(table));
 }
 
-void BridgeLink::serve(bool served, const Plan& plan, const GraphSnapshot& graph) {
+void BridgeLink::serve(bool served, const Plan& plan, const GraphView& graph) {
     served_ = served;
     setTable(plan, graph);
 }

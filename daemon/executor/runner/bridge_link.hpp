@@ -7,7 +7,7 @@
 
 #include "bridge/bridge.hpp"
 #include "ordering/plan.hpp"
-#include "view/snapshot.hpp"
+#include "view/graph_view.hpp"
 
 namespace rtcf::executor {
 
@@ -21,9 +21,9 @@ class BridgeLink {
     bool attach(RunnerView& runner, ParameterRequest change_parameters);
     void configure(const BridgeSettings& settings);
     /// Gives the bridge the connections of a plan and the parameters of its graph view.
-    void setTable(const Plan& plan, const GraphSnapshot& graph);
+    void setTable(const Plan& plan, const GraphView& graph);
     /// Disconnects the bridge from all ports, or connects it again.
-    void serve(bool served, const Plan& plan, const GraphSnapshot& graph);
+    void serve(bool served, const Plan& plan, const GraphView& graph);
     /// Sets the receiver of the peers' simulated clock; null = none.
     void setClock(const std::shared_ptr<SimulatedClock>& clock);
     /// Disconnects the bridge from all ports, for good.

@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 
 namespace rtcf::executor {
 
@@ -45,8 +45,8 @@ void ComponentLoader::requireThreadLocals(const Library& library) {
     const std::string lacking = loop_.lackingThreadLocals(library.handle());
     if (lacking.empty()) return;
     const bool own = lacking.rfind("/proc/", 0) == 0;  // our copy of the library
-    throw Refusal(
-        RefusalKind::LoopRuns,
+    throw Error(
+        ErrorKind::LoopRuns,
         fmt::format(
             "library {0}: {1} has thread_local variables, and the loop of {2} started "
             "without memory for them: stop the loop first (rtcfctl -r {2} stop), or load it "

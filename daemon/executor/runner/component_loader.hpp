@@ -35,7 +35,7 @@ class ComponentLoader {
     /// Makes a component.
     /// @param library   file
     /// @param configure false = only constructs it, to look at its ports
-    /// @throws Refusal and others
+    /// @throws Error and others
     std::shared_ptr<Instance> make(ComponentDefinition definition, const std::string& library,
                                    const Progress& progress, bool configure = true);
 

@@ -17,7 +17,7 @@ constexpr std::int64_t kSoon = kSecond;
 
 }  // namespace
 
-std::uint64_t FaultReportLimit::noteReport(const std::shared_ptr<ComponentFigures>& of,
+std::uint64_t FaultReportLimit::noteReport(const std::shared_ptr<ComponentStatistics>& of,
                                            std::int64_t now_ns) {
     const std::uint64_t count = of->faults.count.value();
     const auto [found, is_new] = silences_.try_emplace(of);

@@ -17,7 +17,7 @@ class FaultReportLimit {
     /// Notes that a fault of a component was reported, and begins a silence.
     /// @param now_ns CLOCK_MONOTONIC, ns
     /// @return faults of this component since its last report; 0 = this is the first report
-    std::uint64_t noteReport(const std::shared_ptr<ComponentFigures>& of, std::int64_t now_ns);
+    std::uint64_t noteReport(const std::shared_ptr<ComponentStatistics>& of, std::int64_t now_ns);
     /// Enables the next report of components whose silence is over.
     void rearm(std::int64_t now_ns);
 
@@ -28,7 +28,7 @@ class FaultReportLimit {
         std::uint64_t count = 0;  // number of the component's faults at the last report
         bool over = false;
     };
-    std::map<std::shared_ptr<ComponentFigures>, Silence> silences_;
+    std::map<std::shared_ptr<ComponentStatistics>, Silence> silences_;
 };
 
 }  // namespace rtcf::executor

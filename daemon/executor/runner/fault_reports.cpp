@@ -56,13 +56,13 @@ RunnerEvent FaultReports::endOfLoop(const Graph& graph, std::uint32_t max_overru
 
 void FaultReports::reportComponents(const Graph& graph) {
     not_finite_.rearm(monotonicNow());
-    const std::uint64_t count = loop_.figures().faults.value();
+    const std::uint64_t count = loop_.statistics().faults.value();
     if (std::exchange(reported_faults_, count) == count) return;
     for (const GraphNode& node : graph.nodes()) report(*node.instance);
 }
 
 void FaultReports::report(Instance& instance) {
-    ComponentFaults& faults = instance.figures()->faults;
+    ComponentFaults& faults = instance.statistics()->faults;
     const auto say = [&](const ComponentFault* fault, const char* text, std::uint64_t more) {
         if (fault == nullptr) return;
         const char* of = fault->text.data();
@@ -75,7 +75,7 @@ void FaultReports::report(Instance& instance) {
         publish_(instance.fullName());
     };
     if (const ComponentFault* fault = faults.not_finite.take(); fault != nullptr) {
-        const std::uint64_t more = not_finite_.noteReport(instance.figures(), monotonicNow());
+        const std::uint64_t more = not_finite_.noteReport(instance.statistics(), monotonicNow());
         say(fault, "output {} is not finite: readers keep its last value", more);
     }
     say(faults.taken_out.take(), "update() threw: {}; taken out, the loop goes on", 0);
@@ -86,7 +86,7 @@ void FaultReports::report(Instance& instance) {
 void FaultReports::reportOverruns(const Graph& graph, bool last, const char* remark) {
     std::string line = overruns_.take(loop_, graph, last);
     if (line.empty()) return;
-    tell_({RunnerEvent::Kind::Overruns, line + remark, {}, loop_.figures().iteration.load()});
+    tell_({RunnerEvent::Kind::Overruns, line + remark, {}, loop_.statistics().iteration.load()});
 }
 
 void FaultReports::reportLostMessages(const Plan& plan, std::size_t largest) {

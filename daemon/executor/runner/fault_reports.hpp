@@ -51,7 +51,7 @@ class FaultReports {
     const Loop& loop_;
     TellEvent tell_;
     PublishFault publish_;
-    std::uint64_t reported_faults_ = 0;  // LoopFigures::faults at the last report
+    std::uint64_t reported_faults_ = 0;  // LoopStatistics::faults at the last report
     FaultReportLimit not_finite_;
     OverrunReport overruns_;
     SizeWatch sizes_;

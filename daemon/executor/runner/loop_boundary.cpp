@@ -4,7 +4,7 @@
 
 #include <utility>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 #include "common/time_units.hpp"
 
 namespace rtcf::executor {
@@ -29,16 +29,15 @@ LoopBoundary::LoopBoundary(std::string runner, const RunnerSettings& settings, L
 void LoopBoundary::adopt(Adoption& adoption) {
     activity_.end();
     if (loop_.adopt(adoption, timeout())) return;
-    throw Refusal(RefusalKind::Unavailable,
-                  fmt::format("the loop of {} reaches no cycle boundary: {}; nothing has changed",
-                              runner_, whatDoesNotReturn()));
+    throw Error(ErrorKind::Unavailable,
+                fmt::format("the loop of {} reaches no cycle boundary: {}; nothing has changed",
+                            runner_, whatDoesNotReturn()));
 }
 
 void LoopBoundary::capture(Capture& capture) {
     if (loop_.capture(capture, timeout())) return;
-    throw Refusal(
-        RefusalKind::Unavailable,
-        fmt::format("the loop of {} reaches no cycle boundary: {}", runner_, whatDoesNotReturn()));
+    throw Error(ErrorKind::Unavailable, fmt::format("the loop of {} reaches no cycle boundary: {}",
+                                                    runner_, whatDoesNotReturn()));
 }
 
 std::size_t LoopBoundary::mostBytes() const {
@@ -49,8 +48,8 @@ std::size_t LoopBoundary::mostBytes() const {
 void LoopBoundary::requireSmall(std::size_t bytes, const char* what) const {
     const std::size_t most = mostBytes();
     if (bytes <= most) return;
-    throw Refusal(
-        RefusalKind::ResourceExhausted,
+    throw Error(
+        ErrorKind::ResourceExhausted,
         fmt::format(
             "{} touches {} bytes in one cycle of {}; the limit is {} at {:g} Hz: stop the loop, "
             "or lower its frequency",

@@ -23,15 +23,15 @@ class LoopBoundary {
                  const FlightRecorder& recorder, HookActivity& activity);
 
     /// Applies an adoption.
-    /// @throws Refusal if the loop does not apply it in time; nothing has changed then
+    /// @throws Error if the loop does not apply it in time; nothing has changed then
     void adopt(Adoption& adoption);
-    /// Copies values. @throws Refusal if the loop does not copy them in time
+    /// Copies values. @throws Error if the loop does not copy them in time
     void capture(Capture& capture);
 
     /// Most bytes to copy at one boundary.
     std::size_t mostBytes() const;
     /// @param what subject of the message, e.g. "a snapshot"
-    /// @throws Refusal if these are too many bytes for one boundary
+    /// @throws Error if these are too many bytes for one boundary
     void requireSmall(std::size_t bytes, const char* what) const;
 
     /// Longest wait for the boundary, ns.

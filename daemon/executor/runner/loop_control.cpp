@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 #include "logging/log_errors.hpp"
 
 namespace rtcf::executor {
@@ -87,9 +87,9 @@ const std::vector<std::string>& LoopControl::start(const Progress& progress) {
 // A stop is final: a job posted before it must not start cycles.
 void LoopControl::requireNoStop() const {
     if (loop_.stops() == job_stops_) return;
-    throw Refusal(RefusalKind::LoopStopped,
-                  fmt::format("the loop of {} is not started: a stop was requested after the start",
-                              runner_));
+    throw Error(ErrorKind::LoopStopped,
+                fmt::format("the loop of {} is not started: a stop was requested after the start",
+                            runner_));
 }
 
 void LoopControl::startComponents(const Progress& progress) {
@@ -107,10 +107,10 @@ RealtimeProblems LoopControl::lockAndStart() {
         problems.push_back(std::move(problem));
     for (const RealtimeProblem& problem : problems) {
         if (!problem.essential || !settings_.realtime_required) continue;
-        throw Refusal(RefusalKind::NoRealtime,
-                      fmt::format("no real time: {}; to run degraded: rtcfctl runner set {} "
-                                  "--realtime preferred",
-                                  problem.text, runner_));
+        throw Error(ErrorKind::NoRealtime,
+                    fmt::format("no real time: {}; to run degraded: rtcfctl runner set {} "
+                                "--realtime preferred",
+                                problem.text, runner_));
     }
     spin_tuner_.reset();
     for (RealtimeProblem& problem : loop_.start(settings, job_stops_))
@@ -128,9 +128,9 @@ void LoopControl::stop(const Progress& progress) {
     progress("stopping the loop");
     if (!loop_.stopRequested()) loop_.requestStop();  // once, so that a later start stays valid
     if (!loop_.join(boundary_.timeout())) {
-        throw Refusal(RefusalKind::Unavailable,
-                      fmt::format("the loop of {} does not reach the end of its cycle: {}", runner_,
-                                  boundary_.whatDoesNotReturn()));
+        throw Error(ErrorKind::Unavailable,
+                    fmt::format("the loop of {} does not reach the end of its cycle: {}", runner_,
+                                boundary_.whatDoesNotReturn()));
     }
     loopEnded();
 }
@@ -142,10 +142,9 @@ void LoopControl::noticeEnd() {
 void LoopControl::requireNoLoop() {
     noticeEnd();
     if (!loop_.joinable()) return;
-    throw Refusal(
-        RefusalKind::LoopRuns,
-        fmt::format("the loop of {0} runs in real time: stop it first: rtcfctl -r {0} stop",
-                    runner_));
+    throw Error(ErrorKind::LoopRuns,
+                fmt::format("the loop of {0} runs in real time: stop it first: rtcfctl -r {0} stop",
+                            runner_));
 }
 
 void LoopControl::loopEnded() {
@@ -215,7 +214,7 @@ void LoopControl::finish() noexcept {
 }
 
 void LoopControl::publish(const std::set<std::string>& changed) {
-    publication_.setGraph(takeSnapshot(*plan_, *publication_.graph(), changed));
+    publication_.setGraph(makeGraphView(*plan_, *publication_.graph(), changed));
     publishStatus();
 }
 

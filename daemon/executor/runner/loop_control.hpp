@@ -44,12 +44,12 @@ class LoopControl {
     /// @return missing prerequisites of real time, one line each
     const std::vector<std::string>& start(const Progress& progress);
     /// Stops the loop and all components.
-    /// @throws Refusal if a component does not return
+    /// @throws Error if a component does not return
     void stop(const Progress& progress);
     /// Handles a loop that has ended by itself, which is possible at any time, even while a change
     /// waits for the next boundary.
     void noticeEnd();
-    /// @throws Refusal if the loop runs
+    /// @throws Error if the loop runs
     void requireNoLoop();
 
     /// Starts all components and prepares the first step, see Loop::step().

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 
 namespace rtcf::executor {
 
@@ -53,8 +53,8 @@ ReplayOutcome OfflineRun::replay(const ReplayChunk& chunk, const Progress& progr
     if (chunk.begin) {
         outcome = beginReplay(chunk, progress);
     } else if (!replay_) {
-        throw Refusal(RefusalKind::NoReplay,
-                      fmt::format("no replay of {} is under way: it was stopped", runner_));
+        throw Error(ErrorKind::NoReplay,
+                    fmt::format("no replay of {} is under way: it was stopped", runner_));
     } else {
         try {
             outcome = replay_->run(chunk);
@@ -67,7 +67,7 @@ ReplayOutcome OfflineRun::replay(const ReplayChunk& chunk, const Progress& progr
     activity_.end();
     const bool failed = ended();
     if ((chunk.end && !outcome.more) || failed) end();
-    if (failed) throw Refusal(RefusalKind::LoopFailed, publication_.status().loop_fault);
+    if (failed) throw Error(ErrorKind::LoopFailed, publication_.status().loop_fault);
     return outcome;
 }
 

@@ -31,12 +31,12 @@ class OfflineRun {
 
     /// Runs cycles on a simulated clock, as fast as possible; then pauses.
     /// @param given_up set by any thread to pause at the next boundary; null = never
-    /// @throws Refusal if the loop runs, and others
+    /// @throws Error if the loop runs, and others
     ChangeOutcome step(std::uint64_t cycles, const Progress& progress,
                        const std::atomic<bool>* given_up);
     /// Runs a part of a replay. The first part recreates all components, and disconnects the bridge
     /// until the end of the replay.
-    /// @throws Refusal if the loop runs, and others
+    /// @throws Error if the loop runs, and others
     ReplayOutcome replay(const ReplayChunk& chunk, const Progress& progress);
     /// Ends steps or a replay, and stops all components. Does nothing if there are none.
     void end();

@@ -17,9 +17,9 @@ std::string cycles(std::uint64_t count) {
 }  // namespace
 
 std::string OverrunReport::take(const Loop& loop, const Graph& graph, bool last) {
-    const LoopFigures& figures = loop.figures();
-    const std::uint64_t overruns = figures.overruns.load(std::memory_order_relaxed);
-    const std::uint64_t missed = figures.missed.load(std::memory_order_relaxed);
+    const LoopStatistics& statistics = loop.statistics();
+    const std::uint64_t overruns = statistics.overruns.load(std::memory_order_relaxed);
+    const std::uint64_t missed = statistics.missed.load(std::memory_order_relaxed);
     const std::int64_t now = monotonicNow();
     if (overruns == told_overruns_) return {};
     if (!last && told_at_ns_ != 0 && now - told_at_ns_ < kInterval) return {};
@@ -27,7 +27,7 @@ std::string OverrunReport::take(const Loop& loop, const Graph& graph, bool last)
     if (missed != told_missed_) line += fmt::format(", {} missed", cycles(missed - told_missed_));
     if (told_at_ns_ != 0)
         line += fmt::format(" in {:.0f} s", static_cast<double>(now - told_at_ns_) / 1e9);
-    line += mostFrequentCause(figures, graph);
+    line += mostFrequentCause(statistics, graph);
     told_at_ns_ = now;
     told_overruns_ = overruns;
     told_missed_ = missed;
@@ -36,8 +36,8 @@ std::string OverrunReport::take(const Loop& loop, const Graph& graph, bool last)
 
 // The most frequent cause of overruns since the last line: a component, or a cause outside of
 // components.
-std::string OverrunReport::mostFrequentCause(const LoopFigures& figures, const Graph& graph) {
-    std::map<std::shared_ptr<const ComponentFigures>, std::uint64_t> present;
+std::string OverrunReport::mostFrequentCause(const LoopStatistics& statistics, const Graph& graph) {
+    std::map<std::shared_ptr<const ComponentStatistics>, std::uint64_t> present;
     std::string text;
     std::uint64_t most = 0;
     const auto consider = [&](std::uint64_t count, const std::string& cause) {
@@ -46,7 +46,7 @@ std::string OverrunReport::mostFrequentCause(const LoopFigures& figures, const G
         text = cause;
     };
     for (const GraphNode& node : graph.nodes()) {
-        const std::shared_ptr<const ComponentFigures> counted = node.instance->figures();
+        const std::shared_ptr<const ComponentStatistics> counted = node.instance->statistics();
         const std::uint64_t count = counted->overruns.load(std::memory_order_relaxed);
         const auto told = told_of_.find(counted);
         present.emplace(counted, count);
@@ -54,9 +54,9 @@ std::string OverrunReport::mostFrequentCause(const LoopFigures& figures, const G
                  ", most of them in " + node.instance->fullName());
     }
     told_of_ = std::move(present);
-    const std::uint64_t late = figures.late_wake_ups.value();
-    const std::uint64_t exchanges = figures.exchange_overruns.value();
-    const std::uint64_t frames = figures.frame_overruns.value();
+    const std::uint64_t late = statistics.late_wake_ups.value();
+    const std::uint64_t exchanges = statistics.exchange_overruns.value();
+    const std::uint64_t frames = statistics.frame_overruns.value();
     consider(late - std::exchange(told_late_, late),
              ", most of them because the machine woke the loop late");
     consider(exchanges - std::exchange(told_exchanges_, exchanges),

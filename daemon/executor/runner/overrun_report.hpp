@@ -20,7 +20,7 @@ class OverrunReport {
     std::string take(const Loop& loop, const Graph& graph, bool last);
 
    private:
-    std::string mostFrequentCause(const LoopFigures& figures, const Graph& graph);
+    std::string mostFrequentCause(const LoopStatistics& statistics, const Graph& graph);
 
     std::int64_t told_at_ns_ = 0;
     std::uint64_t told_overruns_ = 0;
@@ -28,7 +28,7 @@ class OverrunReport {
     std::uint64_t told_late_ = 0;
     std::uint64_t told_exchanges_ = 0;
     std::uint64_t told_frames_ = 0;
-    std::map<std::shared_ptr<const ComponentFigures>, std::uint64_t> told_of_;
+    std::map<std::shared_ptr<const ComponentStatistics>, std::uint64_t> told_of_;
 };
 
 }  // namespace rtcf::executor

@@ -8,8 +8,8 @@
 #include <mutex>
 #include <utility>
 
+#include "view/graph_view.hpp"
 #include "view/runner_status.hpp"
-#include "view/snapshot.hpp"
 
 namespace rtcf::executor {
 
@@ -17,7 +17,7 @@ class Publication {
    public:
     /// @name Graph thread
     /// @{
-    void setGraph(std::shared_ptr<const GraphSnapshot> graph) {
+    void setGraph(std::shared_ptr<const GraphView> graph) {
         const std::lock_guard<std::mutex> lock(mutex_);
         graph_ = std::move(graph);
     }
@@ -35,7 +35,7 @@ class Publication {
 
     /// @name Any thread
     /// @{
-    std::shared_ptr<const GraphSnapshot> graph() const {
+    std::shared_ptr<const GraphView> graph() const {
         const std::lock_guard<std::mutex> lock(mutex_);
         return graph_;
     }
@@ -49,7 +49,7 @@ class Publication {
    private:
     std::atomic<NumberedState> state_;
     mutable std::mutex mutex_;  // protects the following
-    std::shared_ptr<const GraphSnapshot> graph_ = std::make_shared<GraphSnapshot>();
+    std::shared_ptr<const GraphView> graph_ = std::make_shared<GraphView>();
     RunnerStatus status_;
 };
 

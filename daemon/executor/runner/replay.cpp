@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 
 namespace rtcf::executor {
 
@@ -23,8 +23,8 @@ void Replay::check(const BridgeTable& table, const std::vector<RecordedTopic>& t
         for (const RecordedTopic& recorded : topics) {
             if (recorded.topic != injector->topic() || recorded.md5 == injector->type().ros_md5)
                 continue;
-            throw Refusal(
-                RefusalKind::RecordingInvalid,
+            throw Error(
+                ErrorKind::RecordingInvalid,
                 fmt::format(
                     "{} is recorded as {} (MD5 {}), but its reader has type {} (MD5 {}): replay "
                     "without that topic, or remap the input",
@@ -74,11 +74,11 @@ void Replay::inject(const RecordedMessage& message) {
     if (found->second->deliver(reinterpret_cast<const std::uint8_t*>(message.bytes.data()),
                                static_cast<std::uint32_t>(message.bytes.size())))
         return;
-    throw Refusal(RefusalKind::RecordingInvalid,
-                  fmt::format("a message of {} at {:.9f} s is not of type {}: is the recording "
-                              "damaged?",
-                              message.topic, static_cast<double>(message.time_ns) / 1e9,
-                              found->second->type().ros_type));
+    throw Error(ErrorKind::RecordingInvalid,
+                fmt::format("a message of {} at {:.9f} s is not of type {}: is the recording "
+                            "damaged?",
+                            message.topic, static_cast<double>(message.time_ns) / 1e9,
+                            found->second->type().ros_type));
 }
 
 std::size_t Replay::takeOutputs(std::vector<RecordedMessage>& outputs) {

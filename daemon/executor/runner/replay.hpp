@@ -52,7 +52,7 @@ struct ReplayOutcome {
 
 class Replay {
    public:
-    /// @throws Refusal if a topic of the recording has another type than the input that reads it
+    /// @throws Error if a topic of the recording has another type than the input that reads it
     static void check(const BridgeTable& table, const std::vector<RecordedTopic>& topics);
 
     /// @param table table of the new components; no bridge serves it

@@ -142,17 +142,17 @@ ChangeOutcome Runner::stop(const Progress& progress) {
 
 void Runner::changeByBridge(const std::string& component, const ParameterBatch& batch,
                             const std::function<void(const std::string&)>& done) {
-    std::string refusal;
+    std::string message;
     try {
         setParameters(component, batch);
         RunnerEvent event{RunnerEvent::Kind::ParametersChanged, {}, component, 0};
         for (const auto& [name, value] : batch) event.parameters.push_back(name);
         tell(event);
     } catch (const std::exception& error) {
-        refusal = error.what();
-        log_.write(LogLevel::Warn, component, "a change requested by ROS was rejected: " + refusal);
+        message = error.what();
+        log_.write(LogLevel::Warn, component, "a change requested by ROS was rejected: " + message);
     }
-    done(refusal);
+    done(message);
 }
 
 std::vector<Probe::Value> Runner::probe(const std::string& name) {
@@ -169,13 +169,13 @@ std::vector<Probe::Value> Runner::probe(const std::string& name) {
 }
 
 std::vector<std::string> Runner::states(const std::string& name) {
-    StatePicture picture(plan_->graph.get(name).instance->component());
+    StateTexts states(plan_->graph.get(name).instance->component());
     Adoption look;
-    look.copies = picture.copies();
+    look.copies = states.copies();
     // A query must not delay the loop.
     if (look.copies.empty() || bytesOf(look.copies) > boundary_.mostBytes()) return {};
     if (!loop_.adopt(look, kProbeTimeout + 2 * settings_.loop.period_ns)) return {};
-    return picture.texts();
+    return states.texts();
 }
 
 }  // namespace rtcf::executor

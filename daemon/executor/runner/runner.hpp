@@ -25,7 +25,6 @@
 #include "faults/flight_recorder.hpp"
 #include "graph/definition.hpp"
 #include "graph/difference.hpp"
-#include "image/image.hpp"
 #include "logging/log.hpp"
 #include "loop/loop.hpp"
 #include "runner/active_plan.hpp"
@@ -42,6 +41,7 @@
 #include "runner/snapshots.hpp"
 #include "runner/transactions.hpp"
 #include "runner/value_changes.hpp"
+#include "snapshot/snapshot.hpp"
 #include "view/runner_view.hpp"
 #include "view/settings.hpp"
 
@@ -71,7 +71,7 @@ class Runner final : private RunnerView {
     void requestStop() noexcept { loop_.requestStop(); }
 
     /// @name Graph thread, from jobs
-    /// If a function throws Refusal, it has changed nothing.
+    /// If a function throws Error, it has changed nothing.
     /// @{
     void configure(RunnerSettings settings);
     /// Limits the number of published outputs; later changes beyond the limit are rejected.
@@ -130,9 +130,9 @@ class Runner final : private RunnerView {
         return values_.writeInput(name, port, message);
     }
     /// See Snapshots.
-    ImageOutcome takeImage() { return snapshots_.take(); }
-    ChangeOutcome restore(const RunnerImage& image, const Progress& progress) {
-        return snapshots_.restore(image, progress);
+    SnapshotOutcome takeSnapshot() { return snapshots_.take(); }
+    ChangeOutcome restore(const Snapshot& snapshot, const Progress& progress) {
+        return snapshots_.restore(snapshot, progress);
     }
     /// The component's object. The caller must not use it while the loop runs.
     const Component& component(const std::string& name) const {
@@ -150,7 +150,7 @@ class Runner final : private RunnerView {
     /// @name Any thread, at any time
     /// @{
     const std::string& name() const noexcept override { return name_; }
-    std::shared_ptr<const GraphSnapshot> snapshot() const override { return publication_.graph(); }
+    std::shared_ptr<const GraphView> graph() const override { return publication_.graph(); }
     RunnerStatus status() const override { return publication_.status(); }
     NumberedState numberedState() const noexcept { return publication_.state(); }
     const Loop& loop() const noexcept override { return loop_; }
@@ -162,7 +162,7 @@ class Runner final : private RunnerView {
     }
     void onReadersAwaited(std::function<void()> tell) { frames_.onReadersAwaited(std::move(tell)); }
     /// See Loop. One thread only.
-    void holdFigures(bool held) noexcept { loop_.holdFigures(held); }
+    void holdStatistics(bool held) noexcept { loop_.holdStatistics(held); }
     /// Hook that the graph thread is running, and since when (CLOCK_MONOTONIC, ns); empty = none.
     std::pair<std::string, std::int64_t> activity() const { return activity_.present(); }
     /// @}

@@ -64,7 +64,7 @@ void Simulation::reportJumps(const TellEvent& tell) {
         tell({RunnerEvent::Kind::Clock,
               message,
               {},
-              loop_.figures().iteration.load(std::memory_order_relaxed)});
+              loop_.statistics().iteration.load(std::memory_order_relaxed)});
     }
 }
 

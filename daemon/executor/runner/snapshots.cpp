@@ -5,10 +5,10 @@
 
 #include <algorithm>
 
-#include "common/refusal.hpp"
-#include "image/image_restorer.hpp"
-#include "image/image_taker.hpp"
+#include "common/error.hpp"
 #include "realtime/cycle_counter.hpp"
+#include "snapshot/snapshot_restorer.hpp"
+#include "snapshot/snapshot_taker.hpp"
 
 namespace rtcf::executor {
 
@@ -30,9 +30,9 @@ Snapshots::Snapshots(std::string runner, const RunnerSettings& settings, const L
       transactions_(transactions),
       offline_(offline) {}
 
-ImageOutcome Snapshots::take() {
+SnapshotOutcome Snapshots::take() {
     control_.noticeEnd();
-    ImageTaker taker(*plan_);
+    SnapshotTaker taker(*plan_);
     // The first capture finds the lengths of values; they may grow until the next one.
     for (int tries = 4; tries > 0; --tries) {
         boundary_.requireSmall(taker.capture().bytes(), "a snapshot");
@@ -41,17 +41,17 @@ ImageOutcome Snapshots::take() {
         taker.makeRoom();
     }
     if (taker.capture().lacks_room) {
-        throw Refusal(RefusalKind::Unavailable,
-                      fmt::format("values in {} grow faster than they can be copied: take the "
-                                  "snapshot again, or stop the loop",
-                                  runner_));
+        throw Error(ErrorKind::Unavailable,
+                    fmt::format("values in {} grow faster than they can be copied: take the "
+                                "snapshot again, or stop the loop",
+                                runner_));
     }
-    ImageOutcome outcome{taker.image(), {}};
-    outcome.image.runner = runner_;
-    outcome.image.taken_ns = realtimeNow();
-    outcome.image.period_ns = settings_.loop.period_ns;
+    SnapshotOutcome outcome{taker.snapshot(), {}};
+    outcome.snapshot.runner = runner_;
+    outcome.snapshot.taken_ns = realtimeNow();
+    outcome.snapshot.period_ns = settings_.loop.period_ns;
     std::vector<std::string> stateless;
-    for (const ImageComponent& component : outcome.image.components) {
+    for (const SnapshotComponent& component : outcome.snapshot.components) {
         if (component.states.empty()) stateless.push_back(component.name);
     }
     if (!stateless.empty()) {
@@ -68,17 +68,17 @@ ImageOutcome Snapshots::take() {
     return outcome;
 }
 
-ChangeOutcome Snapshots::restore(const RunnerImage& image, const Progress& progress) {
+ChangeOutcome Snapshots::restore(const Snapshot& snapshot, const Progress& progress) {
     control_.noticeEnd();
     transactions_.requireNoReplay();
-    if (image.period_ns != settings_.loop.period_ns) {
-        const double frequency = 1e9 / static_cast<double>(image.period_ns);
-        throw Refusal(RefusalKind::FailedPrecondition,
-                      fmt::format("the snapshot was taken at {0:g} Hz, but {1} runs at {2:g} Hz: "
-                                  "rtcfctl runner set {1} --frequency {0:g}",
-                                  frequency, runner_, settings_.frequency_hz));
+    if (snapshot.period_ns != settings_.loop.period_ns) {
+        const double frequency = 1e9 / static_cast<double>(snapshot.period_ns);
+        throw Error(ErrorKind::FailedPrecondition,
+                    fmt::format("the snapshot was taken at {0:g} Hz, but {1} runs at {2:g} Hz: "
+                                "rtcfctl runner set {1} --frequency {0:g}",
+                                frequency, runner_, settings_.frequency_hz));
     }
-    ImageRestorer restorer(image, *plan_);
+    SnapshotRestorer restorer(snapshot, *plan_);
     boundary_.requireSmall(restorer.restoration().bytes(), "the snapshot");
     if (loop_.inRealTime()) restorer.requireReserved();
     const bool begins = !loop_.joinable() && control_.state() != RunnerState::Stepping;

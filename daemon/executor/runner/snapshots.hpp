@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "image/image.hpp"
 #include "loop/loop.hpp"
 #include "runner/active_plan.hpp"
 #include "runner/change_outcome.hpp"
@@ -13,13 +12,14 @@
 #include "runner/loop_control.hpp"
 #include "runner/offline_run.hpp"
 #include "runner/transactions.hpp"
+#include "snapshot/snapshot.hpp"
 #include "view/settings.hpp"
 
 namespace rtcf::executor {
 
 /// A snapshot, and notes on omitted values, one line each.
-struct ImageOutcome {
-    RunnerImage image;
+struct SnapshotOutcome {
+    Snapshot snapshot;
     std::vector<std::string> notes;
 };
 
@@ -33,11 +33,11 @@ class Snapshots {
               Transactions& transactions, OfflineRun& offline);
 
     /// Takes a snapshot at one boundary.
-    ImageOutcome take();
+    SnapshotOutcome take();
     /// Restores a snapshot at one boundary: parameters, declared state, and the values of
     /// connections. If the loop does not run, it is then paused, as after a step.
-    /// @throws Refusal and others; nothing has changed then
-    ChangeOutcome restore(const RunnerImage& image, const Progress& progress);
+    /// @throws Error and others; nothing has changed then
+    ChangeOutcome restore(const Snapshot& snapshot, const Progress& progress);
 
    private:
     const std::string runner_;

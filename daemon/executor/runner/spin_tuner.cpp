@@ -9,7 +9,7 @@ namespace rtcf::executor {
 void SpinTuner::tune(Loop& loop, std::int64_t period_ns) {
     const std::int64_t now_ns = monotonicNow();
     if (now_ns - tuned_at_ns_ < kSecond) return;
-    const HistogramSnapshot now = loop.figures().wake_up.snapshot();
+    const HistogramSnapshot now = loop.statistics().wake_up.snapshot();
     const DistributionSummary late = summarize(difference(now, measured_), 1.0);
     measured_ = now;
     tuned_at_ns_ = now_ns;

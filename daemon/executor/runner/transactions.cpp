@@ -4,7 +4,7 @@
 
 #include <rtcf/design_period.hpp>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 #include "logging/log_errors.hpp"
 #include "names/name_pattern.hpp"
 
@@ -51,10 +51,10 @@ MappingFilter Transactions::filter() const {
 
 void Transactions::requireNoReplay() const {
     if (!replaying_) return;
-    throw Refusal(RefusalKind::ReplayRuns,
-                  fmt::format("a replay of {0} is under way: wait for its end, or stop it: "
-                              "rtcfctl -r {0} stop",
-                              runner_));
+    throw Error(ErrorKind::ReplayRuns,
+                fmt::format("a replay of {0} is under way: wait for its end, or stop it: "
+                            "rtcfctl -r {0} stop",
+                            runner_));
 }
 
 std::vector<std::string> Transactions::adopt(Change change, const Progress& progress) {
@@ -85,9 +85,9 @@ std::vector<std::string> Transactions::adopt(Change change, const Progress& prog
     progress("adopting the change");
     boundary_.adopt(adoption);
     if (change.restoration != nullptr && change.restoration->taken_out != nullptr) {
-        throw Refusal(RefusalKind::FailedPrecondition,
-                      fmt::format("{} was taken out after a fault: replace it first",
-                                  change.restoration->taken_out->full_name));
+        throw Error(ErrorKind::FailedPrecondition,
+                    fmt::format("{} was taken out after a fault: replace it first",
+                                change.restoration->taken_out->full_name));
     }
     plan->noteKept(adoption, *plan_);
     // Destroyed last: leaving components use it until they are cleaned up.
@@ -121,10 +121,10 @@ void Transactions::handOver(Change& change, const Instance& previous,
     for (const HandOver& other : change.hand_overs) bytes += bytesOf(other.states);
     boundary_.requireSmall(bytes, "the state to hand over");
     if (bytes > kLargestState) {
-        throw Refusal(RefusalKind::StateTooLarge,
-                      fmt::format("a hand-over of {} bytes of state exceeds the limit of {} bytes: "
-                                  "replace fewer components at a time",
-                                  bytes, kLargestState));
+        throw Error(ErrorKind::StateTooLarge,
+                    fmt::format("a hand-over of {} bytes of state exceeds the limit of {} bytes: "
+                                "replace fewer components at a time",
+                                bytes, kLargestState));
     }
     change.hand_overs.push_back(std::move(hand_over));
 }
@@ -151,11 +151,10 @@ void Transactions::checkTaps(const Wiring& wiring) const {
         taps += connection.published ? 1 + connection.others.size() : 0;
     // If the limit was lowered, existing taps may stay, and their number may shrink.
     if (taps <= most_taps_ || taps <= plan_->taps.size()) return;
-    throw Refusal(
-        RefusalKind::ResourceExhausted,
-        fmt::format("{} published outputs (taps) are more than the {} allowed: reduce the "
-                    "whitelist, or raise taps under [limits] in rtcfd's settings",
-                    taps, most_taps_));
+    throw Error(ErrorKind::ResourceExhausted,
+                fmt::format("{} published outputs (taps) are more than the {} allowed: reduce the "
+                            "whitelist, or raise taps under [limits] in rtcfd's settings",
+                            taps, most_taps_));
 }
 
 ChangeOutcome Transactions::load(ComponentDefinition definition, const std::string& library,
@@ -193,7 +192,7 @@ void Transactions::addRemarks(ChangeOutcome& outcome,
 
 ChangeOutcome Transactions::unload(const std::vector<std::string>& names,
                                    const Progress& progress) {
-    if (names.empty()) throw Refusal(RefusalKind::NameMissing, "no component to unload is named");
+    if (names.empty()) throw Error(ErrorKind::NameMissing, "no component to unload is named");
     Change change;
     change.graph = plan_->graph;
     for (const std::string& name : names) {
@@ -393,7 +392,7 @@ void Transactions::adoptFrames() {
 
 ChangeOutcome Transactions::setBreaks(const std::vector<std::pair<std::string, std::string>>& ports,
                                       bool broken) {
-    if (ports.empty()) throw Refusal(RefusalKind::NameMissing, "no input is named");
+    if (ports.empty()) throw Error(ErrorKind::NameMissing, "no input is named");
     Change change;
     change.graph = plan_->graph;
     for (const auto& [component, port] : ports) change.graph.setBreak(component, port, broken);

@@ -62,7 +62,7 @@ class Transactions {
     void limitTaps(std::size_t most) noexcept { most_taps_ = most; }
     /// Rejects changes while a replay runs, or accepts them again.
     void setReplaying(bool replaying) noexcept { replaying_ = replaying; }
-    /// @throws Refusal while a replay runs
+    /// @throws Error while a replay runs
     void requireNoReplay() const;
 
     /// @name Changes of the graph. If one throws, it has changed nothing.
@@ -90,7 +90,7 @@ class Transactions {
     void makeWritable(const std::string& topic);
     /// Wires, starts and adopts a change; then stops and cleans up leaving components.
     /// @return notes on the hand-over of state
-    /// @throws Refusal and others; nothing has changed then
+    /// @throws Error and others; nothing has changed then
     std::vector<std::string> adopt(Change change, const Progress& progress);
     /// @}
 

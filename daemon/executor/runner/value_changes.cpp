@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 #include "logging/log_errors.hpp"
 #include "state/state_value.hpp"
 
@@ -26,8 +26,8 @@ ValueChanges::ValueChanges(std::string runner, const Loop& loop, LoopBoundary& b
 ChangeOutcome ValueChanges::reset(const std::string& name) {
     const Component& component = plan_->graph.get(name).instance->component();
     if (component.states().empty()) {
-        throw Refusal(RefusalKind::NoState,
-                      fmt::format("{} declares no state (rtcf::State) to reset", name));
+        throw Error(ErrorKind::NoState,
+                    fmt::format("{} declares no state (rtcf::State) to reset", name));
     }
     Transactions::Change change;
     change.graph = plan_->graph;
@@ -43,10 +43,10 @@ ChangeOutcome ValueChanges::setStates(
     control_.noticeEnd();
     const auto& states = plan_->graph.get(name).instance->component().states();
     if (loop_.joinable()) {
-        throw Refusal(RefusalKind::FailedPrecondition,
-                      fmt::format("the loop of {0} runs: stop it to set state: rtcfctl -r "
-                                  "{0} stop",
-                                  runner_));
+        throw Error(ErrorKind::FailedPrecondition,
+                    fmt::format("the loop of {0} runs: stop it to set state: rtcfctl -r "
+                                "{0} stop",
+                                runner_));
     }
     std::vector<std::vector<std::byte>> values;
     Transactions::Change change;
@@ -55,9 +55,9 @@ ChangeOutcome ValueChanges::setStates(
             std::find_if(states.begin(), states.end(),
                          [&](const StateDeclaration& state) { return state.name == state_name; });
         if (found == states.end()) {
-            throw Refusal(RefusalKind::NotFound,
-                          fmt::format("{} declares no state {}: rtcfctl info {} lists its states",
-                                      name, state_name, name));
+            throw Error(ErrorKind::NotFound,
+                        fmt::format("{} declares no state {}: rtcfctl info {} lists its states",
+                                    name, state_name, name));
         }
         values.push_back(stateValue(name, *found, value));
         change.copies.push_back({found->value, values.back().data(), found->size});
@@ -103,27 +103,27 @@ WritableInput ValueChanges::writableInput(const std::string& name, const std::st
         if (!found) continue;
         if (connection.writer) {
             const Writer& writer = *connection.writer;
-            throw Refusal(RefusalKind::TwoWriters,
-                          fmt::format("{} reads {}.{}: write to an input that no component feeds",
-                                      full, plan_->graph.nodes()[writer.node].instance->fullName(),
-                                      writer.output->name()));
+            throw Error(ErrorKind::TwoWriters,
+                        fmt::format("{} reads {}.{}: write to an input that no component feeds",
+                                    full, plan_->graph.nodes()[writer.node].instance->fullName(),
+                                    writer.output->name()));
         }
         const auto injector = plan_->injectors.find(topic);
         if (injector != plan_->injectors.end() && bridge_.feeds(*injector->second)) {
-            throw Refusal(RefusalKind::TwoWriters,
-                          fmt::format("{0} reads the ROS topic {1}: publish there (rostopic pub "
-                                      "{1}), or keep the topic out: rtcfctl runner set --blacklist",
-                                      full, topic));
+            throw Error(ErrorKind::TwoWriters,
+                        fmt::format("{0} reads the ROS topic {1}: publish there (rostopic pub "
+                                    "{1}), or keep the topic out: rtcfctl runner set --blacklist",
+                                    full, topic));
         }
         if (*input.type().ros_type == '\0') {
-            throw Refusal(RefusalKind::InvalidArgument,
-                          fmt::format("{} is of type {}, which has no text form: write to an input "
-                                      "of a number, bool, string, Eigen type or ROS message",
-                                      full, input.type().name));
+            throw Error(ErrorKind::InvalidArgument,
+                        fmt::format("{} is of type {}, which has no text form: write to an input "
+                                    "of a number, bool, string, Eigen type or ROS message",
+                                    full, input.type().name));
         }
         return {topic, &input.type()};
     }
-    throw Refusal(RefusalKind::PortNotFound, fmt::format("{} has no connection", full));
+    throw Error(ErrorKind::PortNotFound, fmt::format("{} has no connection", full));
 }
 
 ChangeOutcome ValueChanges::writeInput(const std::string& name, const std::string& port,
@@ -135,16 +135,16 @@ ChangeOutcome ValueChanges::writeInput(const std::string& name, const std::strin
     const auto size = static_cast<std::uint32_t>(message.size());
     // Validates before any change.
     if (!type->deserialize(*type->make_slot(nullptr), bytes, size)) {
-        throw Refusal(
-            RefusalKind::InvalidArgument,
+        throw Error(
+            ErrorKind::InvalidArgument,
             fmt::format("{}.{} is of type {}: the value has another size", name, port, type->name));
     }
     if (plan_->injectors.count(topic) == 0) transactions_.makeWritable(topic);
     if (!plan_->injectors.at(topic)->deliver(bytes, size)) {
-        throw Refusal(RefusalKind::InvalidArgument,
-                      fmt::format("{}.{}: a value of {} bytes is too large: rtcfctl runner set "
-                                  "--largest-message",
-                                  name, port, size));
+        throw Error(ErrorKind::InvalidArgument,
+                    fmt::format("{}.{}: a value of {} bytes is too large: rtcfctl runner set "
+                                "--largest-message",
+                                name, port, size));
     }
     return outcomeWith(*plan_, name);
 }

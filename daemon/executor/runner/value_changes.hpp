@@ -1,6 +1,6 @@
 /// @file
 /// Changes of values at one cycle boundary: parameters, declared state, and inputs without a
-/// writer. Owned by the runner; graph thread. If a function throws Refusal, it has changed nothing.
+/// writer. Owned by the runner; graph thread. If a function throws Error, it has changed nothing.
 #pragma once
 
 #include <string>
@@ -41,7 +41,7 @@ class ValueChanges {
     ChangeOutcome setStates(const std::string& name,
                             const std::vector<std::pair<std::string, ParameterValue>>& batch);
     /// The input, if it can be written.
-    /// @throws Refusal also if a component or ROS writes it
+    /// @throws Error also if a component or ROS writes it
     WritableInput writableInput(const std::string& name, const std::string& port) const;
     /// Writes a value to such an input.
     /// @param message serialised message of the input's ROS type

@@ -5,9 +5,9 @@
 #include <utility>
 #include <vector>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 #include "messages/from_wire.hpp"
-#include "messages/image_file.hpp"
+#include "messages/snapshot_file.hpp"
 
 namespace rtcf::executor {
 
@@ -32,8 +32,7 @@ ChangeOutcome change(Runner& runner, const v1::Request& request, const Progress&
             return runner.stop(progress);
         case v1::Request::kStep:
             if (request.step().cycles() == 0)
-                throw Refusal(RefusalKind::InvalidArgument,
-                              "0 cycles to step: give a positive number");
+                throw Error(ErrorKind::InvalidArgument, "0 cycles to step: give a positive number");
             return runner.step(request.step().cycles(), progress, &given_up);
         case v1::Request::kLoad: {
             trustOwnerOf(runner, request.load());
@@ -51,13 +50,13 @@ ChangeOutcome change(Runner& runner, const v1::Request& request, const Progress&
         case v1::Request::kReplace: {
             trustOwnerOf(runner, request.replace());
             const std::string name = fullNameOf(request.replace().component());
-            for (const auto& component : runner.snapshot()->components) {
+            for (const auto& component : runner.graph()->components) {
                 if (component->full_name != name) continue;
                 return runner.replace(
                     name, replacementFrom(request.replace().replacement(), component->definition),
                     request.replace().library(), request.replace().reset_parameters(), progress);
             }
-            throw Refusal(RefusalKind::NotFound, fmt::format("no component {} to replace", name));
+            throw Error(ErrorKind::NotFound, fmt::format("no component {} to replace", name));
         }
         case v1::Request::kApply: {
             std::vector<WantedComponent> wanted;
@@ -75,7 +74,8 @@ ChangeOutcome change(Runner& runner, const v1::Request& request, const Progress&
             return runner.setBreaks(ports, request.set_breaks().broken());
         }
         case v1::Request::kRestoreSnapshot:
-            return runner.restore(imageFromFile(request.restore_snapshot().snapshot()), progress);
+            return runner.restore(snapshotFromFile(request.restore_snapshot().snapshot()),
+                                  progress);
         case v1::Request::kResetState:
             return runner.reset(fullNameOf(request.reset_state().component()));
         case v1::Request::kSetState:
@@ -88,8 +88,8 @@ ChangeOutcome change(Runner& runner, const v1::Request& request, const Progress&
             return runner.setParameters(fullNameOf(request.set_parameters().component()),
                                         parametersFrom(request.set_parameters().parameters()));
         default:
-            throw Refusal(RefusalKind::RequestMalformed,
-                          "a request of unknown kind: is rtcfd newer than its executor?");
+            throw Error(ErrorKind::RequestMalformed,
+                        "a request of unknown kind: is rtcfd newer than its executor?");
     }
 }
 

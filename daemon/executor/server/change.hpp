@@ -11,7 +11,7 @@ namespace rtcf::executor {
 
 /// Carries out a request that changes the graph or the loop. Graph thread.
 /// @param given_up set by any thread to pause a step at the next boundary
-/// @throws Refusal, also if the request is of another kind
+/// @throws Error, also if the request is of another kind
 ChangeOutcome change(Runner& runner, const v1::Request& request, const Progress& progress,
                      const std::atomic<bool>& given_up);
 

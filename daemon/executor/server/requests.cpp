@@ -38,9 +38,9 @@ std::string Server::stuck() const {
 void Server::requireNotStuck() const {
     const std::string where = stuck();
     if (where.empty()) return;
-    throw Refusal(RefusalKind::Unavailable,
-                  fmt::format("runner {} is stuck in {}(): only stop and restart are possible",
-                              runner_->name(), where));
+    throw Error(ErrorKind::Unavailable,
+                fmt::format("runner {} is stuck in {}(): only stop and restart are possible",
+                            runner_->name(), where));
 }
 
 void Server::handle(Connection& connection, const v1::Request& request) {
@@ -62,7 +62,7 @@ void Server::handle(Connection& connection, const v1::Request& request) {
         return;
     }
     if (!connection.greeted()) {
-        respond(id, errorResponse(request.id(), RefusalKind::FailedPrecondition,
+        respond(id, errorResponse(request.id(), ErrorKind::FailedPrecondition,
                                   "the first request must be hello"));
         return;
     }
@@ -76,15 +76,15 @@ void Server::handle(Connection& connection, const v1::Request& request) {
         } else {
             submitChange(id, request);
         }
-    } catch (const Refusal& refusal) {
-        respond(id, errorResponse(request.id(), refusal.kind(), refusal.what()));
+    } catch (const Error& error) {
+        respond(id, errorResponse(request.id(), error.kind(), error.what()));
     }
 }
 
 bool Server::answerQuery(std::uint64_t connection, const v1::Request& request) {
     v1::Response response;
     response.set_id(request.id());
-    const std::shared_ptr<const GraphSnapshot> graph = runner_->snapshot();
+    const std::shared_ptr<const GraphView> graph = runner_->graph();
     switch (request.kind_case()) {
         case v1::Request::kListComponents: {
             const RunnerState state = runner_->status().state;
@@ -99,7 +99,7 @@ bool Server::answerQuery(std::uint64_t connection, const v1::Request& request) {
             break;
         case v1::Request::kGetStatistics:
             *response.mutable_statistics() =
-                figures_->statistics(request.get_statistics().buckets());
+                statistics_->statistics(request.get_statistics().buckets());
             break;
         case v1::Request::kResetStatistics:
             resetStatistics(connection, request.id());
@@ -154,15 +154,15 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
                         ((request.kind_case() == v1::Request::kStep ||
                           request.kind_case() == v1::Request::kRestoreSnapshot) &&
                          runner_->status().state != RunnerState::Stepping);
-    if (begins && !runner_->loop().running() && !figures_->restart()) {
-        figures_->restartInStep();  // during a step, which this request waits for
+    if (begins && !runner_->loop().running() && !statistics_->restart()) {
+        statistics_->restartInStep();  // during a step, which this request waits for
     }
     // Steps and replays have no time limit; they report progress.
     const bool endless =
         request.kind_case() == v1::Request::kStep || request.kind_case() == v1::Request::kReplay;
     const auto given_up = std::make_shared<std::atomic<bool>>(false);
     const auto otherwise = [this, id] {
-        return errorResponse(id, RefusalKind::Unavailable,
+        return errorResponse(id, ErrorKind::Unavailable,
                              fmt::format("runner {} is stuck in {}()", runner_->name(), stuck()));
     };
     waiting_[{connection, id}] = {endless ? INT64_MAX : monotonicNow() + kHookTimeout, otherwise,
@@ -174,8 +174,8 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
         // out anyway.
         const auto require_wanted = [&] {
             if (!given_up->load() || request.kind_case() == v1::Request::kStop) return;
-            throw Refusal(RefusalKind::Unavailable,
-                          "given up: the caller has disconnected, or a hook took too long");
+            throw Error(ErrorKind::Unavailable,
+                        "given up: the caller has disconnected, or a hook took too long");
         };
         try {
             require_wanted();
@@ -202,17 +202,17 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
                 *response.mutable_input_type() = inputTypeTo(
                     runner_->writableInput(fullNameOf(input.component()), input.port()));
             } else if (request.kind_case() == v1::Request::kTakeSnapshot) {
-                *response.mutable_snapshot() = snapshotTo(runner_->takeImage());
+                *response.mutable_snapshot() = snapshotTo(runner_->takeSnapshot());
             } else {
                 *response.mutable_change() =
                     outcomeTo(change(*runner_, request, progress, *given_up));
             }
-        } catch (const Refusal& refusal) {
-            response = errorResponse(id, refusal.kind(), refusal.what());
+        } catch (const Error& error) {
+            response = errorResponse(id, error.kind(), error.what());
         } catch (const std::exception& error) {
-            response = errorResponse(id, RefusalKind::FailedPrecondition, error.what());
+            response = errorResponse(id, ErrorKind::FailedPrecondition, error.what());
         } catch (...) {
-            response = errorResponse(id, RefusalKind::FailedPrecondition, "an unknown exception");
+            response = errorResponse(id, ErrorKind::FailedPrecondition, "an unknown exception");
         }
         setState(response, runner_->numberedState());
         log_->drain();  // sends log records of hooks before the answer
@@ -228,10 +228,10 @@ void Server::requireStopsKnown(const v1::Request& request) const {
                       request.kind_case() == v1::Request::kReplay;
     const DirectStopReport report = direct_stop_->last();
     if (!runs || request.direct_stops() >= report.count) return;
-    throw Refusal(RefusalKind::LoopStopped,
-                  fmt::format("runner {} was stopped at its executor by user {} after this "
-                              "request: ask again",
-                              runner_->name(), report.user));
+    throw Error(ErrorKind::LoopStopped,
+                fmt::format("runner {} was stopped at its executor by user {} after this "
+                            "request: ask again",
+                            runner_->name(), report.user));
 }
 
 // Answers GetComponent. The graph view has the component; only values need the graph thread, and
@@ -239,7 +239,7 @@ void Server::requireStopsKnown(const v1::Request& request) const {
 void Server::submitProbe(std::uint64_t connection, const v1::Request& request) {
     const std::string name = fullNameOf(request.get_component().component());
     const std::uint64_t id = request.id();
-    const std::shared_ptr<const GraphSnapshot> graph = runner_->snapshot();
+    const std::shared_ptr<const GraphView> graph = runner_->graph();
     const RunnerState state = runner_->status().state;
     const auto found =
         std::find_if(graph->components.begin(), graph->components.end(),
@@ -271,26 +271,25 @@ void Server::beginWatch(std::uint64_t connection, const v1::Request& request) {
     const std::uint64_t watch = next_watch_++;
     const pb::WatchPortsRequest& asked = request.watch_ports();
     if (asked.component_times() && asked.min_max()) {
-        throw Refusal(RefusalKind::InvalidArgument,
-                      "component_times are available per cycle, not per window: request min_max "
-                      "without component_times");
+        throw Error(ErrorKind::InvalidArgument,
+                    "component_times are available per cycle, not per window: request min_max "
+                    "without component_times");
     }
     const auto& patterns = asked.selection();
     const Watch wanted{PortSelection({patterns.begin(), patterns.end()}), asked.component_times()};
     ports_.begin({connection, id}, watch, wanted, asked.every(), asked.min_max());
     const auto nothing = [id] {
-        return errorResponse(id, RefusalKind::Unavailable, "the stream has ended");
+        return errorResponse(id, ErrorKind::Unavailable, "the stream has ended");
     };
     waiting_[{connection, id}] = {INT64_MAX, nothing, nullptr};
     const bool allow_missing = request.watch_ports().allow_missing();
     runner_->post([this, connection, id, watch, wanted, allow_missing] {
         try {
             runner_->watch(watch, wanted, allow_missing);
-        } catch (const Refusal& refusal) {
-            post(connection, errorResponse(id, refusal.kind(), refusal.what()), true);
+        } catch (const Error& error) {
+            post(connection, errorResponse(id, error.kind(), error.what()), true);
         } catch (const std::exception& error) {
-            post(connection, errorResponse(id, RefusalKind::FailedPrecondition, error.what()),
-                 true);
+            post(connection, errorResponse(id, ErrorKind::FailedPrecondition, error.what()), true);
         }
     });
 }
@@ -302,7 +301,7 @@ void Server::endWatches(const std::vector<std::uint64_t>& watches) {
 
 pb::RunnerStatus Server::status() const {
     const RunnerStatus present = runner_->status();
-    const std::shared_ptr<const GraphSnapshot> graph = runner_->snapshot();
+    const std::shared_ptr<const GraphView> graph = runner_->graph();
     const Loop& loop = runner_->loop();
     pb::RunnerStatus status;
     status.set_runner(runner_->name());
@@ -317,12 +316,12 @@ pb::RunnerStatus Server::status() const {
     status.set_pid(::getpid());
     status.set_realtime_tid(loop.threadId());
     if (loop.cpu() >= 0) status.set_loop_cpu(loop.cpu());
-    figures_->addTo(status, *graph);
+    statistics_->addTo(status, *graph);
     status.set_components(static_cast<std::uint32_t>(graph->components.size()));
     status.set_generation(graph->generation);
     std::uint64_t faults = 0;
     for (const auto& component : graph->components)
-        faults += component->figures->faults.count.value();
+        faults += component->statistics->faults.count.value();
     status.set_faults(faults);
     for (const std::string& line : present.degraded) status.add_degraded(line);
     pb::RosStatus& ros = *status.mutable_ros();
@@ -354,7 +353,7 @@ void Server::goOnWithResets() {
     if (resets_.empty()) return;
     v1::Response answer;
     std::vector<Reset> answered;
-    if (figures_->restart()) {
+    if (statistics_->restart()) {
         answer.mutable_done();
         answered.swap(resets_);
     } else {
@@ -365,10 +364,10 @@ void Server::goOnWithResets() {
         if (late == resets_.end()) return;
         answered.assign(late, resets_.end());
         resets_.erase(late, resets_.end());
-        if (resets_.empty()) runner_->holdFigures(false);
+        if (resets_.empty()) runner_->holdStatistics(false);
         const std::string activity = runner_->recorder().realtimeActivity();
         answer = errorResponse(
-            0, RefusalKind::Unavailable,
+            0, ErrorKind::Unavailable,
             fmt::format(
                 "the loop of {} reaches no cycle boundary: {} does not return; the statistics "
                 "are not reset",

@@ -147,7 +147,7 @@ void Server::serve(Runner& runner, Log& log, Access& access, const DirectStop& d
     log_ = &log;
     access_ = &access;
     direct_stop_ = &direct_stop;
-    figures_ = std::make_unique<Figures>(runner, log);
+    statistics_ = std::make_unique<StatisticsReport>(runner, log);
     runner.onReadersAwaited([this] { wakeUp(); });
     while (!exiting_) {
         std::vector<pollfd> polled{
@@ -235,7 +235,7 @@ void Server::drop(std::uint64_t id) {
                                      [id](const Reset& each) { return each.connection == id; });
     if (gone == resets_.end()) return;
     resets_.erase(gone, resets_.end());
-    if (resets_.empty()) runner_->holdFigures(false);
+    if (resets_.empty()) runner_->holdStatistics(false);
 }
 
 void Server::respond(std::uint64_t connection, const v1::Response& response) {
@@ -251,7 +251,7 @@ void Server::respond(std::uint64_t connection, const v1::Response& response) {
         if (response.id() == 0) {
             log_->write(LogLevel::Error, {}, text);
         } else {
-            respond(connection, errorResponse(response.id(), RefusalKind::ResourceExhausted, text));
+            respond(connection, errorResponse(response.id(), ErrorKind::ResourceExhausted, text));
         }
         return;
     }

@@ -17,9 +17,9 @@
 #include "runner/runner.hpp"
 #include "server/connection.hpp"
 #include "server/direct_stop.hpp"
-#include "server/figures.hpp"
 #include "server/listen.hpp"
 #include "server/outside_calls.hpp"
+#include "server/statistics_report.hpp"
 #include "streams/port_streams.hpp"
 
 namespace rtcf::executor {
@@ -99,7 +99,7 @@ class Server {
     const DirectStop* direct_stop_ = nullptr;
     std::uint64_t next_id_ = 1;
     std::map<std::uint64_t, std::unique_ptr<Connection>> connections_;
-    std::unique_ptr<Figures> figures_;
+    std::unique_ptr<StatisticsReport> statistics_;
     std::vector<Reset> resets_;
 
     // Requests queued for the graph thread, by connection and id, with their timeouts.

@@ -56,13 +56,13 @@ std::vector<StateCopy> planReset(const Component& component) {
     return copies;
 }
 
-StatePicture::StatePicture(const Component& component) : declared_(component.states()) {
+StateTexts::StateTexts(const Component& component) : declared_(component.states()) {
     std::size_t size = 0;
     for (const StateDeclaration& state : declared_) size += state.size;
     bytes_.resize(size);
 }
 
-std::vector<StateCopy> StatePicture::copies() {
+std::vector<StateCopy> StateTexts::copies() {
     std::vector<StateCopy> copies;
     std::byte* to = bytes_.data();
     for (const StateDeclaration& state : declared_) {
@@ -72,7 +72,7 @@ std::vector<StateCopy> StatePicture::copies() {
     return copies;
 }
 
-std::vector<std::string> StatePicture::texts() const {
+std::vector<std::string> StateTexts::texts() const {
     std::vector<std::string> texts;
     const std::byte* from = bytes_.data();
     for (const StateDeclaration& state : declared_) {

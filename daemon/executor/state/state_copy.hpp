@@ -34,9 +34,9 @@ void planHandOver(const Component& previous, const Component& successor,
 std::vector<StateCopy> planReset(const Component& component);
 
 /// A copy of a component's state, of one cycle boundary.
-class StatePicture {
+class StateTexts {
    public:
-    explicit StatePicture(const Component& component);
+    explicit StateTexts(const Component& component);
     /// The copies that fill it; valid as long as this object.
     std::vector<StateCopy> copies();
     /// The values as text, in the order of declaration, after the copies were made. Not real-time

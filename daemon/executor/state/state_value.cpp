@@ -9,7 +9,7 @@
 #include <optional>
 #include <type_traits>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 
 namespace rtcf::executor {
 
@@ -65,14 +65,13 @@ std::vector<std::byte> stateValue(const std::string& component, const StateDecla
                                                                            known))
         return bytes;
     if (!known) {
-        throw Refusal(RefusalKind::FailedPrecondition,
-                      fmt::format("state {} of {} is {}: only numbers and bools can be set; "
-                                  "rtcfctl reset {} resets all state",
-                                  state.name, component, state.type, component));
+        throw Error(ErrorKind::FailedPrecondition,
+                    fmt::format("state {} of {} is {}: only numbers and bools can be set; "
+                                "rtcfctl reset {} resets all state",
+                                state.name, component, state.type, component));
     }
-    throw Refusal(
-        RefusalKind::InvalidArgument,
-        fmt::format("state {} of {} takes values of type {}", state.name, component, state.type));
+    throw Error(ErrorKind::InvalidArgument, fmt::format("state {} of {} takes values of type {}",
+                                                        state.name, component, state.type));
 }
 
 }  // namespace rtcf::executor

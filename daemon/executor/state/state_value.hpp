@@ -11,7 +11,7 @@ namespace rtcf::executor {
 
 /// Converts a value to the bytes of a state, which must be a number or a bool.
 /// @param component name, for errors
-/// @throws Refusal if the state is neither, or the value is not of its type
+/// @throws Error if the state is neither, or the value is not of its type
 std::vector<std::byte> stateValue(const std::string& component, const StateDeclaration& state,
                                   const ParameterValue& value);
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <utility>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 
 namespace rtcf::executor {
 
@@ -43,10 +43,10 @@ void skipGone(std::uint64_t& next, std::uint64_t& lost, const FrameRing& ring, s
 void PortStreams::begin(const Id& id, std::uint64_t watch, const Watch& wanted, std::uint32_t every,
                         bool min_max) {
     if (streams_.size() >= kMost) {
-        throw Refusal(RefusalKind::ResourceExhausted,
-                      fmt::format("{} streams of ports are open, which is the limit: "
-                                  "end another one",
-                                  kMost));
+        throw Error(ErrorKind::ResourceExhausted,
+                    fmt::format("{} streams of ports are open, which is the limit: "
+                                "end another one",
+                                kMost));
     }
     streams_.try_emplace(id, id, watch, wanted, every == 0 ? 1 : every, min_max);
 }

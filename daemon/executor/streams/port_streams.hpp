@@ -34,7 +34,7 @@ class PortStreams {
     /// Begins a stream. It sends nothing before a table for `watch` arrives.
     /// @param min_max true = minima and maxima of each window of `every` cycles; false = each
     /// `every`-th cycle
-    /// @throws Refusal if there are too many streams
+    /// @throws Error if there are too many streams
     void begin(const Id& id, std::uint64_t watch, const Watch& wanted, std::uint32_t every,
                bool min_max);
     /// Ends a stream.

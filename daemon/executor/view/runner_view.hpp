@@ -8,8 +8,8 @@
 #include <string>
 
 #include "loop/loop.hpp"
+#include "view/graph_view.hpp"
 #include "view/runner_status.hpp"
-#include "view/snapshot.hpp"
 
 namespace rtcf::executor {
 
@@ -18,7 +18,7 @@ class RunnerView {
     /// @name Any thread
     /// @{
     virtual const std::string& name() const noexcept = 0;
-    virtual std::shared_ptr<const GraphSnapshot> snapshot() const = 0;
+    virtual std::shared_ptr<const GraphView> graph() const = 0;
     virtual RunnerStatus status() const = 0;
     virtual const Loop& loop() const noexcept = 0;
     virtual std::uint64_t logRecordsDropped() const = 0;

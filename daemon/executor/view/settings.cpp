@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 #include "names/name_pattern.hpp"
 #include "names/names.hpp"
 #include "realtime/cpu_claim.hpp"
@@ -15,7 +15,7 @@ namespace rtcf::executor {
 namespace {
 
 [[noreturn]] void refuse(const std::string& message) {
-    throw Refusal(RefusalKind::InvalidArgument, message);
+    throw Error(ErrorKind::InvalidArgument, message);
 }
 
 template <typename T>

@@ -39,7 +39,7 @@ struct RunnerSettings {
 };
 
 /// Checks the settings, and sets the loop's period.
-/// @throws Refusal that names the setting, its value and its range
+/// @throws Error that names the setting, its value and its range
 void validate(RunnerSettings& settings);
 
 }  // namespace rtcf::executor

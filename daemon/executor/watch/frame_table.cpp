@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 #include "watch/frame_layout.hpp"
 
 namespace rtcf::executor {
@@ -158,17 +158,16 @@ void requireMatches(const PortSelection& selection, const Plan& plan) {
                         [&](const std::string& name) { return pattern.matches(name); }))
             continue;
         if (names.empty()) {
-            throw Refusal(RefusalKind::PortNotFound,
-                          fmt::format("{} matches nothing: no component of this runner has an "
-                                      "output of fixed size or declared state",
-                                      pattern.given()));
+            throw Error(ErrorKind::PortNotFound,
+                        fmt::format("{} matches nothing: no component of this runner has an "
+                                    "output of fixed size or declared state",
+                                    pattern.given()));
         }
         const bool all = names.size() <= kNamesInMessage;
         if (!all) names.resize(kNamesInMessage);
-        throw Refusal(
-            RefusalKind::PortNotFound,
-            fmt::format("{} matches no output of fixed size and no state; available: {}{}",
-                        pattern.given(), fmt::join(names, ", "), all ? "" : ", …"));
+        throw Error(ErrorKind::PortNotFound,
+                    fmt::format("{} matches no output of fixed size and no state; available: {}{}",
+                                pattern.given(), fmt::join(names, ", "), all ? "" : ", …"));
     }
 }
 

@@ -59,7 +59,7 @@ constexpr std::size_t kLargestFrame = std::size_t{64} * 1024;
 std::shared_ptr<const FrameTable> makeFrameTable(const Plan& plan, const FrameDemand& demand);
 
 /// Requires that each pattern of a selection matches something in the plan.
-/// @throws Refusal that lists the available names
+/// @throws Error that lists the available names
 void requireMatches(const PortSelection& selection, const Plan& plan);
 
 }  // namespace rtcf::executor

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 #include "names/names.hpp"
 
 namespace rtcf::executor {
@@ -85,9 +85,9 @@ bool PortSelection::Pattern::matches(const std::string& name) const {
 PortSelection::PortSelection(const std::vector<std::string>& patterns) {
     for (const std::string& given : patterns) {
         if (given.empty()) {
-            throw Refusal(RefusalKind::NameMissing,
-                          "a selection of ports is empty: name ports, e.g. /arm/pid.effort, or "
-                          "leave it out for all");
+            throw Error(ErrorKind::NameMissing,
+                        "a selection of ports is empty: name ports, e.g. /arm/pid.effort, or "
+                        "leave it out for all");
         }
         requireLength("a selection of ports", given, kLongestPattern);
         const Pattern& pattern = patterns_.emplace_back(given);

@@ -17,7 +17,7 @@ class PortSelection {
     /// @param patterns e.g. "/arm/*.effort". `*` matches any characters but '/', `**` any
     /// characters, `?` one character, [abc] and [a-z] one of these. A pattern without '.' matches
     /// all outputs and states of the components. Empty = everything
-    /// @throws Refusal if a pattern is empty or too long
+    /// @throws Error if a pattern is empty or too long
     explicit PortSelection(const std::vector<std::string>& patterns);
 
     /// A pattern for whole names.

@@ -67,7 +67,7 @@ void Rosout::show(const executor::RunnerView* runner) {
 const std::vector<std::string>& Rosout::topicsOf(const std::string& component) {
     static const std::vector<std::string> none;
     if (runner_ == nullptr) return none;
-    if (const auto graph = runner_->snapshot(); graph != graph_) {
+    if (const auto graph = runner_->graph(); graph != graph_) {
         graph_ = graph;
         topics_.clear();
         const auto add = [this](const std::string& of, const std::string& topic) {

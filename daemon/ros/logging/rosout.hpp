@@ -19,7 +19,7 @@ class NodeHandle;
 }
 namespace rtcf::executor {
 class RunnerView;
-struct GraphSnapshot;
+struct GraphView;
 }  // namespace rtcf::executor
 
 namespace rtcf::ros1 {
@@ -47,7 +47,7 @@ class Rosout {
 
     mutable std::mutex mutex_;  // protects all members below
     const executor::RunnerView* runner_ = nullptr;
-    std::shared_ptr<const executor::GraphSnapshot> graph_;  // graph view of topics_
+    std::shared_ptr<const executor::GraphView> graph_;  // graph view of topics_
     Topics topics_;
     ros::Publisher publisher_;
     std::string node_;

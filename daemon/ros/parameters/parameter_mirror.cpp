@@ -244,14 +244,14 @@ bool ParameterMirror::write(ParallelCalls& master, const Caller& caller,
                             const std::vector<Component>& components, Reconciled& result) {
     struct Written {
         Known* known;
-        const executor::ParameterSnapshot* parameter;
+        const executor::ParameterView* parameter;
     };
     std::vector<Written> writing;
     std::string problem;
     std::vector<MasterCall> calls;
     for (const Component& component : components) {
         Known& known = known_[component.set->full_name];
-        for (const executor::ParameterSnapshot& parameter : component.set->parameters) {
+        for (const executor::ParameterView& parameter : component.set->parameters) {
             const std::string& name = parameter.declaration.name;
             const std::string full = component.set->full_name + "/" + name;
             if (!canBeSent(parameter.value)) {

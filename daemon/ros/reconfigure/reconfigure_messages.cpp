@@ -14,7 +14,7 @@ namespace rtcf::ros1 {
 namespace {
 
 using executor::ParameterSet;
-using executor::ParameterSnapshot;
+using executor::ParameterView;
 
 // All parameters are in one group, as with a .cfg file without groups.
 constexpr const char* kGroup = "Default";
@@ -117,7 +117,7 @@ std::string docOf(const ParameterDeclaration& declaration) {
 
 dynamic_reconfigure::Config valuesOf(const ParameterSet& set) {
     dynamic_reconfigure::Config config;
-    for (const ParameterSnapshot& parameter : set.parameters)
+    for (const ParameterView& parameter : set.parameters)
         add(config, parameter.declaration, parameter.value);
     addGroup(config);
     return config;
@@ -127,7 +127,7 @@ dynamic_reconfigure::ConfigDescription descriptionOf(const ParameterSet& set) {
     dynamic_reconfigure::ConfigDescription description;
     dynamic_reconfigure::Group group;
     group.name = kGroup;
-    for (const ParameterSnapshot& parameter : set.parameters) {
+    for (const ParameterView& parameter : set.parameters) {
         const ParameterDeclaration& declaration = parameter.declaration;
         dynamic_reconfigure::ParamDescription entry;
         entry.name = declaration.name;
@@ -161,11 +161,10 @@ executor::ParameterBatch batchOf(const dynamic_reconfigure::Config& asked,
         }
     };
     const auto isInteger = [&set](const std::string& name) {
-        return std::any_of(set.parameters.begin(), set.parameters.end(),
-                           [&name](const ParameterSnapshot& parameter) {
-                               return parameter.declaration.name == name &&
-                                      parameter.declaration.type == "int";
-                           });
+        return std::any_of(
+            set.parameters.begin(), set.parameters.end(), [&name](const ParameterView& parameter) {
+                return parameter.declaration.name == name && parameter.declaration.type == "int";
+            });
     };
     take(asked.bools, shown.bools,
          [](const auto& each) { return ParameterValue(each.value != 0); });
@@ -204,10 +203,9 @@ std::vector<std::string> bringWithinBounds(executor::ParameterBatch& batch,
                                     number < low ? "minimum" : "maximum", nearest, value));
     };
     for (auto& [name, value] : batch) {
-        const auto found = std::find_if(set.parameters.begin(), set.parameters.end(),
-                                        [name = &name](const ParameterSnapshot& each) {
-                                            return each.declaration.name == *name;
-                                        });
+        const auto found = std::find_if(
+            set.parameters.begin(), set.parameters.end(),
+            [name = &name](const ParameterView& each) { return each.declaration.name == *name; });
         if (found == set.parameters.end()) continue;
         if (auto* integer = std::get_if<std::int64_t>(&value)) {
             if (found->declaration.type == "int") clamped(found->declaration, *integer);

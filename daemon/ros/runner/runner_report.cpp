@@ -74,15 +74,15 @@ std::string joined(const std::vector<std::string>& lines) {
 
 rtcf_msgs::GetLoop::Response describeRunner(const executor::RunnerView& runner) {
     const executor::RunnerStatus present = runner.status();
-    const std::shared_ptr<const executor::GraphSnapshot> graph = runner.snapshot();
-    const executor::LoopFigures& figures = runner.loop().figures();
+    const std::shared_ptr<const executor::GraphView> graph = runner.graph();
+    const executor::LoopStatistics& statistics = runner.loop().statistics();
     rtcf_msgs::GetLoop::Response response;
     response.runner = runner.name();
     response.state = stateName(present.state);
     response.status = present.loop_fault;
     response.frequency = present.settings.frequency_hz;
-    response.iteration = figures.iteration.load(std::memory_order_relaxed);
-    response.overruns = figures.overruns.load(std::memory_order_relaxed);
+    response.iteration = statistics.iteration.load(std::memory_order_relaxed);
+    response.overruns = statistics.overruns.load(std::memory_order_relaxed);
     response.generation = graph->generation;
     response.degraded = present.degraded;
     for (const auto& component : graph->components) {
@@ -92,7 +92,7 @@ rtcf_msgs::GetLoop::Response describeRunner(const executor::RunnerView& runner) 
         info.type = component->definition.type;
         info.is_first = component->definition.first ? 1 : 0;
         info.fault = component->fault;
-        for (const executor::PortSnapshot& port : component->ports) {
+        for (const executor::PortView& port : component->ports) {
             rtcf_msgs::LoopPort line;
             line.direction = port.output ? rtcf_msgs::LoopPort::OUTPUT : rtcf_msgs::LoopPort::INPUT;
             line.name = port.name;
@@ -100,11 +100,11 @@ rtcf_msgs::GetLoop::Response describeRunner(const executor::RunnerView& runner) 
             line.type = port.type->name;
             if (const auto found = graph->connections.find(port.mapped_name);
                 found != graph->connections.end()) {
-                const executor::ConnectionSnapshot& connection = found->second;
+                const executor::ConnectionView& connection = found->second;
                 line.connected = connection.writer && !connection.readers.empty() ? 1 : 0;
                 const bool mapped = connection.published || (!port.output && connection.subscribed);
                 line.mapped = mapped ? 1 : 0;
-                for (const executor::EndpointSnapshot& reader : connection.readers) {
+                for (const executor::EndpointView& reader : connection.readers) {
                     const bool same =
                         reader.component == component->full_name && reader.port == port.name;
                     if (same && !port.output) line.broken = reader.broken ? 1 : 0;
@@ -170,15 +170,15 @@ diagnostic_msgs::DiagnosticArray DiagnosticReport::take() {
     diagnostic_msgs::DiagnosticArray array;
     array.status.push_back(loopStatus());
     const double ns_per_tick = runner_.loop().counter().nsPerTick();
-    std::map<Figures, Counts> counts;
-    const std::shared_ptr<const executor::GraphSnapshot> graph = runner_.snapshot();
+    std::map<StatisticsReport, Counts> counts;
+    const std::shared_ptr<const executor::GraphView> graph = runner_.graph();
     for (const auto& component : graph->components) {
-        Counts& last = counts[component->figures];
-        if (const auto found = components_.find(component->figures); found != components_.end())
+        Counts& last = counts[component->statistics];
+        if (const auto found = components_.find(component->statistics); found != components_.end())
             last = std::move(found->second);
         array.status.push_back(componentStatus(name_ + ": " + component->full_name,
-                                               component->fault, *component->figures, ns_per_tick,
-                                               last));
+                                               component->fault, *component->statistics,
+                                               ns_per_tick, last));
     }
     components_ = std::move(counts);
     for (DiagnosticStatus& status : array.status) status.hardware_id = hardware_;
@@ -188,17 +188,17 @@ diagnostic_msgs::DiagnosticArray DiagnosticReport::take() {
 DiagnosticStatus DiagnosticReport::loopStatus() {
     const executor::RunnerStatus present = runner_.status();
     const executor::Loop& loop = runner_.loop();
-    const executor::LoopFigures& figures = loop.figures();
-    const executor::HistogramSnapshot duration = figures.duration.snapshot();
-    const executor::HistogramSnapshot latency = figures.latency.snapshot();
+    const executor::LoopStatistics& statistics = loop.statistics();
+    const executor::HistogramSnapshot duration = statistics.duration.snapshot();
+    const executor::HistogramSnapshot latency = statistics.latency.snapshot();
     std::uint64_t taps = 0;
-    const std::shared_ptr<const executor::GraphSnapshot> graph = runner_.snapshot();
+    const std::shared_ptr<const executor::GraphView> graph = runner_.graph();
     for (const auto& tap : graph->taps) taps += tap->dropped();
     std::uint64_t passed_over = 0;
     for (const auto& injector : graph->injectors) passed_over += injector->passedOver();
     const std::uint64_t logs = runner_.logRecordsDropped();
     const std::uint64_t cycles = loop.recordsDropped();
-    const std::uint64_t iteration = figures.iteration.load(std::memory_order_relaxed);
+    const std::uint64_t iteration = statistics.iteration.load(std::memory_order_relaxed);
     const std::int64_t now_ns = executor::monotonicNow();
     const std::uint64_t done = growth(iteration, iteration_);
     const std::int64_t elapsed_ns = time_ns_ == 0 ? 0 : now_ns - time_ns_;
@@ -209,8 +209,8 @@ DiagnosticStatus DiagnosticReport::loopStatus() {
     status.level = DiagnosticStatus::OK;
     status.message = stateName(present.state);
     const std::uint64_t overruns =
-        growth(figures.overruns.load(std::memory_order_relaxed), overruns_);
-    const std::uint64_t missed = growth(figures.missed.load(std::memory_order_relaxed), missed_);
+        growth(statistics.overruns.load(std::memory_order_relaxed), overruns_);
+    const std::uint64_t missed = growth(statistics.missed.load(std::memory_order_relaxed), missed_);
     const std::uint64_t dropped = growth(taps + logs + cycles, dropped_);
     if (dropped != 0) {
         raise(status, DiagnosticStatus::WARN,
@@ -274,7 +274,7 @@ DiagnosticStatus DiagnosticReport::loopStatus() {
 
 DiagnosticStatus DiagnosticReport::componentStatus(const std::string& name,
                                                    const std::string& fault,
-                                                   const executor::ComponentFigures& now,
+                                                   const executor::ComponentStatistics& now,
                                                    double ns_per_tick, Counts& last) {
     DiagnosticStatus status;
     status.name = name;

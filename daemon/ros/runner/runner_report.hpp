@@ -16,7 +16,7 @@
 #include "statistics/histogram.hpp"
 
 namespace rtcf::executor {
-struct ComponentFigures;
+struct ComponentStatistics;
 class RunnerView;
 }  // namespace rtcf::executor
 
@@ -41,17 +41,16 @@ class DiagnosticReport {
     diagnostic_msgs::DiagnosticArray take();
 
    private:
-    using Figures = std::shared_ptr<const executor::ComponentFigures>;
+    using StatisticsReport = std::shared_ptr<const executor::ComponentStatistics>;
     struct Counts {  // counts at the last report
         executor::HistogramSnapshot duration;
         std::uint64_t overruns = 0;
     };
 
     diagnostic_msgs::DiagnosticStatus loopStatus();
-    static diagnostic_msgs::DiagnosticStatus componentStatus(const std::string& name,
-                                                             const std::string& fault,
-                                                             const executor::ComponentFigures& now,
-                                                             double ns_per_tick, Counts& last);
+    static diagnostic_msgs::DiagnosticStatus componentStatus(
+        const std::string& name, const std::string& fault, const executor::ComponentStatistics& now,
+        double ns_per_tick, Counts& last);
     /// @return growth of a counter, which restarts from 0 with the loop
     static std::uint64_t growth(std::uint64_t now, std::uint64_t& last);
 
@@ -67,7 +66,7 @@ class DiagnosticReport {
     std::int64_t time_ns_ = 0;
     bool ran_ = false;                   // at the last report
     std::vector<std::string> degraded_;  // as last reported
-    std::map<Figures, Counts> components_;
+    std::map<StatisticsReport, Counts> components_;
 };
 
 }  // namespace rtcf::ros1

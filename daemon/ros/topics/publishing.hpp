@@ -37,7 +37,7 @@ class Publishing {
 
     /// Sets the delivery to subscribers; reconcile() reopens topics with another delivery. Any
     /// thread; returns at once.
-    /// @throws executor::Refusal if an expression is invalid
+    /// @throws executor::Error if an expression is invalid
     void configure(const executor::BridgeSettings& settings);
     /// Sets the taps. After configure(). An open topic continues at once with its new tap; a
     /// latched one keeps its last value until it is opened. Any thread; returns at once.

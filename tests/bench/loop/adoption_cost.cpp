@@ -31,9 +31,9 @@ void flushCaches() {
 
 // Duration of an adoption in ns, as the loop measures it.
 double adoptionOf(BenchGraph& graph, const std::function<void()>& change) {
-    const HistogramSnapshot before = graph.loop().figures().adoption.snapshot();
+    const HistogramSnapshot before = graph.loop().statistics().adoption.snapshot();
     change();
-    const HistogramSnapshot after = graph.loop().figures().adoption.snapshot();
+    const HistogramSnapshot after = graph.loop().statistics().adoption.snapshot();
     return rtcf::executor::summarize(difference(after, before), graph.loop().counter().nsPerTick())
         .max;
 }
@@ -76,10 +76,11 @@ int main(int argc, char** argv) try {
             found["load"].push_back(adoptionOf(graph, [&] { graph.adopt(grown); }));
             found["unload"].push_back(adoptionOf(graph, [&] { graph.adopt(small); }));
         }
-        std::vector<std::string> figures;
+        std::vector<std::string> statistics;
         for (const auto& [change, values] : found)
-            figures.push_back(fmt::format("\"{}_ns\": {:.0f}", change, median(values)));
-        rows.push_back(fmt::format("{{\"components\": {}, {}}}", length, fmt::join(figures, ", ")));
+            statistics.push_back(fmt::format("\"{}_ns\": {:.0f}", change, median(values)));
+        rows.push_back(
+            fmt::format("{{\"components\": {}, {}}}", length, fmt::join(statistics, ", ")));
     }
     fmt::print("{{\"rounds\": {}, \"graphs\": [{}]}}\n", rounds, fmt::join(rows, ", "));
     return 0;

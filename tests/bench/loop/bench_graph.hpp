@@ -36,7 +36,7 @@ class BenchGraph {
    public:
     /// @param library of rtcf_examples
     /// @param mapped  regular expression of connections that get a tap or an injector; empty = none
-    /// @throws executor::Refusal
+    /// @throws executor::Error
     BenchGraph(const std::vector<Node>& nodes, const std::string& library, std::string mapped = {});
     ~BenchGraph();
 

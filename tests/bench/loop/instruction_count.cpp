@@ -52,7 +52,7 @@ int runCounted(const std::string& library, const std::string& which, std::uint64
     raise(SIGSTOP);
     // Mean and maximum are exact, the histogram's quantiles are not.
     const executor::DistributionSummary cycle =
-        summarize(graph.loop().figures().duration.snapshot(), 1.0);
+        summarize(graph.loop().statistics().duration.snapshot(), 1.0);
     fmt::print(
         "{{\"graph\": \"{}\", \"cycles\": {}, \"instructions\": {:.1f}, \"max\": {}, "
         "\"whole\": {:.1f}, \"components\": {{",
@@ -60,7 +60,7 @@ int runCounted(const std::string& library, const std::string& which, std::uint64
         static_cast<double>(whole) / static_cast<double>(cycles));
     const char* separator = "";
     for (const executor::Step& step : graph.plan().schedule.steps) {
-        const auto update = summarize(step.figures->duration.snapshot(), 1.0);
+        const auto update = summarize(step.statistics->duration.snapshot(), 1.0);
         fmt::print("{}\"{}\": {}", separator, step.component->name(), update.p50);
         separator = ", ";
     }

@@ -56,9 +56,9 @@ int run(char** argv) {
             fmt::print(file.get(), "{} {}\n", record.duration_ns, record.latency_ns);
         }
     }
-    const executor::LoopFigures& figures = graph.loop().figures();
+    const executor::LoopStatistics& statistics = graph.loop().statistics();
     fmt::print("{{\"cycles\": {}, \"overruns\": {}, \"missed\": {}, \"records_dropped\": {}}}\n",
-               figures.iteration.load(), figures.overruns.load(), figures.missed.load(),
+               statistics.iteration.load(), statistics.overruns.load(), statistics.missed.load(),
                graph.loop().recordsDropped());
     return 0;
 }

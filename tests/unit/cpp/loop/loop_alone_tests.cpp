@@ -65,7 +65,7 @@ class LoopAlone : public ::testing::Test {
         }
     }
 
-    std::uint64_t iteration() const { return loop_.figures().iteration.load(); }
+    std::uint64_t iteration() const { return loop_.statistics().iteration.load(); }
     bool reaches(std::uint64_t iteration) {
         return eventually([&] { return this->iteration() >= iteration; });
     }
@@ -75,7 +75,7 @@ class LoopAlone : public ::testing::Test {
     Log log_{[](LogEntry&&) {}};
     Loop loop_{log_, recorder_, {}};
     ComponentContext context_;
-    ComponentFigures component_;
+    ComponentStatistics component_;
     Schedule schedule_;
     FrameRing* frames_ = nullptr;
     std::unique_ptr<Worker> worker_;
@@ -94,7 +94,7 @@ TEST_P(LoopSuspended, ASuspendNeitherStopsNorStallsTheLoop) {
         if (iteration == kAt) counter.shift(ticks);
     });
     ASSERT_TRUE(reaches(kAt + 100));
-    EXPECT_LT(loop_.figures().missed.load(), static_cast<std::uint64_t>(kSlept) * 1000)
+    EXPECT_LT(loop_.statistics().missed.load(), static_cast<std::uint64_t>(kSlept) * 1000)
         << "cycles missed during the suspend";
     stop();
 }
@@ -109,7 +109,7 @@ TEST_F(LoopAlone, FullBucketEndsTheLoop) {
     });
     ASSERT_TRUE(eventually([this] { return loop_.join(0); }));
     EXPECT_EQ(loop_.fault().kind, LoopFault::Kind::Overruns);
-    EXPECT_EQ(loop_.figures().overruns.load(), 4U);
+    EXPECT_EQ(loop_.statistics().overruns.load(), 4U);
 }
 
 TEST_F(LoopAlone, BucketOfNoSizeIsNeverFull) {
@@ -130,12 +130,12 @@ TEST_F(LoopAlone, FramesAreASeparateCauseOfOverruns) {
     start([](std::uint64_t) {});
     ASSERT_TRUE(reaches(60));
     stop();
-    const LoopFigures& figures = loop_.figures();
-    EXPECT_GE(figures.frame_overruns.value(), 20U);
+    const LoopStatistics& statistics = loop_.statistics();
+    EXPECT_GE(statistics.frame_overruns.value(), 20U);
     // A cycle delayed elsewhere has another cause.
-    EXPECT_EQ(figures.frame_overruns.value() + figures.exchange_overruns.value() +
-                  figures.late_wake_ups.value() + component_.overruns.load(),
-              figures.overruns.load());
+    EXPECT_EQ(statistics.frame_overruns.value() + statistics.exchange_overruns.value() +
+                  statistics.late_wake_ups.value() + component_.overruns.load(),
+              statistics.overruns.load());
 }
 
 }  // namespace

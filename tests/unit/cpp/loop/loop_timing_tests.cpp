@@ -28,8 +28,8 @@ class LoopTiming : public RunnerFixture {
         stop();
     }
 
-    std::uint64_t overruns() { return runner().loop().figures().overruns.load(); }
-    std::uint64_t missed() { return runner().loop().figures().missed.load(); }
+    std::uint64_t overruns() { return runner().loop().statistics().overruns.load(); }
+    std::uint64_t missed() { return runner().loop().statistics().missed.load(); }
     std::vector<std::string> linesOnOverruns() const {
         std::vector<std::string> lines;
         for (const RunnerEvent& event : events()) {
@@ -79,7 +79,7 @@ TEST_F(LoopTiming, RelativeRestartsThePeriod) {
 TEST_F(LoopTiming, OverrunIsCountedForTheComponentThatWasRunning) {
     load(definition("Ticker", "A"));
     overrun(OverrunPolicy::Skip);
-    EXPECT_GE(runner().snapshot()->get("/S").figures->overruns.load(), 1U);
+    EXPECT_GE(runner().graph()->get("/S").statistics->overruns.load(), 1U);
 }
 
 TEST_F(LoopTiming, AChangesDurationIsNoComponentsOverrun) {
@@ -91,7 +91,7 @@ TEST_F(LoopTiming, AChangesDurationIsNoComponentsOverrun) {
     ASSERT_TRUE(runs());
     replace("/B", definition("SlowSuccessor", "B"));
     ASSERT_TRUE(runs());
-    EXPECT_GE(runner().loop().figures().exchange_overruns.value(), 1U);
+    EXPECT_GE(runner().loop().statistics().exchange_overruns.value(), 1U);
 }
 
 // The process is stopped between two cycles, as by a hypervisor.
@@ -99,7 +99,7 @@ TEST_F(LoopTiming, LateWakeUpIsASeparateCause) {
     load(definition("Ticker", "A"));
     start();
     ASSERT_TRUE(runs());
-    const auto late = [this] { return runner().loop().figures().late_wake_ups.value(); };
+    const auto late = [this] { return runner().loop().statistics().late_wake_ups.value(); };
     EXPECT_TRUE(eventually([&] {
         const pid_t self = getpid();
         const pid_t helper = fork();
@@ -113,7 +113,7 @@ TEST_F(LoopTiming, LateWakeUpIsASeparateCause) {
         return runs(2) && late() > 0;
     }));
     stop();  // statistics that no longer change
-    EXPECT_LE(late() + runner().snapshot()->get("/A").figures->overruns.load(), overruns());
+    EXPECT_LE(late() + runner().graph()->get("/A").statistics->overruns.load(), overruns());
 }
 
 // Without full real-time rights a loop is not blamed for being late.
@@ -173,10 +173,10 @@ TEST_F(LoopTiming, EveryCycleIsInTheStatistics) {
     start();
     ASSERT_TRUE(runs(100));
     stop();
-    const executor::LoopFigures& figures = runner().loop().figures();
-    EXPECT_EQ(figures.duration.snapshot().count, iteration());
-    EXPECT_EQ(figures.latency.snapshot().count, iteration());
-    EXPECT_EQ(runner().snapshot()->get("/A").figures->duration.snapshot().count, iteration());
+    const executor::LoopStatistics& statistics = runner().loop().statistics();
+    EXPECT_EQ(statistics.duration.snapshot().count, iteration());
+    EXPECT_EQ(statistics.latency.snapshot().count, iteration());
+    EXPECT_EQ(runner().graph()->get("/A").statistics->duration.snapshot().count, iteration());
 }
 
 TEST_F(LoopTiming, WarmUpIsNotInTheStatistics) {
@@ -185,8 +185,8 @@ TEST_F(LoopTiming, WarmUpIsNotInTheStatistics) {
     start();
     ASSERT_TRUE(runs(100));
     stop();
-    EXPECT_EQ(runner().loop().figures().duration.snapshot().count, iteration() - 10);
-    EXPECT_EQ(runner().snapshot()->get("/A").figures->duration.snapshot().count, iteration() - 10);
+    EXPECT_EQ(runner().loop().statistics().duration.snapshot().count, iteration() - 10);
+    EXPECT_EQ(runner().graph()->get("/A").statistics->duration.snapshot().count, iteration() - 10);
 }
 
 }  // namespace

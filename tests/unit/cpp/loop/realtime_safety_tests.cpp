@@ -91,7 +91,7 @@ TEST_F(RealtimeSafety, MappedTypesOfVariableSizeAreSafe) {
     for (int round = 0; round < 30; ++round) {
         ASSERT_TRUE(runs(10));
         onGraphThread([this] { return runner().probe("/S"); });
-        onGraphThread([this] { return runner().takeImage(); });
+        onGraphThread([this] { return runner().takeSnapshot(); });
         const auto tap = bridge().tap("/scan");
         while (tap->pop([](const std::uint8_t*, std::uint32_t, std::int64_t) {})) {
         }

@@ -5,14 +5,14 @@
 #include <string>
 #include <thread>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 #include "names/names.hpp"
 
 namespace rtcf::test {
 namespace {
 
+using executor::Error;
 using executor::NamePattern;
-using executor::Refusal;
 
 TEST(NamePattern, EmptyMatchesNothing) {
     EXPECT_FALSE(NamePattern().matches(""));
@@ -41,7 +41,7 @@ TEST(NamePattern, BadExpressionIsRejectedWithTheReason) {
         try {
             const NamePattern pattern("ignore of /H1", expression);
             return {};
-        } catch (const Refusal& refused) {
+        } catch (const Error& refused) {
             return refused.what();
         }
     };
@@ -76,7 +76,7 @@ TEST(NamePattern, TooLongExpressionIsRejected) {
     try {
         const NamePattern pattern("whitelist", longest + "a");
         ADD_FAILURE() << "it was taken";
-    } catch (const Refusal& refused) {
+    } catch (const Error& refused) {
         EXPECT_NE(std::string(refused.what()).find("whitelist"), std::string::npos);
         EXPECT_NE(std::string(refused.what()).find("1001 characters: at most 1000"),
                   std::string::npos)

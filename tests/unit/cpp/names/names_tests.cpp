@@ -4,7 +4,7 @@
 
 #include <functional>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 
 namespace rtcf::test {
 namespace {
@@ -50,14 +50,14 @@ TEST(Names, BaseNamesHaveNoSlashes) {
 
 TEST(Names, InvalidNamespaceIsRejected) {
     for (const char* ns : {"~arm", "left arm", "/a-b"})
-        EXPECT_THROW(canonicalNamespace(ns), Refusal) << ns;
+        EXPECT_THROW(canonicalNamespace(ns), Error) << ns;
 }
 
 TEST(Names, ComponentsResolveInTheRoot) {
     EXPECT_EQ(fullNameOf("H1"), "/H1");
     EXPECT_EQ(fullNameOf("arm/H1"), "/arm/H1");
     EXPECT_EQ(fullNameOf("/arm//H1/"), "/arm/H1");
-    for (const char* name : {"", "~H1", "H 1"}) EXPECT_THROW(fullNameOf(name), Refusal) << name;
+    for (const char* name : {"", "~H1", "H 1"}) EXPECT_THROW(fullNameOf(name), Error) << name;
 }
 
 TEST(Names, ThatAreTooLongAreRejectedWithTheirLength) {
@@ -68,7 +68,7 @@ TEST(Names, ThatAreTooLongAreRejectedWithTheirLength) {
         try {
             refuse();
             ADD_FAILURE() << "it was taken";
-        } catch (const Refusal& refused) {
+        } catch (const Error& refused) {
             EXPECT_NE(std::string(refused.what()).find("256 characters: at most 255"),
                       std::string::npos)
                 << refused.what();

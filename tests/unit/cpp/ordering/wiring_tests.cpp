@@ -141,7 +141,7 @@ TEST_F(WiringTest, BreakOfAMissingPortIsRejected) {
     try {
         graph.setBreak("/A", "out1", true);
         FAIL() << "no error";
-    } catch (const Refusal& refused) {
+    } catch (const Error& refused) {
         EXPECT_STREQ(refused.what(), "/A has no input out1; it has in1, in2, in3, in4");
     }
 }

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <memory>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 #include "support/temporary_folder.hpp"
 
 namespace rtcf::test {
@@ -20,7 +20,7 @@ std::string refusalOf(const std::string& path) {
     try {
         LibraryStore().open(path);
         return {};
-    } catch (const Refusal& refused) {
+    } catch (const Error& refused) {
         return refused.what();
     }
 }

@@ -49,8 +49,8 @@ class RttCompat : public RunnerFixture {
 TEST_F(RttCompat, PortsOfConstructorAndConfigureHookExist) {
     loadOld("Reader", "R");
     std::vector<std::string> names;
-    const auto snapshot = runner().snapshot();
-    for (const auto& port : snapshot->get("/R").ports) names.push_back(port.name);
+    const auto graph = runner().graph();
+    for (const auto& port : graph->get("/R").ports) names.push_back(port.name);
     EXPECT_EQ(names, (std::vector<std::string>{"in", "flow", "copied", "copied_old", "connected"}));
 }
 

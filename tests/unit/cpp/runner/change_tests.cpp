@@ -272,8 +272,8 @@ TEST_F(Change, BatchWithABadValueSetsNothing) {
     ASSERT_TRUE(runs());
     stop();
     EXPECT_EQ(value("/A", "out"), static_cast<double>(iteration())) << "the gain is still 1";
-    const auto snapshot = runner().snapshot();
-    for (const auto& parameter : snapshot->get("/A").parameters) {
+    const auto graph = runner().graph();
+    for (const auto& parameter : graph->get("/A").parameters) {
         if (parameter.declaration.name == "gain") {
             EXPECT_EQ(std::get<double>(parameter.value), 1.0);
         }
@@ -394,8 +394,8 @@ TEST_F(Change, RingsAreBoundedInTotal) {
     try {
         load(camera(33));
         FAIL() << "no error";
-    } catch (const Refusal& refused) {
-        EXPECT_EQ(refused.kind(), executor::RefusalKind::ResourceExhausted);
+    } catch (const Error& refused) {
+        EXPECT_EQ(refused.kind(), executor::ErrorKind::ResourceExhausted);
         const std::string text = refused.what();
         EXPECT_NE(text.find("more than the 256 MiB of locked memory"), std::string::npos) << text;
         EXPECT_EQ(text.find('\n'), std::string::npos) << text;

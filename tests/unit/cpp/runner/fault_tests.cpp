@@ -44,8 +44,8 @@ TEST_F(Fault, ExceptionStopsTheLoopAndIsReported) {
         EXPECT_NE(event.message.find(part), std::string::npos) << event.message;
     }
     EXPECT_EQ(event.message.find('\n'), std::string::npos);
-    EXPECT_NE(runner().snapshot()->get("/B").fault.find("as told"), std::string::npos);
-    EXPECT_EQ(runner().snapshot()->get("/A").fault, "");
+    EXPECT_NE(runner().graph()->get("/B").fault.find("as told"), std::string::npos);
+    EXPECT_EQ(runner().graph()->get("/A").fault, "");
     EXPECT_EQ(value("/A", "out"), 11.0);
     EXPECT_EQ(value("/C", "out"), 10.0) << "the cycle was abandoned before it";
 }
@@ -73,7 +73,7 @@ TEST_F(Fault, LoopStartsAgainOnceTheCauseIsGone) {
     setParameters("/B", {{"throws_at", std::int64_t{-1}}});
     start();
     EXPECT_EQ(state(), RunnerState::Running);
-    EXPECT_EQ(runner().snapshot()->get("/B").fault, "");
+    EXPECT_EQ(runner().graph()->get("/B").fault, "");
     EXPECT_EQ(runner().status().loop_fault, "");
     EXPECT_TRUE(runs());
 }
@@ -169,7 +169,7 @@ TEST_F(Fault, NoFaultIsLostInAFloodOfOthers) {
     EXPECT_TRUE(eventually([&] { return told("/Z: iteration 300: update() threw") == 1; }));
     EXPECT_EQ(told("/N1: iteration 0: output checked is not finite"), 1);
     EXPECT_EQ(told("/N2: iteration 0: output checked is not finite"), 1);
-    EXPECT_GE(runner().snapshot()->get("/N1").figures->faults.count.value(), 400U);
+    EXPECT_GE(runner().graph()->get("/N1").statistics->faults.count.value(), 400U);
     EXPECT_EQ(state(), RunnerState::Running);
 }
 

@@ -135,10 +135,10 @@ TEST_F(Queues, ASnapshotHasNoQueuedMessages) {
     setParameters("/C", {{"takes", false}});
     send(1.0);
     step(1);
-    const auto image = onGraphThread([&] { return runner().takeImage().image; });
+    const auto snapshot = onGraphThread([&] { return runner().takeSnapshot().snapshot; });
     send(2.0);
     step(1);
-    onGraphThread([&] { return runner().restore(image, [](const std::string&) {}); });
+    onGraphThread([&] { return runner().restore(snapshot, [](const std::string&) {}); });
     setParameters("/C", {{"takes", true}});
     send(3.0);
     step(1);

@@ -29,8 +29,8 @@ class Rollback : public RunnerFixture {
     }
 
     ParameterValue parameter(const std::string& component, const std::string& name) {
-        const auto snapshot = runner().snapshot();
-        for (const auto& each : snapshot->get(component).parameters) {
+        const auto graph = runner().graph();
+        for (const auto& each : graph->get(component).parameters) {
             if (each.declaration.name == name) return each.value;
         }
         return {};

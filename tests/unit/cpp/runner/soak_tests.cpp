@@ -128,10 +128,10 @@ class Soak : public RunnerFixture {
     void startHelpers() {
         helpers_.emplace_back([this] {
             while (!over_.load()) {
-                const auto snapshot = runner().snapshot();
-                for (const auto& component : snapshot->components)
-                    (void)component->figures->duration.snapshot();
-                (void)runner().loop().figures().duration.snapshot();
+                const auto graph = runner().graph();
+                for (const auto& component : graph->components)
+                    (void)component->statistics->duration.snapshot();
+                (void)runner().loop().statistics().duration.snapshot();
                 (void)runner().status();
                 (void)runner().activity();
                 std::this_thread::yield();

@@ -26,8 +26,8 @@ class DeclaredState : public RunnerFixture {
             .notes;
     }
     std::string state(const std::string& name) {
-        const auto snapshot = runner().snapshot();
-        const auto& declared = snapshot->get("/A").states;
+        const auto graph = runner().graph();
+        const auto& declared = graph->get("/A").states;
         const auto values = onGraphThread([&] { return runner().states("/A"); });
         for (std::size_t i = 0; i < values.size(); ++i) {
             if (declared[i].name == name) return values[i];
@@ -84,8 +84,8 @@ TEST_F(DeclaredState, MissingInTheOldComponentIsReported) {
 TEST_F(DeclaredState, IsShownWithItsDeclaration) {
     loadVersion(1);
     step(3);
-    const auto snapshot = runner().snapshot();
-    const auto& states = snapshot->get("/A").states;
+    const auto graph = runner().graph();
+    const auto& states = graph->get("/A").states;
     ASSERT_EQ(states.size(), 5U);
     EXPECT_EQ(states[3].name, "count");
     EXPECT_EQ(states[3].type, "uint64");

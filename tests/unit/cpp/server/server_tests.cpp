@@ -406,7 +406,7 @@ TEST_F(ServerTest, StatisticsRestartWithEachStart) {
     stop.mutable_stop();
     Request statistics;
     statistics.mutable_get_statistics();
-    const auto iterations = [this] { return runner_.loop().figures().iteration.load(); };
+    const auto iterations = [this] { return runner_.loop().statistics().iteration.load(); };
     for (int i = 0; i < 2; ++i) {
         ASSERT_TRUE(client.ask(start()).has_change());
         ASSERT_TRUE(eventually([&] { return iterations() > 200; }));
@@ -463,7 +463,7 @@ TEST_F(ServerTest, ResetOfALateLoopIsOneInstant) {
     statistics.mutable_get_statistics();
     Request stop;
     stop.mutable_stop();
-    const auto total = [this] { return runner_.loop().figures().overruns.load(); };
+    const auto total = [this] { return runner_.loop().statistics().overruns.load(); };
     for (const auto policy : {rtcf::v1::OVERRUN_POLICY_CATCH_UP, rtcf::v1::OVERRUN_POLICY_SKIP}) {
         Request configure;
         configure.mutable_configure()->set_frequency_hz(10000.0);
@@ -484,19 +484,19 @@ TEST_F(ServerTest, ResetOfALateLoopIsOneInstant) {
         ASSERT_TRUE(eventually([&] { return total() > before + 20; }));
         ASSERT_TRUE(client.ask(stop).has_change());
         const rtcf::v1::RunnerStatus status = client.ask(getStatus()).status();
-        const rtcf::v1::RunnerStatistics figures = client.ask(statistics).statistics();
-        EXPECT_GT(figures.overruns(), 20U);
-        EXPECT_LE(figures.overruns(), figures.iterations());
-        EXPECT_EQ(status.overruns(), figures.overruns());
-        EXPECT_EQ(status.missed(), figures.missed());
-        EXPECT_EQ(figures.latency().count(), figures.iterations());
-        std::uint64_t causes = figures.late_wake_ups() + figures.exchange_overruns() +
-                               figures.frame_overruns() + figures.catching_up();
-        for (const auto& component : figures.components()) {
-            EXPECT_EQ(component.duration().count(), figures.iterations()) << component.component();
+        const rtcf::v1::RunnerStatistics result = client.ask(statistics).statistics();
+        EXPECT_GT(result.overruns(), 20U);
+        EXPECT_LE(result.overruns(), result.iterations());
+        EXPECT_EQ(status.overruns(), result.overruns());
+        EXPECT_EQ(status.missed(), result.missed());
+        EXPECT_EQ(result.latency().count(), result.iterations());
+        std::uint64_t causes = result.late_wake_ups() + result.exchange_overruns() +
+                               result.frame_overruns() + result.catching_up();
+        for (const auto& component : result.components()) {
+            EXPECT_EQ(component.duration().count(), result.iterations()) << component.component();
             causes += component.overruns();
         }
-        EXPECT_EQ(causes, figures.overruns());
+        EXPECT_EQ(causes, result.overruns());
     }
 }
 
@@ -509,8 +509,8 @@ TEST_F(ServerTest, ResetWaitsForTheEndOfACycleInWhichAComponentDoesNotReturn) {
     ASSERT_TRUE(client.ask(configure).has_status());
     ASSERT_TRUE(client.ask(load("Gated", "G")).has_change());
     ASSERT_TRUE(client.ask(start()).has_change());
-    const auto& figures = runner_.loop().figures();
-    const auto counted = [&] { return figures.duration.snapshot().count; };
+    const auto& statistics = runner_.loop().statistics();
+    const auto counted = [&] { return statistics.duration.snapshot().count; };
     const auto counts_again = [&] {
         const std::uint64_t before = counted();
         return eventually([&] { return counted() > before; });

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 #include "faults/flight_recorder.hpp"
 #include "graph/graph.hpp"
 #include "logging/log.hpp"
@@ -88,7 +88,7 @@ class GraphFixture : public ::testing::Test {
         try {
             executor::wire(graph, {}, loading);
             return {};
-        } catch (const executor::Refusal& refused) {
+        } catch (const executor::Error& refused) {
             return refused.what();
         }
     }

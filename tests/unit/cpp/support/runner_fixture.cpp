@@ -123,8 +123,8 @@ void RunnerFixture::configure(const std::function<void(RunnerSettings&)>& change
 }
 
 double RunnerFixture::value(const std::string& component, const std::string& port) {
-    const auto snapshot = runner_->snapshot();
-    const auto& ports = snapshot->get(component).ports;
+    const auto graph = runner_->graph();
+    const auto& ports = graph->get(component).ports;
     std::vector<executor::Probe::Value> values;
     // A query waits 0.1 s for the loop, which other load may delay longer.
     EXPECT_TRUE(eventually([&] {
@@ -146,8 +146,8 @@ bool RunnerFixture::runs(std::uint64_t cycles) {
 
 std::vector<std::string> RunnerFixture::order() const {
     std::vector<std::string> names;
-    const auto snapshot = runner_->snapshot();
-    for (const auto& component : snapshot->components) names.push_back(component->full_name);
+    const auto graph = runner_->graph();
+    for (const auto& component : graph->components) names.push_back(component->full_name);
     return names;
 }
 

@@ -16,7 +16,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 #include "components/journal.hpp"
 #include "faults/flight_recorder.hpp"
 #include "logging/log.hpp"
@@ -28,8 +28,8 @@ namespace rtcf::test {
 
 using executor::ChangeOutcome;
 using executor::ComponentDefinition;
+using executor::Error;
 using executor::LogEntry;
-using executor::Refusal;
 using executor::Runner;
 using executor::RunnerEvent;
 using executor::RunnerSettings;
@@ -43,7 +43,7 @@ ComponentDefinition definition(const std::string& type, const std::string& name)
 template <typename Result>
 struct Answer {
     std::optional<Result> result;
-    std::optional<std::pair<executor::RefusalKind, std::string>> refusal;
+    std::optional<std::pair<executor::ErrorKind, std::string>> refusal;
 };
 
 /// Work on the graph thread that may still be running.
@@ -51,10 +51,10 @@ template <typename Result>
 class Pending {
    public:
     explicit Pending(std::future<Answer<Result>> answer) : answer_(std::move(answer)) {}
-    /// Waits. @throws Refusal
+    /// Waits. @throws Error
     Result get() {
         Answer<Result> answer = answer_.get();
-        if (answer.refusal) throw Refusal(answer.refusal->first, answer.refusal->second);
+        if (answer.refusal) throw Error(answer.refusal->first, answer.refusal->second);
         return std::move(*answer.result);
     }
 
@@ -100,12 +100,12 @@ class RunnerFixture : public ::testing::Test {
 
     /// Newest value of a port with a std_msgs number. @return NaN without a value
     double value(const std::string& component, const std::string& port);
-    std::uint64_t iteration() const { return runner_->loop().figures().iteration.load(); }
+    std::uint64_t iteration() const { return runner_->loop().statistics().iteration.load(); }
     /// Waits until the loop has run `cycles` more. @return false at the deadline
     bool runs(std::uint64_t cycles = 20);
     RunnerState state() const { return runner_->status().state; }
     std::vector<std::string> order() const;
-    std::uint64_t generation() const { return runner_->snapshot()->generation; }
+    std::uint64_t generation() const { return runner_->graph()->generation; }
 
     std::vector<RunnerEvent> events() const;
     std::vector<LogEntry> logged();
@@ -141,7 +141,7 @@ auto RunnerFixture::begin(Work work) -> Pending<decltype(work())> {
         Answer<Result> answer;
         try {
             answer.result = work();
-        } catch (const Refusal& refused) {
+        } catch (const Error& refused) {
             answer.refusal.emplace(refused.kind(), refused.what());
         }
         promise->set_value(std::move(answer));
@@ -159,7 +159,7 @@ std::string RunnerFixture::refusal(Work&& work) {
     try {
         work();
         return {};
-    } catch (const Refusal& refused) {
+    } catch (const Error& refused) {
         return refused.what();
     }
 }

@@ -5,13 +5,13 @@
 #include <string>
 #include <vector>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 
 namespace rtcf::test {
 namespace {
 
+using executor::Error;
 using executor::PortSelection;
-using executor::Refusal;
 
 bool selects(const std::string& pattern, const std::string& name) {
     return PortSelection({pattern}).matches(name);
@@ -86,8 +86,8 @@ TEST(PortSelection, AcceptsNamesAndPatternsTogether) {
 }
 
 TEST(PortSelection, RejectsEmptyAndTooLongPatterns) {
-    EXPECT_THROW(PortSelection({""}), Refusal);
-    EXPECT_THROW(PortSelection({std::string(2000, 'a')}), Refusal);
+    EXPECT_THROW(PortSelection({""}), Error);
+    EXPECT_THROW(PortSelection({std::string(2000, 'a')}), Error);
 }
 
 }  // namespace

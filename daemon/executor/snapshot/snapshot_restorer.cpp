@@ -1,4 +1,4 @@
-#include "image/image_restorer.hpp"
+#include "snapshot/snapshot_restorer.hpp"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 
 namespace rtcf::executor {
 
@@ -18,8 +18,8 @@ std::string orNothing(const std::string& source) { return source.empty() ? "noth
 
 }  // namespace
 
-ImageRestorer::ImageRestorer(const RunnerImage& image, const Plan& plan)
-    : image_(image), plan_(plan), sources_(plan) {
+SnapshotRestorer::SnapshotRestorer(const Snapshot& saved, const Plan& plan)
+    : snapshot_(saved), plan_(plan), sources_(plan) {
     for (const GraphNode& node : plan.graph.nodes()) {
         const auto& outputs = node.instance->component().outputs();
         for (std::size_t i = 0; i < outputs.size(); ++i) {
@@ -30,17 +30,17 @@ ImageRestorer::ImageRestorer(const RunnerImage& image, const Plan& plan)
     for (const auto& [name, injector] : plan.injectors) readers_[injector.get()];
     requireTimes();
     fitEach(
-        {}, "component", image.components, plan.graph.nodes(),
+        {}, "component", saved.components, plan.graph.nodes(),
         [](const GraphNode& node) { return node.instance->fullName(); },
-        [&](const ImageComponent& component, const GraphNode& node) { fit(component, node); });
+        [&](const SnapshotComponent& component, const GraphNode& node) { fit(component, node); });
     if (problems_.empty()) fitTopics();
     requireFit();
-    restoration_.clock = image.clock;
+    restoration_.clock = saved.clock;
 }
 
 template <typename From, typename To, typename Name, typename Fit>
-void ImageRestorer::fitEach(const std::string& of, const char* kind, const From& from, const To& to,
-                            Name name, Fit fit) {
+void SnapshotRestorer::fitEach(const std::string& of, const char* kind, const From& from,
+                               const To& to, Name name, Fit fit) {
     std::map<std::string, const typename From::value_type*> there;
     for (const auto& each : from) there[each.name] = &each;
     if (there.size() != from.size()) problem(fmt::format("a {} is in the snapshot twice", kind));
@@ -59,75 +59,75 @@ void ImageRestorer::fitEach(const std::string& of, const char* kind, const From&
 }
 
 // Requires times that a loop can have, because components compute with them.
-void ImageRestorer::requireTimes() const {
+void SnapshotRestorer::requireTimes() const {
     constexpr std::int64_t kLongest = INT64_MAX / 2;
     constexpr std::int64_t kLastStamp = 4'294'967'295'999'999'999;  // of a ros::Time
     const auto is = [](std::int64_t time, std::int64_t most) { return time >= 0 && time <= most; };
     const auto isElapsed = [&](std::int64_t elapsed) {
-        return is(elapsed, kLongest) && elapsed != 0 && elapsed % image_.period_ns == 0;
+        return is(elapsed, kLongest) && elapsed != 0 && elapsed % snapshot_.period_ns == 0;
     };
-    const auto isTurn = [&](const ImageComponent& component) {
+    const auto isTurn = [&](const SnapshotComponent& component) {
         return is(component.updated_ns + 1, kLongest) && is(component.elapsed_ns, kLongest);
     };
-    const ClockImage& clock = image_.clock;
+    const ClockState& clock = snapshot_.clock;
     if (is(clock.time_ns, kLongest) && is(clock.stamp_ns, kLastStamp) &&
         is(clock.total_elapsed_ns, kLongest) && isElapsed(clock.elapsed_ns) &&
-        std::all_of(image_.components.begin(), image_.components.end(), isTurn))
+        std::all_of(snapshot_.components.begin(), snapshot_.components.end(), isTurn))
         return;
-    throw Refusal(RefusalKind::InvalidArgument,
-                  fmt::format("the snapshot of {} has an invalid clock (time {} ns, stamp "
-                              "{} ns, elapsed {} ns): the file was modified; take another snapshot",
-                              image_.runner, clock.time_ns, clock.stamp_ns, clock.elapsed_ns));
+    throw Error(ErrorKind::InvalidArgument,
+                fmt::format("the snapshot of {} has an invalid clock (time {} ns, stamp "
+                            "{} ns, elapsed {} ns): the file was modified; take another snapshot",
+                            snapshot_.runner, clock.time_ns, clock.stamp_ns, clock.elapsed_ns));
 }
 
-void ImageRestorer::requireFit() const {
+void SnapshotRestorer::requireFit() const {
     if (problems_.empty()) return;
     const auto told = static_cast<std::ptrdiff_t>(std::min(problems_.size(), kToldProblems));
     std::string text =
         fmt::format("{}", fmt::join(problems_.begin(), problems_.begin() + told, "; "));
     if (problems_.size() > kToldProblems)
         text += fmt::format("; and {} more", problems_.size() - kToldProblems);
-    throw Refusal(RefusalKind::FailedPrecondition,
-                  fmt::format("the snapshot of {} does not fit this graph: {}; load the graph that "
-                              "it was taken from",
-                              image_.runner, text));
+    throw Error(ErrorKind::FailedPrecondition,
+                fmt::format("the snapshot of {} does not fit this graph: {}; load the graph that "
+                            "it was taken from",
+                            snapshot_.runner, text));
 }
 
-void ImageRestorer::fit(const ImageComponent& image, const GraphNode& node) {
+void SnapshotRestorer::fit(const SnapshotComponent& saved, const GraphNode& node) {
     Instance& instance = *node.instance;
     const ComponentDefinition& definition = instance.definition();
-    if (image.type != definition.type) {
-        problem(fmt::format("{} was a {} and is a {}", image.name, image.type, definition.type));
+    if (saved.type != definition.type) {
+        problem(fmt::format("{} was a {} and is a {}", saved.name, saved.type, definition.type));
         return;
     }
-    if (image.every != definition.every) {
-        problem(fmt::format("{} ran every {} cycles and runs every {}", image.name, image.every,
+    if (saved.every != definition.every) {
+        problem(fmt::format("{} ran every {} cycles and runs every {}", saved.name, saved.every,
                             definition.every));
     }
-    if (image.phase >= std::max(1U, definition.every)) {
-        problem(fmt::format("{} ran in cycle {} of {}", image.name, image.phase, image.every));
-    } else if (image.phase != instance.phase()) {
-        phases_[&instance] = image.phase;
+    if (saved.phase >= std::max(1U, definition.every)) {
+        problem(fmt::format("{} ran in cycle {} of {}", saved.name, saved.phase, saved.every));
+    } else if (saved.phase != instance.phase()) {
+        phases_[&instance] = saved.phase;
     }
-    restoration_.turns.push_back({&instance.context(), image.updated_ns, image.elapsed_ns});
-    fitParameters(image, instance);
-    fitStates(image, instance);
-    fitOutputs(image, instance);
-    fitInputs(image, instance);
+    restoration_.turns.push_back({&instance.context(), saved.updated_ns, saved.elapsed_ns});
+    fitParameters(saved, instance);
+    fitStates(saved, instance);
+    fitOutputs(saved, instance);
+    fitInputs(saved, instance);
 }
 
-void ImageRestorer::fitParameters(const ImageComponent& image, Instance& instance) {
+void SnapshotRestorer::fitParameters(const SnapshotComponent& saved, Instance& instance) {
     struct Named {
         std::string name;
         const ParameterValue* value;
     };
     std::vector<Named> from;
-    for (const auto& [name, value] : image.parameters) from.push_back({name, &value});
+    for (const auto& [name, value] : saved.parameters) from.push_back({name, &value});
     const auto& declared = instance.component().parameters();
     std::vector<std::size_t> to(declared.size());
     for (std::size_t i = 0; i < to.size(); ++i) to[i] = i;
     fitEach(
-        image.name + ".", "parameter", from, to,
+        saved.name + ".", "parameter", from, to,
         [&](std::size_t i) { return declared[i]->declaration().name; },
         [&](const Named& parameter, std::size_t i) {
             if (!sameValue(*parameter.value, instance.parameterValues()[i]))
@@ -135,13 +135,13 @@ void ImageRestorer::fitParameters(const ImageComponent& image, Instance& instanc
         });
 }
 
-void ImageRestorer::fitStates(const ImageComponent& image, const Instance& instance) {
+void SnapshotRestorer::fitStates(const SnapshotComponent& saved, const Instance& instance) {
     fitEach(
-        image.name + ".", "state", image.states, instance.component().states(),
+        saved.name + ".", "state", saved.states, instance.component().states(),
         [](const StateDeclaration& state) { return state.name; },
-        [&](const ImageState& from, const StateDeclaration& to) {
+        [&](const SnapshotState& from, const StateDeclaration& to) {
             if (from.identity != to.identity || from.bytes.size() != to.size) {
-                problem(fmt::format("state {}.{} was {} and is {}", image.name, to.name, from.type,
+                problem(fmt::format("state {}.{} was {} and is {}", saved.name, to.name, from.type,
                                     to.type));
                 return;
             }
@@ -149,12 +149,12 @@ void ImageRestorer::fitStates(const ImageComponent& image, const Instance& insta
         });
 }
 
-void ImageRestorer::fitOutputs(const ImageComponent& image, const Instance& instance) {
+void SnapshotRestorer::fitOutputs(const SnapshotComponent& saved, const Instance& instance) {
     fitEach(
-        image.name + ".", "output", image.outputs, instance.component().outputs(),
+        saved.name + ".", "output", saved.outputs, instance.component().outputs(),
         [](const OutputBase* output) { return output->name(); },
-        [&](const ImageOutput& from, OutputBase* to) {
-            const std::string name = image.name + "." + to->name();
+        [&](const SnapshotOutput& from, OutputBase* to) {
+            const std::string name = saved.name + "." + to->name();
             const TypeInfo& type = to->type();
             if (!same(from.type, type)) {
                 problem(fmt::format("output {} was {} and is {}", name, from.type.name, type.name));
@@ -178,52 +178,53 @@ void ImageRestorer::fitOutputs(const ImageComponent& image, const Instance& inst
         });
 }
 
-void ImageRestorer::fitInputs(const ImageComponent& image, const Instance& instance) {
+void SnapshotRestorer::fitInputs(const SnapshotComponent& saved, const Instance& instance) {
     fitEach(
-        image.name + ".", "input", image.inputs, instance.component().inputs(),
+        saved.name + ".", "input", saved.inputs, instance.component().inputs(),
         [](const InputBase* input) { return input->name(); },
-        [&](const ImageInput& from, InputBase* to) {
-            fitInput(from, *to, image.name + "." + to->name());
+        [&](const SnapshotInput& from, InputBase* to) {
+            fitInput(from, *to, saved.name + "." + to->name());
         });
 }
 
-void ImageRestorer::fitInput(const ImageInput& image, InputBase& input, const std::string& name) {
+void SnapshotRestorer::fitInput(const SnapshotInput& saved, InputBase& input,
+                                const std::string& name) {
     const TypeInfo& type = input.type();
-    if (!same(image.type, type)) {
-        problem(fmt::format("input {} was {} and is {}", name, image.type.name, type.name));
+    if (!same(saved.type, type)) {
+        problem(fmt::format("input {} was {} and is {}", name, saved.type.name, type.name));
         return;
     }
     const std::string source = sources_.of(input);
-    if (source != image.source) {
-        problem(fmt::format("input {} read {} and reads {}", name, orNothing(image.source),
+    if (source != saved.source) {
+        problem(fmt::format("input {} read {} and reads {}", name, orNothing(saved.source),
                             orNothing(source)));
         return;
     }
-    Restoration::Input to{&input, {nullptr, nullptr, image.seen, image.kept_is_new}};
+    Restoration::Input to{&input, {nullptr, nullptr, saved.seen, saved.kept_is_new}};
     const auto binding = plan_.bindings.find(&input);
     const bool was_bound = binding != plan_.bindings.end();
-    if (source.empty() && image.seen != 0 && !image.left) {
+    if (source.empty() && saved.seen != 0 && !saved.left) {
         problem(fmt::format("input {} has read a removed writer, whose value is missing", name));
         return;
     }
-    if (source.empty() && (image.left || was_bound)) {
-        auto left = image.left ? slotFrom(type, *image.left, name) : type.make_slot(nullptr);
+    if (source.empty() && (saved.left || was_bound)) {
+        auto left = saved.left ? slotFrom(type, *saved.left, name) : type.make_slot(nullptr);
         restoration_.headers.push_back(left.get());
         to.reading.source = left.get();
         kept_[&input].left = std::move(left);
     }
-    if (!image.reads_source) {
+    if (!saved.reads_source) {
         std::shared_ptr<SlotHeader> kept;
-        if (!image.kept_of.empty()) {
-            const auto output = outputs_.find(image.kept_of);
+        if (!saved.kept_of.empty()) {
+            const auto output = outputs_.find(saved.kept_of);
             if (output == outputs_.end() || !sameType(output->second.first->type(), type)) {
                 problem(fmt::format("input {} has a value of {}, which does not exist", name,
-                                    image.kept_of));
+                                    saved.kept_of));
                 return;
             }
             kept = output->second.first->slot();
         } else {
-            kept = image.kept ? slotFrom(type, *image.kept, name) : type.make_slot(nullptr);
+            kept = saved.kept ? slotFrom(type, *saved.kept, name) : type.make_slot(nullptr);
             restoration_.headers.push_back(kept.get());
         }
         to.reading.current = kept.get();
@@ -235,10 +236,10 @@ void ImageRestorer::fitInput(const ImageInput& image, InputBase& input, const st
     (readers != readers_.end() ? readers->second : restoration_.inputs).push_back(to);
 }
 
-void ImageRestorer::fitTopics() {
+void SnapshotRestorer::fitTopics() {
     fitEach(
-        {}, "topic", image_.topics, plan_.injectors, [](const auto& each) { return each.first; },
-        [&](const ImageTopic& from, const auto& each) {
+        {}, "topic", snapshot_.topics, plan_.injectors, [](const auto& each) { return each.first; },
+        [&](const SnapshotTopic& from, const auto& each) {
             Injector& to = *each.second;
             if (!same(from.type, to.type())) {
                 problem(fmt::format("topic {} was {} and is {}", from.name, from.type.name,
@@ -250,9 +251,10 @@ void ImageRestorer::fitTopics() {
         });
 }
 
-std::shared_ptr<SlotHeader> ImageRestorer::slotFrom(const TypeInfo& type, const ImageValue& value,
-                                                    const std::string& name,
-                                                    const SlotHeader* sample) {
+std::shared_ptr<SlotHeader> SnapshotRestorer::slotFrom(const TypeInfo& type,
+                                                       const SnapshotValue& value,
+                                                       const std::string& name,
+                                                       const SlotHeader* sample) {
     std::shared_ptr<SlotHeader> slot = type.make_slot(sample);
     const auto* const bytes = reinterpret_cast<const std::uint8_t*>(value.bytes.data());
     bool valid = false;
@@ -268,29 +270,29 @@ std::shared_ptr<SlotHeader> ImageRestorer::slotFrom(const TypeInfo& type, const 
     return slot;
 }
 
-void ImageRestorer::restoreTo(SlotHeader* to, const TypeInfo& type, const ImageValue& value,
-                              const std::string& name) {
+void SnapshotRestorer::restoreTo(SlotHeader* to, const TypeInfo& type, const SnapshotValue& value,
+                                 const std::string& name) {
     const SlotHeader* const sample = outputs_.at(name).second;
     restoration_.values.push_back({&type, to, slotFrom(type, value, name, sample)});
     restoration_.headers.push_back(to);
     if (!type.flat) reserved_[to] = {name, sample};
 }
 
-void ImageRestorer::requireReserved() const {
+void SnapshotRestorer::requireReserved() const {
     for (const Restoration::Value& value : restoration_.values) {
         if (value.type->flat) continue;
         const auto& [name, sample] = reserved_.at(value.to);
         const std::uint32_t room = value.type->length(*sample);
         const std::uint32_t length = value.type->length(*value.from);
         if (length <= room) continue;
-        throw Refusal(RefusalKind::ResourceExhausted,
-                      fmt::format("the value of {} has {} bytes, its component has reserved {}: "
-                                  "restore it while the loop does not run, or reserve() more",
-                                  name, length, room));
+        throw Error(ErrorKind::ResourceExhausted,
+                    fmt::format("the value of {} has {} bytes, its component has reserved {}: "
+                                "restore it while the loop does not run, or reserve() more",
+                                name, length, room));
     }
 }
 
-void ImageRestorer::noteIn(Plan& plan) const {
+void SnapshotRestorer::noteIn(Plan& plan) const {
     for (const auto& [input, kept] : kept_) {
         Binding& binding = plan.bindings[input];
         if (kept.left) {

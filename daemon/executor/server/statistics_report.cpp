@@ -1,4 +1,4 @@
-#include "server/figures.hpp"
+#include "server/statistics_report.hpp"
 
 #include <utility>
 
@@ -30,8 +30,8 @@ void addBuckets(google::protobuf::RepeatedPtrField<pb::Bucket>& buckets,
 
 }  // namespace
 
-void Figures::addTo(pb::RunnerStatus& status, const GraphSnapshot& graph) const {
-    const LoopFigures& loop = runner_.loop().figures();
+void StatisticsReport::addTo(pb::RunnerStatus& status, const GraphView& graph) const {
+    const LoopStatistics& loop = runner_.loop().statistics();
     const std::shared_ptr<const Counted> baseline = this->baseline();
     status.set_iteration(loop.iteration.load(std::memory_order_relaxed));
     status.set_overruns(loop.overruns.load(std::memory_order_relaxed) - baseline->overruns);
@@ -41,13 +41,13 @@ void Figures::addTo(pb::RunnerStatus& status, const GraphSnapshot& graph) const 
 }
 
 // All statistics are of the same cycles, unless the loop leaves no time between cycles.
-pb::RunnerStatistics Figures::statistics(bool buckets) const {
-    const std::shared_ptr<const GraphSnapshot> graph = runner_.snapshot();
+pb::RunnerStatistics StatisticsReport::statistics(bool buckets) const {
+    const std::shared_ptr<const GraphView> graph = runner_.graph();
     const Loop& loop = runner_.loop();
     const double ns_per_tick = loop.counter().nsPerTick();
     const std::shared_ptr<const Counted> baseline = this->baseline();
     Counted now;
-    if (!loop.figures().counting.read([&] { now = counted(*graph); })) now = counted(*graph);
+    if (!loop.statistics().counting.read([&] { now = counted(*graph); })) now = counted(*graph);
     pb::RunnerStatistics message;
     message.set_runner(runner_.name());
     const HistogramSnapshot duration = difference(now.duration, baseline->duration);
@@ -70,8 +70,8 @@ pb::RunnerStatistics Figures::statistics(bool buckets) const {
     for (const auto& component : graph->components) {
         pb::ComponentStatistics& statistics = *message.add_components();
         statistics.set_component(component->full_name);
-        Counted::Component& present = now.components[component->figures];
-        if (const auto found = baseline->components.find(component->figures);
+        Counted::Component& present = now.components[component->statistics];
+        if (const auto found = baseline->components.find(component->statistics);
             found != baseline->components.end()) {
             const Counted::Component& past = found->second;
             present.duration = difference(present.duration, past.duration);
@@ -81,7 +81,7 @@ pb::RunnerStatistics Figures::statistics(bool buckets) const {
         }
         setDistribution(*statistics.mutable_duration(), summarize(present.duration, ns_per_tick));
         statistics.set_overruns(present.overruns);
-        statistics.set_faults(component->figures->faults.count.value());
+        statistics.set_faults(component->statistics->faults.count.value());
         statistics.set_device_calls(present.device_calls);
         if (present.device_calls != 0) {
             statistics.set_device_mean_ns(static_cast<double>(present.device_time_ns) /
@@ -98,7 +98,7 @@ pb::RunnerStatistics Figures::statistics(bool buckets) const {
     return message;
 }
 
-std::uint64_t Figures::tapDropped(const GraphSnapshot& graph, const Counted& baseline) {
+std::uint64_t StatisticsReport::tapDropped(const GraphView& graph, const Counted& baseline) {
     std::uint64_t dropped = 0;
     for (const auto& tap : graph.taps) {
         const auto found = baseline.tap_dropped.find(tap);
@@ -107,56 +107,56 @@ std::uint64_t Figures::tapDropped(const GraphSnapshot& graph, const Counted& bas
     return dropped;
 }
 
-Figures::Counted Figures::counted(const GraphSnapshot& graph) const {
+StatisticsReport::Counted StatisticsReport::counted(const GraphView& graph) const {
     const auto relaxed = std::memory_order_relaxed;
-    const LoopFigures& loop = runner_.loop().figures();
-    Counted figures;
+    const LoopStatistics& loop = runner_.loop().statistics();
+    Counted totals;
     for (const auto& component : graph.components) {
-        const ComponentFigures& each = *component->figures;
-        figures.components[component->figures] = {
+        const ComponentStatistics& each = *component->statistics;
+        totals.components[component->statistics] = {
             each.duration.snapshot(), each.overruns.load(relaxed), each.device.calls.load(relaxed),
             each.device.time_ns.load(relaxed)};
     }
-    figures.duration = loop.duration.snapshot();
-    figures.latency = loop.latency.snapshot();
-    figures.adoption = loop.adoption.snapshot();
-    figures.overruns = loop.overruns.load(relaxed);
-    figures.missed = loop.missed.load(relaxed);
-    figures.late_wake_ups = loop.late_wake_ups.value();
-    figures.exchange_overruns = loop.exchange_overruns.value();
-    figures.frame_overruns = loop.frame_overruns.value();
-    figures.catching_up = loop.catching_up.value();
-    figures.log_dropped = log_.dropped();
-    for (const auto& tap : graph.taps) figures.tap_dropped[tap] = tap->dropped();
-    figures.thread = runner_.loop().threadId();
-    figures.usage = readThreadUsage(figures.thread);
-    return figures;
+    totals.duration = loop.duration.snapshot();
+    totals.latency = loop.latency.snapshot();
+    totals.adoption = loop.adoption.snapshot();
+    totals.overruns = loop.overruns.load(relaxed);
+    totals.missed = loop.missed.load(relaxed);
+    totals.late_wake_ups = loop.late_wake_ups.value();
+    totals.exchange_overruns = loop.exchange_overruns.value();
+    totals.frame_overruns = loop.frame_overruns.value();
+    totals.catching_up = loop.catching_up.value();
+    totals.log_dropped = log_.dropped();
+    for (const auto& tap : graph.taps) totals.tap_dropped[tap] = tap->dropped();
+    totals.thread = runner_.loop().threadId();
+    totals.usage = readThreadUsage(totals.thread);
+    return totals;
 }
 
 // @return false if a cycle is being counted
-bool Figures::restart() {
-    runner_.holdFigures(true);
-    const std::shared_ptr<const GraphSnapshot> graph = runner_.snapshot();
+bool StatisticsReport::restart() {
+    runner_.holdStatistics(true);
+    const std::shared_ptr<const GraphView> graph = runner_.graph();
     Counted now;
-    if (!runner_.loop().figures().counting.read([&] { now = counted(*graph); })) return false;
+    if (!runner_.loop().statistics().counting.read([&] { now = counted(*graph); })) return false;
     setBaseline(std::move(now));
     return true;
 }
 
-void Figures::setBaseline(Counted figures) {
+void StatisticsReport::setBaseline(Counted totals) {
     {
-        const auto next = std::make_shared<const Counted>(std::move(figures));
+        const auto next = std::make_shared<const Counted>(std::move(totals));
         const std::lock_guard<std::mutex> lock(mutex_);
         baseline_ = next;
     }
-    runner_.holdFigures(false);
+    runner_.holdStatistics(false);
 }
 
-std::shared_ptr<const Figures::Counted> Figures::baseline() const {
+std::shared_ptr<const StatisticsReport::Counted> StatisticsReport::baseline() const {
     const std::lock_guard<std::mutex> lock(mutex_);
     return baseline_;
 }
 
-void Figures::restartInStep() { setBaseline(counted(*runner_.snapshot())); }
+void StatisticsReport::restartInStep() { setBaseline(counted(*runner_.graph())); }
 
 }  // namespace rtcf::executor

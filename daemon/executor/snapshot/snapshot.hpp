@@ -2,7 +2,7 @@
 /// A snapshot of a runner: all values that its next cycle depends on, by the names and types of
 /// their components and ports. If a snapshot is restored into a runner with the same graph, even
 /// with rebuilt libraries, the loop continues with the same values, bit by bit, provided that
-/// components declare all their state. File format: messages/image_file.hpp.
+/// components declare all their state. File format: messages/snapshot_file.hpp.
 #pragma once
 
 #include <cstdint>
@@ -12,56 +12,56 @@
 #include <vector>
 
 #include "rtcf/parameter.hpp"
-#include "state/image_work.hpp"
+#include "state/snapshot_work.hpp"
 
 namespace rtcf::executor {
 
 /// A port's type, with the properties that connections compare.
-struct ImageType {
+struct SnapshotType {
     std::string name;
     std::string md5;
     std::uint64_t size = 0;
     std::uint64_t alignment = 0;
     bool flat = false;
 };
-ImageType imageTypeOf(const TypeInfo& type);
+SnapshotType snapshotTypeOf(const TypeInfo& type);
 /// @return true if values of the two types are compatible
-bool same(const ImageType& image, const TypeInfo& type);
+bool same(const SnapshotType& saved, const TypeInfo& type);
 
-struct ImageValue {
+struct SnapshotValue {
     std::uint64_t sequence = 0;
     std::int64_t time_ns = 0;
     std::string bytes;  ///< flat types: as in memory; others: serialised
 };
 
-struct ImageState {
+struct SnapshotState {
     std::string name;
     std::string type;  ///< type for people
     std::uint64_t identity = 0;
     std::string bytes;
 };
 
-struct ImageOutput {
+struct SnapshotOutput {
     std::string name;
-    ImageType type;
-    ImageValue value;
-    std::optional<ImageValue> staged;   ///< staged outputs only: the value before commit()
-    std::optional<ImageValue> latched;  ///< the copy that loop breaks read
+    SnapshotType type;
+    SnapshotValue value;
+    std::optional<SnapshotValue> staged;   ///< staged outputs only: the value before commit()
+    std::optional<SnapshotValue> latched;  ///< the copy that loop breaks read
 };
 
-struct ImageInput {
+struct SnapshotInput {
     std::string name;
-    ImageType type;
+    SnapshotType type;
     std::string source;  ///< its writer, e.g. "/C.out"; empty = none
     std::uint64_t seen = 0;
-    bool reads_source = true;        ///< the component has the source's value,
-    std::string kept_of;             ///< or that of an earlier writer in the graph,
-    std::optional<ImageValue> kept;  ///< or that of a removed writer; if none of these: no value
-    bool kept_is_new = false;        ///< the component has not read that value yet
-    std::optional<ImageValue> left;  ///< without a writer: the last value of the removed writer
+    bool reads_source = true;           ///< the component has the source's value,
+    std::string kept_of;                ///< or that of an earlier writer in the graph,
+    std::optional<SnapshotValue> kept;  ///< or that of a removed writer; if none of these: no value
+    bool kept_is_new = false;           ///< the component has not read that value yet
+    std::optional<SnapshotValue> left;  ///< without a writer: the last value of the removed writer
 };
 
-struct ImageComponent {
+struct SnapshotComponent {
     std::string name;  ///< full name
     std::string package;
     std::string type;
@@ -70,26 +70,26 @@ struct ImageComponent {
     std::int64_t updated_ns = -1;  ///< see ComponentContext
     std::int64_t elapsed_ns = 0;
     std::vector<std::pair<std::string, ParameterValue>> parameters;
-    std::vector<ImageState> states;
-    std::vector<ImageOutput> outputs;
-    std::vector<ImageInput> inputs;
+    std::vector<SnapshotState> states;
+    std::vector<SnapshotOutput> outputs;
+    std::vector<SnapshotInput> inputs;
 };
 
 /// The last value from outside on a topic.
-struct ImageTopic {
+struct SnapshotTopic {
     std::string name;
-    ImageType type;
+    SnapshotType type;
     std::uint64_t sequence = 0;
-    ImageValue value;
+    SnapshotValue value;
 };
 
-struct RunnerImage {
+struct Snapshot {
     std::string runner;
     std::int64_t taken_ns = 0;  ///< CLOCK_REALTIME
     std::int64_t period_ns = 0;
-    ClockImage clock;
-    std::vector<ImageComponent> components;  ///< in the order of the schedule
-    std::vector<ImageTopic> topics;
+    ClockState clock;
+    std::vector<SnapshotComponent> components;  ///< in the order of the schedule
+    std::vector<SnapshotTopic> topics;
 };
 
 }  // namespace rtcf::executor

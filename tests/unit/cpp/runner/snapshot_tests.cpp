@@ -1,5 +1,5 @@
 // Snapshots of a runner: a restored one continues with the same bits; unsuitable ones are rejected.
-#include "image/image.hpp"
+#include "snapshot/snapshot.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,19 +8,19 @@
 #include <string>
 #include <vector>
 
-#include "messages/image_file.hpp"
+#include "messages/snapshot_file.hpp"
 #include "support/runner_fixture.hpp"
 
 namespace rtcf::test {
 namespace {
 
-using executor::imageFromFile;
-using executor::imageToFile;
-using executor::RunnerImage;
+using executor::Snapshot;
+using executor::snapshotFromFile;
+using executor::snapshotToFile;
 
 constexpr std::uint64_t kMany = 10'000;  // cycles
 
-class Image : public RunnerFixture {
+class Snapshots : public RunnerFixture {
    protected:
     static ComponentDefinition chaos(const std::string& name, const std::string& a,
                                      const std::string& b) {
@@ -49,16 +49,16 @@ class Image : public RunnerFixture {
         load(chaos("S", "R_x", "Q_checked"));
     }
 
-    RunnerImage take() {
-        return onGraphThread([&] { return runner().takeImage().image; });
+    Snapshot take() {
+        return onGraphThread([&] { return runner().takeSnapshot().snapshot; });
     }
-    ChangeOutcome restore(const RunnerImage& image) {
-        return onGraphThread([&] { return runner().restore(image, [](const std::string&) {}); });
+    ChangeOutcome restore(const Snapshot& snapshot) {
+        return onGraphThread([&] { return runner().restore(snapshot, [](const std::string&) {}); });
     }
     // The whole snapshot, except the time at which it was taken.
-    static std::string bytesOf(RunnerImage image) {
-        image.taken_ns = 0;
-        return imageToFile(image);
+    static std::string bytesOf(Snapshot snapshot) {
+        snapshot.taken_ns = 0;
+        return snapshotToFile(snapshot);
     }
     std::string now() { return bytesOf(take()); }
 
@@ -83,30 +83,30 @@ class Image : public RunnerFixture {
     }
 
     // Checks that it is rejected with these words, and changes nothing.
-    void expectRefused(const RunnerImage& image, const std::string& words) {
+    void expectRefused(const Snapshot& snapshot, const std::string& words) {
         const std::string before = now();
-        const std::string text = refusal([&] { restore(image); });
+        const std::string text = refusal([&] { restore(snapshot); });
         EXPECT_NE(text.find(words), std::string::npos) << text;
         EXPECT_EQ(now(), before);
     }
 };
 
-TEST_F(Image, RestoredStepsContinueWithTheSameBits) {
+TEST_F(Snapshots, RestoredStepsContinueWithTheSameBits) {
     loadRing();
     for (const char* name : {"/P", "/Q", "/R", "/S"}) setParameters(name, {{"timed", true}});
     step(123);
-    const RunnerImage image = imageFromFile(imageToFile(take()));
+    const Snapshot snapshot = snapshotFromFile(snapshotToFile(take()));
     const std::string begin = now();
     step(kMany);
     const std::string end = now();
     EXPECT_NE(begin, end);
-    restore(image);
+    restore(snapshot);
     EXPECT_EQ(now(), begin);
     step(kMany);
     EXPECT_EQ(now(), end);
 }
 
-TEST_F(Image, RestoredLoopContinuesWithTheSameBits) {
+TEST_F(Snapshots, RestoredLoopContinuesWithTheSameBits) {
     configure([](RunnerSettings& settings) {
         settings.frequency_hz = 4000.0;
         settings.loop.period_ns = 250'000;
@@ -114,11 +114,11 @@ TEST_F(Image, RestoredLoopContinuesWithTheSameBits) {
     loadRing();
     start();
     ASSERT_TRUE(runs());
-    const RunnerImage image = take();
-    const std::uint64_t last = image.clock.iteration + kMany;
+    const Snapshot snapshot = take();
+    const std::uint64_t last = snapshot.clock.iteration + kMany;
     ASSERT_TRUE(reaches(last + 1));
     const auto first = digestsAt(last);
-    restore(image);
+    restore(snapshot);
     ASSERT_LT(iteration(), last);
     ASSERT_TRUE(reaches(last + 1));
     EXPECT_EQ(digestsAt(last), first);
@@ -126,26 +126,26 @@ TEST_F(Image, RestoredLoopContinuesWithTheSameBits) {
     EXPECT_EQ(state(), RunnerState::Running);
 }
 
-TEST_F(Image, OfARunningLoopCanBeStepped) {
+TEST_F(Snapshots, OfARunningLoopCanBeStepped) {
     loadRing();
     start();
     ASSERT_TRUE(runs());
-    const RunnerImage image = take();
+    const Snapshot snapshot = take();
     stop();
-    restore(image);
+    restore(snapshot);
     EXPECT_EQ(state(), RunnerState::Stepping);
-    EXPECT_EQ(now(), bytesOf(image));
+    EXPECT_EQ(now(), bytesOf(snapshot));
     step(kMany);
     const std::string end = now();
-    restore(image);
+    restore(snapshot);
     step(kMany);
     EXPECT_EQ(now(), end);
 }
 
-TEST_F(Image, FitsAnotherRunnerWithTheSameGraph) {
+TEST_F(Snapshots, FitsAnotherRunnerWithTheSameGraph) {
     loadRing();
     step(100);
-    const RunnerImage image = take();
+    const Snapshot snapshot = take();
     step(kMany);
     const std::string end = now();
     for (const char* name : {"/S", "/R", "/Q", "/P"}) unload(name);
@@ -167,13 +167,13 @@ TEST_F(Image, FitsAnotherRunnerWithTheSameGraph) {
     replace("/S", chaos("S", "R_x", "Q_checked"));
     setParameters("/Q", {{"rate", 3.8}});
     step(3);
-    restore(image);
+    restore(snapshot);
     step(kMany);
     EXPECT_EQ(now(), end);
 }
 
 // The value of an input from an unloaded writer, or from a connection that it no longer reads.
-TEST_F(Image, KeepsInputValuesOfEarlierWriters) {
+TEST_F(Snapshots, KeepsInputValuesOfEarlierWriters) {
     load(chaos("P", "Q_x", "Q_x"));
     setBreak("/P", "a", true);
     setBreak("/P", "b", true);
@@ -188,7 +188,7 @@ TEST_F(Image, KeepsInputValuesOfEarlierWriters) {
     late.every = 7;
     late.phase = 5;
     load(late);  // P and R keep the first Q's value until this one writes
-    const RunnerImage with_kept = take();
+    const Snapshot with_kept = take();
     step(kMany);
     const std::string end = now();
     restore(with_kept);
@@ -196,7 +196,7 @@ TEST_F(Image, KeepsInputValuesOfEarlierWriters) {
     step(kMany);
     EXPECT_EQ(now(), end);
     unload("/Q");
-    const RunnerImage with_left = take();
+    const Snapshot with_left = take();
     step(kMany);
     const std::string alone = now();
     restore(with_left);
@@ -208,7 +208,7 @@ TEST_F(Image, KeepsInputValuesOfEarlierWriters) {
     EXPECT_EQ(now(), alone) << "also for inputs that never had a writer";
 }
 
-TEST_F(Image, HasTheLastValueFromOutside) {
+TEST_F(Snapshots, HasTheLastValueFromOutside) {
     configure([](RunnerSettings& settings) { settings.whitelist = "/outside"; });
     ComponentDefinition p = chaos("P", "outside", "P_x");
     p.first = true;
@@ -220,27 +220,27 @@ TEST_F(Image, HasTheLastValueFromOutside) {
     };
     send(0.25);
     step(3);
-    const RunnerImage image = take();
+    const Snapshot snapshot = take();
     step(100);
     const std::string end = now();
     send(0.75);
     step(5);
-    restore(image);
-    EXPECT_EQ(now(), bytesOf(image));
+    restore(snapshot);
+    EXPECT_EQ(now(), bytesOf(snapshot));
     step(100);
     EXPECT_EQ(now(), end);
 }
 
-TEST_F(Image, RestoresParameters) {
+TEST_F(Snapshots, RestoresParameters) {
     loadRing();
     setParameters("/P", {{"rate", 3.75}});
-    const RunnerImage image = take();
+    const Snapshot snapshot = take();
     setParameters("/P", {{"rate", 3.99}});
     setParameters("/S", {{"rate", 3.99}});
-    restore(image);
+    restore(snapshot);
     const auto rate = [&](const std::string& name) {
-        const auto snapshot = runner().snapshot();
-        for (const auto& parameter : snapshot->get(name).parameters) {
+        const auto graph = runner().graph();
+        for (const auto& parameter : graph->get(name).parameters) {
             if (parameter.declaration.name == "rate") return std::get<double>(parameter.value);
         }
         return 0.0;
@@ -249,66 +249,66 @@ TEST_F(Image, RestoresParameters) {
     EXPECT_EQ(rate("/S"), 3.9);
 }
 
-TEST_F(Image, UnsuitableOneIsRejectedCompletely) {
+TEST_F(Snapshots, UnsuitableOneIsRejectedCompletely) {
     loadRing();
     step(50);
-    const RunnerImage image = take();
+    const Snapshot snapshot = take();
     step(7);
-    const auto changed = [&](const std::function<void(RunnerImage&)>& change) {
-        RunnerImage other = image;
+    const auto changed = [&](const std::function<void(Snapshot&)>& change) {
+        Snapshot other = snapshot;
         change(other);
         return other;
     };
     const auto expect = [&](const std::string& words,
-                            const std::function<void(RunnerImage&)>& change) {
+                            const std::function<void(Snapshot&)>& change) {
         expectRefused(changed(change), words);
     };
     expect("component /P is not in the snapshot",
-           [](RunnerImage& other) { other.components.erase(other.components.begin()); });
+           [](Snapshot& other) { other.components.erase(other.components.begin()); });
     expect("the graph has no component /X",
-           [](RunnerImage& other) { other.components[0].name = "/X"; });
+           [](Snapshot& other) { other.components[0].name = "/X"; });
     expect("a component is in the snapshot twice",
-           [](RunnerImage& other) { other.components.push_back(other.components[0]); });
+           [](Snapshot& other) { other.components.push_back(other.components[0]); });
     expect("/P was a Wave and is a Chaos",
-           [](RunnerImage& other) { other.components[0].type = "Wave"; });
+           [](Snapshot& other) { other.components[0].type = "Wave"; });
     expect("ran every 4 cycles and runs every 1",
-           [](RunnerImage& other) { other.components[0].every = 4; });
-    expect("state /P.value was int and is double", [](RunnerImage& other) {
+           [](Snapshot& other) { other.components[0].every = 4; });
+    expect("state /P.value was int and is double", [](Snapshot& other) {
         other.components[0].states[0].type = "int";
         ++other.components[0].states[0].identity;
     });
     expect("state /P.digest is not in the snapshot",
-           [](RunnerImage& other) { other.components[0].states[1].name = "other"; });
+           [](Snapshot& other) { other.components[0].states[1].name = "other"; });
     expect("the graph has no state /P.other",
-           [](RunnerImage& other) { other.components[0].states[1].name = "other"; });
+           [](Snapshot& other) { other.components[0].states[1].name = "other"; });
     expect("state /P.past was",
-           [](RunnerImage& other) { other.components[0].states[2].bytes.pop_back(); });
+           [](Snapshot& other) { other.components[0].states[2].bytes.pop_back(); });
     expect("output /P.x was float and is double",
-           [](RunnerImage& other) { other.components[0].outputs[0].type.name = "float"; });
+           [](Snapshot& other) { other.components[0].outputs[0].type.name = "float"; });
     expect("output /P.checked is",
-           [](RunnerImage& other) { other.components[0].outputs[1].staged.reset(); });
+           [](Snapshot& other) { other.components[0].outputs[1].staged.reset(); });
     expect("the value of /P.x is not of type",
-           [](RunnerImage& other) { other.components[0].outputs[0].value.bytes += 'x'; });
+           [](Snapshot& other) { other.components[0].outputs[0].value.bytes += 'x'; });
     expect("the value of /P.listed is not of type",
-           [](RunnerImage& other) { other.components[0].outputs[3].value.bytes = "\xff"; });
+           [](Snapshot& other) { other.components[0].outputs[3].value.bytes = "\xff"; });
     expect("input /P.a read /Q.x and reads /S.x",
-           [](RunnerImage& other) { other.components[0].inputs[0].source = "/Q.x"; });
+           [](Snapshot& other) { other.components[0].inputs[0].source = "/Q.x"; });
     expect("input /P.a read nothing",
-           [](RunnerImage& other) { other.components[0].inputs[0].source.clear(); });
+           [](Snapshot& other) { other.components[0].inputs[0].source.clear(); });
     expect("the graph has no parameter /P.gain",
-           [](RunnerImage& other) { other.components[0].parameters[0].first = "gain"; });
+           [](Snapshot& other) { other.components[0].parameters[0].first = "gain"; });
     expect("above its maximum",
-           [](RunnerImage& other) { other.components[0].parameters[0].second = 5.0; });
-    expect("topic /t", [](RunnerImage& other) { other.topics.push_back({"/t", {}, 1, {}}); });
-    expect("taken at 500 Hz", [](RunnerImage& other) { other.period_ns = 2'000'000; });
-    expect("and 3 more", [](RunnerImage& other) {
+           [](Snapshot& other) { other.components[0].parameters[0].second = 5.0; });
+    expect("topic /t", [](Snapshot& other) { other.topics.push_back({"/t", {}, 1, {}}); });
+    expect("taken at 500 Hz", [](Snapshot& other) { other.period_ns = 2'000'000; });
+    expect("and 3 more", [](Snapshot& other) {
         for (auto& component : other.components) component.name += "x";
     });
     setBreak("/S", "a", true);
-    expectRefused(image, "input /S.a read /R.x and reads /R.x one cycle late");
+    expectRefused(snapshot, "input /S.a read /R.x and reads /R.x one cycle late");
 }
 
-TEST_F(Image, OfAnotherBuildFitsByNameAndType) {
+TEST_F(Snapshots, OfAnotherBuildFitsByNameAndType) {
     const auto loadVersion = [&](int number) {
         const std::string file = RTCF_UNIT_COMPONENTS "/stateful_" + std::to_string(number) + ".so";
         onGraphThread([&] {
@@ -317,60 +317,60 @@ TEST_F(Image, OfAnotherBuildFitsByNameAndType) {
     };
     loadVersion(1);
     step(10);
-    const RunnerImage image = take();
+    const Snapshot snapshot = take();
     unload("/A");
     loadVersion(2);
-    const std::string text = refusal([&] { restore(image); });
+    const std::string text = refusal([&] { restore(snapshot); });
     for (const char* words :
          {"state /A.fresh is not in the snapshot", "state /A.gain was float and is double",
           "the graph has no state /A.old_name"})
         EXPECT_NE(text.find(words), std::string::npos) << text;
     unload("/A");
     loadVersion(1);
-    restore(image);
+    restore(snapshot);
     step(1);
     EXPECT_EQ(value("/A", "out"), 11.0);
 }
 
-TEST_F(Image, TooLargeForACycleIsRejectedWithTheLimit) {
+TEST_F(Snapshots, TooLargeForACycleIsRejectedWithTheLimit) {
     load(definition("Camera", "C"));
-    const RunnerImage image = take();
+    const Snapshot snapshot = take();
     start();
     ASSERT_TRUE(runs());
     for (const auto& work :
-         std::vector<std::function<void()>>{[&] { take(); }, [&] { restore(image); }}) {
+         std::vector<std::function<void()>>{[&] { take(); }, [&] { restore(snapshot); }}) {
         const std::string text = refusal(work);
         EXPECT_NE(text.find("touches 2097"), std::string::npos) << text;
         EXPECT_NE(text.find("limit is 131072 at 1000 Hz"), std::string::npos) << text;
     }
     EXPECT_EQ(state(), RunnerState::Running);
     stop();
-    restore(image);
+    restore(snapshot);
 }
 
-TEST_F(Image, LargerThanReservedIsRejectedInTheCycle) {
+TEST_F(Snapshots, LargerThanReservedIsRejectedInTheCycle) {
     loadRing();
-    RunnerImage image = take();
-    image.components[0].outputs[3].value.bytes =
+    Snapshot snapshot = take();
+    snapshot.components[0].outputs[3].value.bytes =
         std::string(8, '\0') + '\x9' + std::string(3, '\0') + std::string(72, '\1');
     start();
     ASSERT_TRUE(runs());
-    const std::string text = refusal([&] { restore(image); });
+    const std::string text = refusal([&] { restore(snapshot); });
     EXPECT_NE(text.find("the value of /P.listed has 84 bytes, its component has reserved 44"),
               std::string::npos)
         << text;
     stop();
-    restore(image);
+    restore(snapshot);
 }
 
-TEST_F(Image, OfATakenOutComponentIsRejected) {
+TEST_F(Snapshots, OfATakenOutComponentIsRejected) {
     loadRing();
-    const RunnerImage before = take();
+    const Snapshot before = take();
     ComponentDefinition throwing = definition("Controller", "C");
     throwing.optional = true;
     throwing.parameters = {{"throws_at", std::int64_t{3}}};
     load(throwing);
-    const RunnerImage sound = take();
+    const Snapshot sound = take();
     step(10);
     EXPECT_NE(refusal([&] { take(); }).find("/C was taken out after a fault"), std::string::npos);
     EXPECT_NE(refusal([&] { restore(sound); }).find("/C was taken out after a fault"),
@@ -380,19 +380,19 @@ TEST_F(Image, OfATakenOutComponentIsRejected) {
 }
 
 // A late cycle has a larger elapsed(); the steps after it do not.
-TEST_F(Image, AfterAMissedCycleStepsHaveOnePeriodEach) {
+TEST_F(Snapshots, AfterAMissedCycleStepsHaveOnePeriodEach) {
     load(definition("Spinner", "S"));
     step(5);
-    RunnerImage image = take();
-    image.clock.elapsed_ns = 3 * image.period_ns;  // as in a loop that just missed two
+    Snapshot snapshot = take();
+    snapshot.clock.elapsed_ns = 3 * snapshot.period_ns;  // as in a loop that just missed two
     const double before = value("/S", "periods");
-    restore(image);
+    restore(snapshot);
     step(11);
     EXPECT_EQ(value("/S", "periods"), before + 3.0 + 10.0);
 }
 
 // A removed topic leaves its last value in the input, and in the snapshot.
-TEST_F(Image, KeepsTheLastValueOfARemovedTopic) {
+TEST_F(Snapshots, KeepsTheLastValueOfARemovedTopic) {
     configure([](RunnerSettings& settings) { settings.whitelist = "/outside"; });
     ComponentDefinition relay = definition("Relay", "P");
     relay.remaps = {{"in", "/outside"}};
@@ -405,9 +405,9 @@ TEST_F(Image, KeepsTheLastValueOfARemovedTopic) {
     configure([](RunnerSettings& settings) { settings.whitelist = ""; });
     step(1);
     ASSERT_EQ(value("/P", "out"), 1.25);
-    const RunnerImage image = take();
+    const Snapshot snapshot = take();
     const auto expectOld = [&](const char* where) {
-        restore(image);
+        restore(snapshot);
         step(1);
         EXPECT_EQ(value("/P", "out"), 1.25) << where;
         EXPECT_EQ(value("/P", "status"), static_cast<double>(DataStatus::Old)) << where;
@@ -418,7 +418,7 @@ TEST_F(Image, KeepsTheLastValueOfARemovedTopic) {
 }
 
 // For AddressSanitizer: the next change frees the input's value.
-TEST_F(Image, AKeptValueOutlivesTheNextChange) {
+TEST_F(Snapshots, AKeptValueOutlivesTheNextChange) {
     ComponentDefinition ticker = definition("Ticker", "W");
     ticker.remaps = {{"out", "/w"}};
     load(ticker);
@@ -430,9 +430,9 @@ TEST_F(Image, AKeptValueOutlivesTheNextChange) {
     configure([](RunnerSettings& settings) { settings.whitelist = "/w"; });
     unload("/W");  // P now reads the topic, which has no messages,
     configure([](RunnerSettings& settings) { settings.whitelist = ""; });  // which is removed, too
-    const RunnerImage image = take();
+    const Snapshot snapshot = take();
     replace("/P", relay);
-    restore(image);
+    restore(snapshot);
     step(1);
     ASSERT_EQ(value("/P", "out"), kept);
     for (const char* name : {"X", "Y", "Z"}) {  // its memory is reused
@@ -446,59 +446,59 @@ TEST_F(Image, AKeptValueOutlivesTheNextChange) {
 
 // Fewer bytes on the wire do not mean less memory: here a dimension without reserved memory. The
 // sanitizer detects an allocation in the cycle.
-TEST_F(Image, OfAnotherShapeAllocatesNothingInTheCycle) {
+TEST_F(Snapshots, OfAnotherShapeAllocatesNothingInTheCycle) {
     load(chaos("P", "S_x", "R_checked"));  // no reader with a loop break, which would copy it
-    RunnerImage image = take();
+    Snapshot snapshot = take();
     const auto word = [](std::uint32_t number) {
         return std::string(reinterpret_cast<const char*>(&number), sizeof number);
     };
     const std::string other =
         word(1) + word(0) + word(0) + word(0) + word(0) + word(2) + std::string(16, '\0');
-    image.components[0].outputs[3].value.bytes = other;
+    snapshot.components[0].outputs[3].value.bytes = other;
     start();
     ASSERT_TRUE(runs());
-    restore(image);
+    restore(snapshot);
     stop();
-    restore(image);
+    restore(snapshot);
     EXPECT_EQ(take().components[0].outputs[3].value.bytes, other);
 }
 
-TEST_F(Image, WithAnInvalidClockIsRejected) {
+TEST_F(Snapshots, WithAnInvalidClockIsRejected) {
     loadRing();
     step(5);
-    const RunnerImage image = take();
-    for (const auto& change : std::vector<std::function<void(RunnerImage&)>>{
-             [](RunnerImage& other) { other.clock.elapsed_ns = 0; },
-             [](RunnerImage& other) { other.clock.elapsed_ns = -1; },
-             [](RunnerImage& other) { other.clock.time_ns = INT64_MIN; },
-             [](RunnerImage& other) { other.clock.time_ns = INT64_MAX; },
-             [](RunnerImage& other) { other.clock.total_elapsed_ns = INT64_MIN; },
+    const Snapshot snapshot = take();
+    for (const auto& change : std::vector<std::function<void(Snapshot&)>>{
+             [](Snapshot& other) { other.clock.elapsed_ns = 0; },
+             [](Snapshot& other) { other.clock.elapsed_ns = -1; },
+             [](Snapshot& other) { other.clock.time_ns = INT64_MIN; },
+             [](Snapshot& other) { other.clock.time_ns = INT64_MAX; },
+             [](Snapshot& other) { other.clock.total_elapsed_ns = INT64_MIN; },
              // More seconds than ros::Time can hold: publishing the cycle would throw.
-             [](RunnerImage& other) { other.clock.stamp_ns = 5'000'000'000'000'000'000; }}) {
-        RunnerImage other = image;
+             [](Snapshot& other) { other.clock.stamp_ns = 5'000'000'000'000'000'000; }}) {
+        Snapshot other = snapshot;
         change(other);
         expectRefused(other, "clock");
     }
 }
 
 // A rejected snapshot of a stopped runner runs no hooks.
-TEST_F(Image, RejectedOneStartsNothing) {
+TEST_F(Snapshots, RejectedOneStartsNothing) {
     load(definition("Recorder", "C"));
-    RunnerImage image = take();
-    for (auto& [name, value] : image.components[0].parameters) {
+    Snapshot snapshot = take();
+    for (auto& [name, value] : snapshot.components[0].parameters) {
         if (name == "gain") value = 50.0;  // above its maximum
     }
     const std::uint32_t before = runner().numberedState().number;
-    EXPECT_NE(refusal([&] { restore(image); }), "");
+    EXPECT_NE(refusal([&] { restore(snapshot); }), "");
     EXPECT_EQ(runner().numberedState().number, before) << "it must not be started";
 }
 
-TEST_F(Image, AlteredFileIsRejected) {
+TEST_F(Snapshots, AlteredFileIsRejected) {
     loadRing();
     step(5);
-    const std::string file = imageToFile(take());
+    const std::string file = snapshotToFile(take());
     const auto told = [&](const std::string& bytes) {
-        return refusal([&] { imageFromFile(bytes); });
+        return refusal([&] { snapshotFromFile(bytes); });
     };
     EXPECT_EQ(told(file), "");
     for (const std::string& none : {std::string(), std::string("RTCF"), std::string(100, 'x')})
@@ -515,9 +515,9 @@ TEST_F(Image, AlteredFileIsRejected) {
     EXPECT_NE(told(file + "x").find("is damaged"), std::string::npos);
 }
 
-TEST_F(Image, ListsComponentsWithoutState) {
+TEST_F(Snapshots, ListsComponentsWithoutState) {
     load(definition("Controller", "C"));
-    const auto notes = onGraphThread([&] { return runner().takeImage().notes; });
+    const auto notes = onGraphThread([&] { return runner().takeSnapshot().notes; });
     ASSERT_EQ(notes.size(), 1U);
     EXPECT_NE(notes[0].find("components without declared state"), std::string::npos);
     EXPECT_NE(notes[0].find("/C"), std::string::npos);

@@ -5,13 +5,13 @@
 #include <string>
 #include <string_view>
 
-#include "image/image.hpp"
+#include "snapshot/snapshot.hpp"
 
 namespace rtcf::executor {
 
 /// @return the content of the file
-std::string imageToFile(const RunnerImage& image);
-/// @throws Refusal if the file is not a snapshot, has another format, or is damaged
-RunnerImage imageFromFile(std::string_view file);
+std::string snapshotToFile(const Snapshot& snapshot);
+/// @throws Error if the file is not a snapshot, has another format, or is damaged
+Snapshot snapshotFromFile(std::string_view file);
 
 }  // namespace rtcf::executor

@@ -1,4 +1,4 @@
-#include "messages/image_file.hpp"
+#include "messages/snapshot_file.hpp"
 
 #include <fmt/format.h>
 
@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <cstring>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 #include "messages/parameter_value.hpp"
 #include "rtcf/executor/v1/snapshot.pb.h"
 
@@ -48,11 +48,9 @@ void append(std::string& bytes, T number) {
     bytes.append(reinterpret_cast<const char*>(&number), sizeof number);
 }
 
-[[noreturn]] void refuse(const std::string& why) {
-    throw Refusal(RefusalKind::InvalidArgument, why);
-}
+[[noreturn]] void refuse(const std::string& why) { throw Error(ErrorKind::InvalidArgument, why); }
 
-v1::PortType typeTo(const ImageType& type) {
+v1::PortType typeTo(const SnapshotType& type) {
     v1::PortType message;
     message.set_name(type.name);
     message.set_md5(type.md5);
@@ -62,11 +60,11 @@ v1::PortType typeTo(const ImageType& type) {
     return message;
 }
 
-ImageType typeFrom(const v1::PortType& message) {
+SnapshotType typeFrom(const v1::PortType& message) {
     return {message.name(), message.md5(), message.size(), message.alignment(), message.flat()};
 }
 
-v1::PortValue valueTo(const ImageValue& value) {
+v1::PortValue valueTo(const SnapshotValue& value) {
     v1::PortValue message;
     message.set_sequence(value.sequence);
     message.set_time_ns(value.time_ns);
@@ -74,11 +72,11 @@ v1::PortValue valueTo(const ImageValue& value) {
     return message;
 }
 
-ImageValue valueFrom(const v1::PortValue& message) {
+SnapshotValue valueFrom(const v1::PortValue& message) {
     return {message.sequence(), message.time_ns(), message.value()};
 }
 
-v1::ComponentSnapshot componentTo(const ImageComponent& component) {
+v1::ComponentSnapshot componentTo(const SnapshotComponent& component) {
     v1::ComponentSnapshot message;
     message.set_name(component.name);
     message.set_package(component.package);
@@ -92,14 +90,14 @@ v1::ComponentSnapshot componentTo(const ImageComponent& component) {
         parameter.set_name(name);
         *parameter.mutable_value() = parameterValueTo(value);
     }
-    for (const ImageState& state : component.states) {
+    for (const SnapshotState& state : component.states) {
         v1::StateSnapshot& to = *message.add_states();
         to.set_name(state.name);
         to.set_type(state.type);
         to.set_identity(state.identity);
         to.set_value(state.bytes);
     }
-    for (const ImageOutput& output : component.outputs) {
+    for (const SnapshotOutput& output : component.outputs) {
         v1::OutputSnapshot& to = *message.add_outputs();
         to.set_name(output.name);
         *to.mutable_type() = typeTo(output.type);
@@ -107,7 +105,7 @@ v1::ComponentSnapshot componentTo(const ImageComponent& component) {
         if (output.staged) *to.mutable_staged() = valueTo(*output.staged);
         if (output.latched) *to.mutable_latched() = valueTo(*output.latched);
     }
-    for (const ImageInput& input : component.inputs) {
+    for (const SnapshotInput& input : component.inputs) {
         v1::InputSnapshot& to = *message.add_inputs();
         to.set_name(input.name);
         *to.mutable_type() = typeTo(input.type);
@@ -122,18 +120,18 @@ v1::ComponentSnapshot componentTo(const ImageComponent& component) {
     return message;
 }
 
-ImageComponent componentFrom(const v1::ComponentSnapshot& message) {
-    ImageComponent component{message.name(),
-                             message.package(),
-                             message.type(),
-                             message.every(),
-                             message.phase(),
-                             message.updated_ns(),
-                             message.elapsed_ns(),
-                             {},
-                             {},
-                             {},
-                             {}};
+SnapshotComponent componentFrom(const v1::ComponentSnapshot& message) {
+    SnapshotComponent component{message.name(),
+                                message.package(),
+                                message.type(),
+                                message.every(),
+                                message.phase(),
+                                message.updated_ns(),
+                                message.elapsed_ns(),
+                                {},
+                                {},
+                                {},
+                                {}};
     for (const auto& parameter : message.parameters()) {
         component.parameters.emplace_back(parameter.name(),
                                           parameterValueFrom(parameter.value(), parameter.name()));
@@ -141,13 +139,13 @@ ImageComponent componentFrom(const v1::ComponentSnapshot& message) {
     for (const v1::StateSnapshot& state : message.states())
         component.states.push_back({state.name(), state.type(), state.identity(), state.value()});
     for (const v1::OutputSnapshot& from : message.outputs()) {
-        ImageOutput output{from.name(), typeFrom(from.type()), valueFrom(from.value()), {}, {}};
+        SnapshotOutput output{from.name(), typeFrom(from.type()), valueFrom(from.value()), {}, {}};
         if (from.has_staged()) output.staged = valueFrom(from.staged());
         if (from.has_latched()) output.latched = valueFrom(from.latched());
         component.outputs.push_back(std::move(output));
     }
     for (const v1::InputSnapshot& from : message.inputs()) {
-        ImageInput input;
+        SnapshotInput input;
         input.name = from.name();
         input.type = typeFrom(from.type());
         input.source = from.source();
@@ -164,19 +162,19 @@ ImageComponent componentFrom(const v1::ComponentSnapshot& message) {
 
 }  // namespace
 
-std::string imageToFile(const RunnerImage& image) {
+std::string snapshotToFile(const Snapshot& snapshot) {
     v1::RunnerSnapshot message;
-    message.set_runner(image.runner);
-    message.set_taken_ns(image.taken_ns);
-    message.set_period_ns(image.period_ns);
-    message.set_iteration(image.clock.iteration);
-    message.set_time_ns(image.clock.time_ns);
-    message.set_stamp_ns(image.clock.stamp_ns);
-    message.set_elapsed_ns(image.clock.elapsed_ns);
-    message.set_total_elapsed_ns(image.clock.total_elapsed_ns);
-    for (const ImageComponent& component : image.components)
+    message.set_runner(snapshot.runner);
+    message.set_taken_ns(snapshot.taken_ns);
+    message.set_period_ns(snapshot.period_ns);
+    message.set_iteration(snapshot.clock.iteration);
+    message.set_time_ns(snapshot.clock.time_ns);
+    message.set_stamp_ns(snapshot.clock.stamp_ns);
+    message.set_elapsed_ns(snapshot.clock.elapsed_ns);
+    message.set_total_elapsed_ns(snapshot.clock.total_elapsed_ns);
+    for (const SnapshotComponent& component : snapshot.components)
         *message.add_components() = componentTo(component);
-    for (const ImageTopic& topic : image.topics) {
+    for (const SnapshotTopic& topic : snapshot.topics) {
         v1::TopicSnapshot& to = *message.add_topics();
         to.set_name(topic.name);
         *to.mutable_type() = typeTo(topic.type);
@@ -191,7 +189,7 @@ std::string imageToFile(const RunnerImage& image) {
     return file + body;
 }
 
-RunnerImage imageFromFile(std::string_view file) {
+Snapshot snapshotFromFile(std::string_view file) {
     if (file.size() < kHeader || file.substr(0, kMagic.size()) != kMagic)
         refuse("the file is not a snapshot: rtcfctl snapshot FILE makes one");
     if (const auto version = numberAt<std::uint32_t>(file, 8); version != kVersion) {
@@ -204,7 +202,7 @@ RunnerImage imageFromFile(std::string_view file) {
         checksum(body) != numberAt<std::uint32_t>(file, 12) ||
         !message.ParseFromArray(body.data(), static_cast<int>(body.size())))
         refuse("the snapshot is damaged: its checksum is wrong; take a new one");
-    RunnerImage image{message.runner(),
+    Snapshot snapshot{message.runner(),
                       message.taken_ns(),
                       message.period_ns(),
                       {message.iteration(), message.time_ns(), message.stamp_ns(),
@@ -212,12 +210,12 @@ RunnerImage imageFromFile(std::string_view file) {
                       {},
                       {}};
     for (const v1::ComponentSnapshot& component : message.components())
-        image.components.push_back(componentFrom(component));
+        snapshot.components.push_back(componentFrom(component));
     for (const v1::TopicSnapshot& topic : message.topics()) {
-        image.topics.push_back(
+        snapshot.topics.push_back(
             {topic.name(), typeFrom(topic.type()), topic.sequence(), valueFrom(topic.value())});
     }
-    return image;
+    return snapshot;
 }
 
 }  // namespace rtcf::executor

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "image/image.hpp"
 #include "ordering/plan.hpp"
+#include "snapshot/snapshot.hpp"
 
 namespace rtcf::executor {
 
@@ -28,26 +28,26 @@ class Sources {
     std::map<const void*, std::string> names_;  // by slot or injector
 };
 
-class ImageTaker {
+class SnapshotTaker {
    public:
     /// @param plan the loop's plan; outlives this object
-    explicit ImageTaker(const Plan& plan);
-    ImageTaker(const ImageTaker&) = delete;
-    ImageTaker& operator=(const ImageTaker&) = delete;
+    explicit SnapshotTaker(const Plan& plan);
+    SnapshotTaker(const SnapshotTaker&) = delete;
+    SnapshotTaker& operator=(const SnapshotTaker&) = delete;
 
     /// The capture to fill at a boundary.
     Capture& capture() noexcept { return capture_; }
     /// Enlarges buffers that were too small.
     void makeRoom();
     /// The snapshot, after the capture.
-    /// @throws Refusal if a component was taken out after a fault
-    RunnerImage image() const;
+    /// @throws Error if a component was taken out after a fault
+    Snapshot snapshot() const;
 
    private:
     void add(const TypeInfo& type, const SlotHeader* slot, const SlotHeader* sample);
-    ImageValue valueAt(const SlotHeader* slot) const;
-    ImageComponent componentOf(std::size_t step) const;
-    ImageInput inputOf(const InputBase& input, const InputBase::Reading& reading) const;
+    SnapshotValue valueAt(const SlotHeader* slot) const;
+    SnapshotComponent componentOf(std::size_t step) const;
+    SnapshotInput inputOf(const InputBase& input, const InputBase::Reading& reading) const;
 
     const Plan& plan_;
     const Sources sources_;

@@ -1,8 +1,8 @@
-#include "image/image_taker.hpp"
+#include "snapshot/snapshot_taker.hpp"
 
 #include <fmt/format.h>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 
 namespace rtcf::executor {
 
@@ -12,7 +12,7 @@ const Instance& instanceOf(const Plan& plan, std::size_t step) {
     return *plan.graph.nodes()[plan.wiring.order[step]].instance;
 }
 
-ImageValue valueFrom(const Capture::Value& value) {
+SnapshotValue valueFrom(const Capture::Value& value) {
     return {value.header.sequence, value.header.time_ns,
             std::string(value.bytes.begin(), value.bytes.begin() + value.length)};
 }
@@ -20,11 +20,11 @@ ImageValue valueFrom(const Capture::Value& value) {
 // Requires that values can be copied in the cycle.
 void requireCopied(const TypeInfo& type) {
     if (!allocatesMessage(type)) return;
-    throw Refusal(RefusalKind::FailedPrecondition,
-                  fmt::format("a snapshot cannot contain values of {}: they own memory, "
-                              "and so do messages of {}, which would be allocated in the cycle; "
-                              "store the values in a std::array",
-                              type.name, type.ros_type));
+    throw Error(ErrorKind::FailedPrecondition,
+                fmt::format("a snapshot cannot contain values of {}: they own memory, "
+                            "and so do messages of {}, which would be allocated in the cycle; "
+                            "store the values in a std::array",
+                            type.name, type.ros_type));
 }
 
 // The slot that an input without a writer still reads; null if it never had a writer.
@@ -57,7 +57,7 @@ std::string Sources::of(const InputBase& input) const {
     return names_.at(binding.writer) + (late ? " one cycle late" : "");
 }
 
-ImageTaker::ImageTaker(const Plan& plan) : plan_(plan), sources_(plan) {
+SnapshotTaker::SnapshotTaker(const Plan& plan) : plan_(plan), sources_(plan) {
     for (std::size_t step = 0; step < plan.wiring.order.size(); ++step) {
         const Instance& instance = instanceOf(plan, step);
         const Component& component = instance.component();
@@ -98,7 +98,7 @@ ImageTaker::ImageTaker(const Plan& plan) : plan_(plan), sources_(plan) {
     }
 }
 
-void ImageTaker::add(const TypeInfo& type, const SlotHeader* slot, const SlotHeader* sample) {
+void SnapshotTaker::add(const TypeInfo& type, const SlotHeader* slot, const SlotHeader* sample) {
     requireCopied(type);
     if (slot == nullptr || !values_.emplace(slot, capture_.values.size()).second) return;
     std::size_t room = type.size;
@@ -106,7 +106,7 @@ void ImageTaker::add(const TypeInfo& type, const SlotHeader* slot, const SlotHea
     capture_.values.push_back({&type, slot, std::vector<std::uint8_t>(room)});
 }
 
-void ImageTaker::makeRoom() {
+void SnapshotTaker::makeRoom() {
     const auto enlarge = [](Capture::Value& value) {
         if (value.bytes.size() < value.length) value.bytes.resize(value.length);
     };
@@ -114,83 +114,84 @@ void ImageTaker::makeRoom() {
     for (Capture::Topic& topic : capture_.topics) enlarge(topic.value);
 }
 
-ImageValue ImageTaker::valueAt(const SlotHeader* slot) const {
+SnapshotValue SnapshotTaker::valueAt(const SlotHeader* slot) const {
     return valueFrom(capture_.values[values_.at(slot)]);
 }
 
-ImageInput ImageTaker::inputOf(const InputBase& input, const InputBase::Reading& reading) const {
-    ImageInput image;
-    image.name = input.name();
-    image.type = imageTypeOf(input.type());
-    image.source = sources_.of(input);
-    image.seen = reading.seen;
-    image.kept_is_new = reading.kept_is_new;
-    image.reads_source = reading.current == reading.source;
+SnapshotInput SnapshotTaker::inputOf(const InputBase& input,
+                                     const InputBase::Reading& reading) const {
+    SnapshotInput result;
+    result.name = input.name();
+    result.type = snapshotTypeOf(input.type());
+    result.source = sources_.of(input);
+    result.seen = reading.seen;
+    result.kept_is_new = reading.kept_is_new;
+    result.reads_source = reading.current == reading.source;
     const auto binding = plan_.bindings.find(&input);
-    if (binding == plan_.bindings.end()) return image;
+    if (binding == plan_.bindings.end()) return result;
     if (const SlotHeader* const left = leftBy(binding->second); left != nullptr)
-        image.left = valueAt(left);
-    if (image.reads_source || reading.current != binding->second.kept) return image;
-    image.kept_of = sources_.output(reading.current);
-    if (image.kept_of.empty()) image.kept = valueAt(reading.current);
-    return image;
+        result.left = valueAt(left);
+    if (result.reads_source || reading.current != binding->second.kept) return result;
+    result.kept_of = sources_.output(reading.current);
+    if (result.kept_of.empty()) result.kept = valueAt(reading.current);
+    return result;
 }
 
-ImageComponent ImageTaker::componentOf(std::size_t step) const {
+SnapshotComponent SnapshotTaker::componentOf(std::size_t step) const {
     const Instance& instance = instanceOf(plan_, step);
     const Component& component = instance.component();
-    ImageComponent image;
-    image.name = instance.fullName();
-    image.package = instance.definition().package;
-    image.type = instance.definition().type;
-    image.every = instance.definition().every;
-    image.phase = instance.phase();
-    image.updated_ns = capture_.turns[step].updated_ns;
-    image.elapsed_ns = capture_.turns[step].elapsed_ns;
+    SnapshotComponent result;
+    result.name = instance.fullName();
+    result.package = instance.definition().package;
+    result.type = instance.definition().type;
+    result.every = instance.definition().every;
+    result.phase = instance.phase();
+    result.updated_ns = capture_.turns[step].updated_ns;
+    result.elapsed_ns = capture_.turns[step].elapsed_ns;
     const auto& parameters = component.parameters();
     for (std::size_t i = 0; i < parameters.size(); ++i)
-        image.parameters.emplace_back(parameters[i]->declaration().name,
-                                      instance.parameterValues()[i]);
+        result.parameters.emplace_back(parameters[i]->declaration().name,
+                                       instance.parameterValues()[i]);
     const char* state_bytes = reinterpret_cast<const char*>(states_[step].data());
     for (const StateDeclaration& state : component.states()) {
-        image.states.push_back(
+        result.states.push_back(
             {state.name, state.type, state.identity, std::string(state_bytes, state.size)});
         state_bytes += state.size;
     }
     for (const OutputBase* output : component.outputs()) {
         const SlotHeader* const slot = output->slot().get();
-        ImageOutput port{output->name(), imageTypeOf(output->type()), valueAt(slot), {}, {}};
+        SnapshotOutput port{output->name(), snapshotTypeOf(output->type()), valueAt(slot), {}, {}};
         if (output->written() != slot) port.staged = valueAt(output->written());
         if (const auto latch = plan_.latches.find(slot); latch != plan_.latches.end())
             port.latched = valueAt(latch->second.get());
-        image.outputs.push_back(std::move(port));
+        result.outputs.push_back(std::move(port));
     }
-    return image;
+    return result;
 }
 
-RunnerImage ImageTaker::image() const {
-    RunnerImage image;
-    image.clock = capture_.clock;
+Snapshot SnapshotTaker::snapshot() const {
+    Snapshot result;
+    result.clock = capture_.clock;
     auto input = capture_.inputs.begin();
     for (std::size_t step = 0; step < plan_.wiring.order.size(); ++step) {
         const Instance& instance = instanceOf(plan_, step);
         if (capture_.turns[step].disabled) {
-            throw Refusal(RefusalKind::FailedPrecondition,
-                          fmt::format("{0} was taken out after a fault, so its state is unknown: "
-                                      "replace or unload it first",
-                                      instance.fullName()));
+            throw Error(ErrorKind::FailedPrecondition,
+                        fmt::format("{0} was taken out after a fault, so its state is unknown: "
+                                    "replace or unload it first",
+                                    instance.fullName()));
         }
-        image.components.push_back(componentOf(step));
+        result.components.push_back(componentOf(step));
         for (const InputBase* port : instance.component().inputs()) {
-            image.components.back().inputs.push_back(inputOf(*port, input->reading));
+            result.components.back().inputs.push_back(inputOf(*port, input->reading));
             ++input;
         }
     }
     for (const Capture::Topic& topic : capture_.topics) {
-        image.topics.push_back({topic.injector->topic(), imageTypeOf(topic.injector->type()),
-                                topic.sequence, valueFrom(topic.value)});
+        result.topics.push_back({topic.injector->topic(), snapshotTypeOf(topic.injector->type()),
+                                 topic.sequence, valueFrom(topic.value)});
     }
-    return image;
+    return result;
 }
 
 }  // namespace rtcf::executor

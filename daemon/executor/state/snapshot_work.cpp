@@ -1,4 +1,4 @@
-#include "state/image_work.hpp"
+#include "state/snapshot_work.hpp"
 
 #include <cstring>
 

@@ -1,6 +1,6 @@
 /// @file
-/// Values copied out of a loop for a snapshot (image/image.hpp), and back in, all at one cycle
-/// boundary. The graph thread plans the copies; the cycle thread makes them.
+/// Values copied out of a loop for a snapshot (snapshot/snapshot.hpp), and back in, all at one
+/// cycle boundary. The graph thread plans the copies; the cycle thread makes them.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +15,7 @@
 namespace rtcf::executor {
 
 /// The loop's own state between two cycles.
-struct ClockImage {
+struct ClockState {
     std::uint64_t iteration = 0;        ///< iteration of the next cycle
     std::int64_t time_ns = 0;           ///< loop time of the last cycle
     std::int64_t stamp_ns = 0;          ///< ROS time of the last cycle
@@ -57,7 +57,7 @@ struct Capture {
     std::vector<Input> inputs;
     std::vector<Topic> topics;
     std::vector<Turn> turns;
-    ClockImage clock;
+    ClockState clock;
     /// Buffers of values of variable size were too small. Their lengths are now known; the caller
     /// has to repeat the capture.
     bool lacks_room = false;
@@ -99,7 +99,7 @@ struct Restoration {
     std::vector<Input> inputs;
     std::vector<Topic> topics;
     std::vector<Turn> turns;
-    ClockImage clock;
+    ClockState clock;
     /// True = the loop's time continues from the snapshot's (simulated time). False = the loop's
     /// time is the machine's; the ages of values are kept.
     bool sets_time = false;

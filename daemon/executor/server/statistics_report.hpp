@@ -16,13 +16,13 @@
 namespace rtcf::executor {
 
 /// Owned by the server. Main thread and graph thread.
-class Figures {
+class StatisticsReport {
    public:
     /// @param runner, log outlive this object
-    Figures(Runner& runner, Log& log) : runner_(runner), log_(log) {}
+    StatisticsReport(Runner& runner, Log& log) : runner_(runner), log_(log) {}
 
     /// Adds the statistics of a status.
-    void addTo(::rtcf::v1::RunnerStatus& status, const GraphSnapshot& graph) const;
+    void addTo(::rtcf::v1::RunnerStatus& status, const GraphView& graph) const;
     /// All statistics.
     /// @param buckets true = with the histograms of the loop
     ::rtcf::v1::RunnerStatistics statistics(bool buckets) const;
@@ -43,7 +43,7 @@ class Figures {
             std::int64_t device_time_ns = 0;
         };
         // Shared ownership, as other statistics could get the same address.
-        std::map<std::shared_ptr<const ComponentFigures>, Component> components;
+        std::map<std::shared_ptr<const ComponentStatistics>, Component> components;
         HistogramSnapshot duration;
         HistogramSnapshot latency;
         HistogramSnapshot adoption;
@@ -60,9 +60,9 @@ class Figures {
         ThreadUsage usage;
     };
 
-    Counted counted(const GraphSnapshot& graph) const;
-    static std::uint64_t tapDropped(const GraphSnapshot& graph, const Counted& baseline);
-    void setBaseline(Counted figures);
+    Counted counted(const GraphView& graph) const;
+    static std::uint64_t tapDropped(const GraphView& graph, const Counted& baseline);
+    void setBaseline(Counted totals);
     std::shared_ptr<const Counted> baseline() const;
 
     Runner& runner_;

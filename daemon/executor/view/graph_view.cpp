@@ -1,18 +1,18 @@
-#include "view/snapshot.hpp"
+#include "view/graph_view.hpp"
 
 #include <fmt/format.h>
 
-#include "common/refusal.hpp"
+#include "common/error.hpp"
 
 namespace rtcf::executor {
 
 namespace {
 
-std::shared_ptr<const ComponentSnapshot> picture(const GraphNode& node) {
+std::shared_ptr<const ComponentView> viewOf(const GraphNode& node) {
     const Instance& instance = *node.instance;
-    auto result = std::make_shared<ComponentSnapshot>();
+    auto result = std::make_shared<ComponentView>();
     result->instance = &instance;
-    result->figures = instance.figures();
+    result->statistics = instance.statistics();
     result->definition = instance.definition();
     result->definition.breaks = node.breaks;
     result->full_name = instance.fullName();
@@ -40,11 +40,11 @@ std::shared_ptr<const ComponentSnapshot> picture(const GraphNode& node) {
     return result;
 }
 
-ConnectionSnapshot picture(const Graph& graph, const ConnectionPlan& plan) {
+ConnectionView viewOf(const Graph& graph, const ConnectionPlan& plan) {
     const auto component = [&](std::size_t node) {
         return graph.nodes()[node].instance->fullName();
     };
-    ConnectionSnapshot result{plan.type->name, {}, {}, {}, plan.published, plan.subscribed};
+    ConnectionView result{plan.type->name, {}, {}, {}, plan.published, plan.subscribed};
     if (plan.writer)
         result.writer = {component(plan.writer->node), plan.writer->output->name(), false};
     for (const Writer& writer : plan.others)
@@ -57,32 +57,32 @@ ConnectionSnapshot picture(const Graph& graph, const ConnectionPlan& plan) {
 
 }  // namespace
 
-const ComponentSnapshot& GraphSnapshot::get(const std::string& full_name) const {
+const ComponentView& GraphView::get(const std::string& full_name) const {
     for (const auto& component : components) {
         if (component->full_name == full_name) return *component;
     }
-    throw Refusal(RefusalKind::NotFound, fmt::format("no component {} in this runner", full_name));
+    throw Error(ErrorKind::NotFound, fmt::format("no component {} in this runner", full_name));
 }
 
-std::shared_ptr<const GraphSnapshot> takeSnapshot(const Plan& plan, const GraphSnapshot& previous,
-                                                  const std::set<std::string>& changed) {
-    auto result = std::make_shared<GraphSnapshot>();
+std::shared_ptr<const GraphView> makeGraphView(const Plan& plan, const GraphView& previous,
+                                               const std::set<std::string>& changed) {
+    auto result = std::make_shared<GraphView>();
     result->generation = plan.schedule.generation;
-    std::map<const Instance*, std::shared_ptr<const ComponentSnapshot>> known;
+    std::map<const Instance*, std::shared_ptr<const ComponentView>> known;
     for (const auto& component : previous.components) known.emplace(component->instance, component);
     for (const std::size_t index : plan.wiring.order) {
         const GraphNode& node = plan.graph.nodes()[index];
         const auto found = known.find(node.instance.get());
         const bool same = found != known.end() &&
                           found->second->full_name == node.instance->fullName() &&
-                          found->second->figures == node.instance->figures() &&
+                          found->second->statistics == node.instance->statistics() &&
                           found->second->definition.breaks == node.breaks &&
                           found->second->fault == node.instance->faultText() &&
                           changed.count(node.instance->fullName()) == 0;
-        result->components.push_back(same ? found->second : picture(node));
+        result->components.push_back(same ? found->second : viewOf(node));
     }
     for (const auto& [name, connection] : plan.wiring.connections) {
-        result->connections.emplace(name, picture(plan.graph, connection));
+        result->connections.emplace(name, viewOf(plan.graph, connection));
     }
     for (const auto& [name, tap] : plan.taps) result->taps.push_back(tap);
     for (const auto& [name, injector] : plan.injectors) result->injectors.push_back(injector);

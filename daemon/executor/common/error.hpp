@@ -9,7 +9,7 @@
 namespace rtcf::executor {
 
 /// Error kind, for programs. messages/errors.cpp maps each kind to a reason and a status code.
-enum class RefusalKind {
+enum class ErrorKind {
     InvalidArgument,  ///< a value is out of range or of the wrong type
     RequestMalformed,
     NameMissing,
@@ -32,7 +32,7 @@ enum class RefusalKind {
     ConnectionsFormLoop,
     TwoWriters,
     TwoPacers,
-    LibraryRefused,
+    LibraryRejected,
     HookFailed,
     NoMaster,
     NoRealtime,
@@ -49,14 +49,13 @@ enum class RefusalKind {
     StateTooLarge
 };
 
-class Refusal : public std::runtime_error {
+class Error : public std::runtime_error {
    public:
-    Refusal(RefusalKind kind, const std::string& message)
-        : std::runtime_error(message), kind_(kind) {}
-    RefusalKind kind() const noexcept { return kind_; }
+    Error(ErrorKind kind, const std::string& message) : std::runtime_error(message), kind_(kind) {}
+    ErrorKind kind() const noexcept { return kind_; }
 
    private:
-    RefusalKind kind_;
+    ErrorKind kind_;
 };
 
 }  // namespace rtcf::executor

@@ -9,28 +9,28 @@
 #include <utility>
 #include <vector>
 
-#include "image/image.hpp"
-#include "image/image_taker.hpp"
 #include "ordering/plan.hpp"
+#include "snapshot/snapshot.hpp"
+#include "snapshot/snapshot_taker.hpp"
 
 namespace rtcf::executor {
 
-class ImageRestorer {
+class SnapshotRestorer {
    public:
     using Batch = std::vector<std::pair<std::string, ParameterValue>>;
 
     /// Assigns all values.
-    /// @param image outlives this object
+    /// @param saved outlives this object
     /// @param plan the loop's plan; outlives this object
-    /// @throws Refusal that lists the differences
-    ImageRestorer(const RunnerImage& image, const Plan& plan);
-    ImageRestorer(const ImageRestorer&) = delete;
-    ImageRestorer& operator=(const ImageRestorer&) = delete;
+    /// @throws Error that lists the differences
+    SnapshotRestorer(const Snapshot& saved, const Plan& plan);
+    SnapshotRestorer(const SnapshotRestorer&) = delete;
+    SnapshotRestorer& operator=(const SnapshotRestorer&) = delete;
 
     /// The restoration to apply at a boundary.
     Restoration& restoration() noexcept { return restoration_; }
     /// Requires that no value is larger than the capacity that its component has reserved.
-    /// @throws Refusal
+    /// @throws Error
     void requireReserved() const;
     /// Parameters to change, and new phases (cycle modulo `every`) of components.
     const std::map<Instance*, Batch>& parameters() const noexcept { return parameters_; }
@@ -39,12 +39,12 @@ class ImageRestorer {
     void noteIn(Plan& plan) const;
 
    private:
-    void fit(const ImageComponent& image, const GraphNode& node);
-    void fitParameters(const ImageComponent& image, Instance& instance);
-    void fitStates(const ImageComponent& image, const Instance& instance);
-    void fitOutputs(const ImageComponent& image, const Instance& instance);
-    void fitInputs(const ImageComponent& image, const Instance& instance);
-    void fitInput(const ImageInput& image, InputBase& input, const std::string& name);
+    void fit(const SnapshotComponent& saved, const GraphNode& node);
+    void fitParameters(const SnapshotComponent& saved, Instance& instance);
+    void fitStates(const SnapshotComponent& saved, const Instance& instance);
+    void fitOutputs(const SnapshotComponent& saved, const Instance& instance);
+    void fitInputs(const SnapshotComponent& saved, const Instance& instance);
+    void fitInput(const SnapshotInput& saved, InputBase& input, const std::string& name);
     void fitTopics();
     /// Matches the elements of one kind by name, and calls `fit` for each pair.
     /// @param from elements of the snapshot
@@ -53,16 +53,16 @@ class ImageRestorer {
     void fitEach(const std::string& of, const char* kind, const From& from, const To& to, Name name,
                  Fit fit);
     /// @param sample slot whose capacity the new slot gets, or null
-    std::shared_ptr<SlotHeader> slotFrom(const TypeInfo& type, const ImageValue& value,
+    std::shared_ptr<SlotHeader> slotFrom(const TypeInfo& type, const SnapshotValue& value,
                                          const std::string& name,
                                          const SlotHeader* sample = nullptr);
-    void restoreTo(SlotHeader* to, const TypeInfo& type, const ImageValue& value,
+    void restoreTo(SlotHeader* to, const TypeInfo& type, const SnapshotValue& value,
                    const std::string& name);
     void problem(std::string text) { problems_.push_back(std::move(text)); }
     void requireFit() const;
     void requireTimes() const;
 
-    const RunnerImage& image_;
+    const Snapshot& snapshot_;
     const Plan& plan_;
     const Sources sources_;
     Restoration restoration_;
