@@ -1,8 +1,8 @@
 /// @file
 /// The loop: one real-time thread that executes a schedule at a fixed frequency. The graph thread
 /// starts it, hands it changes and joins it; any thread may stop it and read its counters.
-/// cycle.hpp contains the cycle; pacing.cpp begins cycles, by real time, a device, a simulated
-/// clock or as steps.
+/// It begins cycles by real time, by a device, by a simulated clock, or one after another as steps;
+/// cycle.hpp contains the cycle.
 #pragma once
 
 #include <pthread.h>

@@ -8,15 +8,25 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
 #include <system_error>
+#include <utility>
 
+#include "common/time_units.hpp"
 #include "messages/errors.hpp"
+#include "messages/from_wire.hpp"
+#include "messages/known_values.hpp"
+#include "messages/settings_messages.hpp"
 #include "messages/to_wire.hpp"
+#include "rtcf/version.hpp"
+#include "server/change.hpp"
 
 namespace rtcf::executor {
+
+namespace pb = ::rtcf::v1;
 
 namespace {
 
@@ -61,6 +71,12 @@ v1::Response lostRecords(std::uint64_t count) {
     *response.mutable_log() = logTo(entry);
     return response;
 }
+
+// Protocol version. The newer side of rtcfd and executor uses only requests that the older one
+// knows, see link.py of rtcfd. Hello, stop and exit never change.
+constexpr std::uint32_t kProtocol = 4;
+constexpr std::int64_t kHookTimeout = 10 * kSecond;
+constexpr std::int64_t kProbeTimeout = kSecond / 2;
 
 }  // namespace
 
@@ -333,6 +349,355 @@ void Server::servePorts() {
     };
     std::vector<PortStreams::Table> done = ports_.serve(runner_->takeFrameTables(), room, send);
     if (!done.empty()) runner_->post([done = std::move(done)]() mutable { done.clear(); });
+}
+
+std::string Server::stuck() const {
+    const auto [activity, since_ns] = runner_->activity();
+    return !activity.empty() && monotonicNow() - since_ns > kHookTimeout ? activity : std::string();
+}
+
+void Server::requireNotStuck() const {
+    const std::string where = stuck();
+    if (where.empty()) return;
+    throw Error(ErrorKind::Unavailable,
+                fmt::format("runner {} is stuck in {}(): only stop and restart are possible",
+                            runner_->name(), where));
+}
+
+void Server::handle(Connection& connection, const v1::Request& request) {
+    const std::uint64_t id = connection.id();
+    if (request.kind_case() == v1::Request::kHello) {
+        v1::Response response;
+        response.set_id(request.id());
+        v1::HelloResult& hello = *response.mutable_hello();
+        hello.set_protocol(kProtocol);
+        hello.set_version(RTCF_VERSION);
+        hello.set_runner(runner_->name());
+        hello.set_pid(::getpid());
+        hello.set_flight_recorder_fd(runner_->recorder().fd());
+        hello.set_frames_fd(runner_->frameMemory().fd());
+        if (const DirectStopReport report = direct_stop_->last(); report.count != 0)
+            *hello.mutable_direct_stop() = directStopTo(report);
+        connection.setGreeted();
+        respond(id, response);
+        return;
+    }
+    if (!connection.greeted()) {
+        respond(id, errorResponse(request.id(), ErrorKind::FailedPrecondition,
+                                  "the first request must be hello"));
+        return;
+    }
+    try {
+        requireKnownValues(request);
+        if (answerQuery(id, request)) return;
+        if (request.kind_case() == v1::Request::kGetComponent) {
+            submitProbe(id, request);
+        } else if (request.kind_case() == v1::Request::kWatchPorts) {
+            beginWatch(id, request);
+        } else {
+            submitChange(id, request);
+        }
+    } catch (const Error& error) {
+        respond(id, errorResponse(request.id(), error.kind(), error.what()));
+    }
+}
+
+bool Server::answerQuery(std::uint64_t connection, const v1::Request& request) {
+    v1::Response response;
+    response.set_id(request.id());
+    const std::shared_ptr<const GraphView> graph = runner_->graph();
+    switch (request.kind_case()) {
+        case v1::Request::kListComponents: {
+            const RunnerState state = runner_->status().state;
+            auto& result = *response.mutable_components();
+            for (std::size_t i = 0; i < graph->components.size(); ++i) {
+                *result.add_components() = componentTo(*graph, i, state);
+            }
+            break;
+        }
+        case v1::Request::kListConnections:
+            *response.mutable_connections() = connectionsTo(*graph);
+            break;
+        case v1::Request::kGetStatistics:
+            *response.mutable_statistics() =
+                statistics_->statistics(request.get_statistics().buckets());
+            break;
+        case v1::Request::kResetStatistics:
+            resetStatistics(connection, request.id());
+            return true;
+        case v1::Request::kGetStatus:
+            setState(response, runner_->numberedState());
+            *response.mutable_status() = status();
+            break;
+        case v1::Request::kServiceAnswer:
+            calls_.answer(request.service_answer().call(),
+                          {request.service_answer().success(), request.service_answer().message()});
+            response.mutable_done();
+            break;
+        case v1::Request::kAccess:
+            access_->set(rulesFrom(request.access()));
+            response.mutable_done();
+            break;
+        case v1::Request::kEndWatch: {
+            const auto id = std::make_pair(connection, request.end_watch().watch());
+            waiting_.erase(id);
+            if (const std::uint64_t watch = ports_.end(id); watch != 0) endWatches({watch});
+            response.mutable_done();
+            break;
+        }
+        case v1::Request::kEndStep: {
+            const auto step = waiting_.find({connection, request.end_step().step()});
+            if (step != waiting_.end() && step->second.endless())
+                step->second.given_up->store(true);
+            response.mutable_done();
+            break;
+        }
+        case v1::Request::kExit:
+            response.mutable_done();
+            exiting_ = true;
+            break;
+        default:
+            return false;
+    }
+    respond(connection, response);
+    return true;
+}
+
+void Server::submitChange(std::uint64_t connection, const v1::Request& request) {
+    const std::uint64_t id = request.id();
+    // A stop never waits behind a hook.
+    if (request.kind_case() == v1::Request::kStop) runner_->requestStop();
+    if (request.kind_case() != v1::Request::kStop) requireNotStuck();
+    requireStopsKnown(request);
+    // Statistics belong to one run of the loop, which begins here.
+    const bool begins = request.kind_case() == v1::Request::kStart ||
+                        (request.kind_case() == v1::Request::kReplay && request.replay().begin()) ||
+                        ((request.kind_case() == v1::Request::kStep ||
+                          request.kind_case() == v1::Request::kRestoreSnapshot) &&
+                         runner_->status().state != RunnerState::Stepping);
+    if (begins && !runner_->loop().running() && !statistics_->restart()) {
+        statistics_->restartInStep();  // during a step, which this request waits for
+    }
+    // Steps and replays have no time limit; they report progress.
+    const bool endless =
+        request.kind_case() == v1::Request::kStep || request.kind_case() == v1::Request::kReplay;
+    const auto given_up = std::make_shared<std::atomic<bool>>(false);
+    const auto otherwise = [this, id] {
+        return errorResponse(id, ErrorKind::Unavailable,
+                             fmt::format("runner {} is stuck in {}()", runner_->name(), stuck()));
+    };
+    waiting_[{connection, id}] = {endless ? INT64_MAX : monotonicNow() + kHookTimeout, otherwise,
+                                  given_up};
+    runner_->post([this, connection, id, request, given_up, endless] {
+        v1::Response response;
+        response.set_id(id);
+        // If the request was given up, the caller has already received an error. A stop is carried
+        // out anyway.
+        const auto require_wanted = [&] {
+            if (!given_up->load() || request.kind_case() == v1::Request::kStop) return;
+            throw Error(ErrorKind::Unavailable,
+                        "given up: the caller has disconnected, or a hook took too long");
+        };
+        try {
+            require_wanted();
+            requireStopsKnown(request);
+            const auto progress = [this, connection, id, endless,
+                                   &require_wanted](const std::string& line) {
+                if (!endless) require_wanted();  // endless ones pause by themselves
+                v1::Response step;
+                step.set_id(id);
+                step.set_progress(line);
+                post(connection, std::move(step), false);
+            };
+            if (request.kind_case() == v1::Request::kConfigure) {
+                runner_->configure(settingsFrom(request.configure(), runner_->settings()));
+                *response.mutable_status() = status();
+            } else if (request.kind_case() == v1::Request::kLimits) {
+                runner_->limitTaps(request.limits().taps());
+                response.mutable_done();
+            } else if (request.kind_case() == v1::Request::kReplay) {
+                *response.mutable_replay() =
+                    replayTo(runner_->replay(replayFrom(request.replay()), progress));
+            } else if (request.kind_case() == v1::Request::kDescribeInput) {
+                const auto& input = request.describe_input();
+                *response.mutable_input_type() = inputTypeTo(
+                    runner_->writableInput(fullNameOf(input.component()), input.port()));
+            } else if (request.kind_case() == v1::Request::kTakeSnapshot) {
+                *response.mutable_snapshot() = snapshotTo(runner_->takeSnapshot());
+            } else {
+                *response.mutable_change() =
+                    outcomeTo(change(*runner_, request, progress, *given_up));
+            }
+        } catch (const Error& error) {
+            response = errorResponse(id, error.kind(), error.what());
+        } catch (const std::exception& error) {
+            response = errorResponse(id, ErrorKind::FailedPrecondition, error.what());
+        } catch (...) {
+            response = errorResponse(id, ErrorKind::FailedPrecondition, "an unknown exception");
+        }
+        setState(response, runner_->numberedState());
+        log_->drain();  // sends log records of hooks before the answer
+        post(connection, std::move(response), true);
+    });
+}
+
+// Rejects a request to run the loop if it was made before the last direct stop.
+void Server::requireStopsKnown(const v1::Request& request) const {
+    const bool runs = request.kind_case() == v1::Request::kStart ||
+                      request.kind_case() == v1::Request::kStep ||
+                      request.kind_case() == v1::Request::kRestoreSnapshot ||
+                      request.kind_case() == v1::Request::kReplay;
+    const DirectStopReport report = direct_stop_->last();
+    if (!runs || request.direct_stops() >= report.count) return;
+    throw Error(ErrorKind::LoopStopped,
+                fmt::format("runner {} was stopped at its executor by user {} after this "
+                            "request: ask again",
+                            runner_->name(), report.user));
+}
+
+// Answers GetComponent. The graph view has the component; only values need the graph thread, and
+// are omitted if it is busy.
+void Server::submitProbe(std::uint64_t connection, const v1::Request& request) {
+    const std::string name = fullNameOf(request.get_component().component());
+    const std::uint64_t id = request.id();
+    const std::shared_ptr<const GraphView> graph = runner_->graph();
+    const RunnerState state = runner_->status().state;
+    const auto found =
+        std::find_if(graph->components.begin(), graph->components.end(),
+                     [&](const auto& component) { return component->full_name == name; });
+    if (found == graph->components.end()) {
+        (void)graph->get(name);  // throws
+    }
+    v1::Response response;
+    response.set_id(id);
+    *response.mutable_component() =
+        componentTo(*graph, static_cast<std::size_t>(found - graph->components.begin()), state);
+    waiting_[{connection, id}] = {monotonicNow() + kProbeTimeout, [response] { return response; },
+                                  nullptr};
+    runner_->post([this, connection, name, response]() mutable {
+        try {
+            addValues(*response.mutable_component(), runner_->probe(name));
+            addStates(*response.mutable_component(), runner_->states(name));
+        } catch (const std::exception&) {
+            // Unloaded meanwhile: answer with the earlier graph view.
+        }
+        post(connection, std::move(response), true);
+    });
+}
+
+// Begins a stream. Values begin when the graph thread has made the loop keep them.
+void Server::beginWatch(std::uint64_t connection, const v1::Request& request) {
+    requireNotStuck();
+    const std::uint64_t id = request.id();
+    const std::uint64_t watch = next_watch_++;
+    const pb::WatchPortsRequest& asked = request.watch_ports();
+    if (asked.component_times() && asked.min_max()) {
+        throw Error(ErrorKind::InvalidArgument,
+                    "component_times are available per cycle, not per window: request min_max "
+                    "without component_times");
+    }
+    const auto& patterns = asked.selection();
+    const Watch wanted{PortSelection({patterns.begin(), patterns.end()}), asked.component_times()};
+    ports_.begin({connection, id}, watch, wanted, asked.every(), asked.min_max());
+    const auto nothing = [id] {
+        return errorResponse(id, ErrorKind::Unavailable, "the stream has ended");
+    };
+    waiting_[{connection, id}] = {INT64_MAX, nothing, nullptr};
+    const bool allow_missing = request.watch_ports().allow_missing();
+    runner_->post([this, connection, id, watch, wanted, allow_missing] {
+        try {
+            runner_->watch(watch, wanted, allow_missing);
+        } catch (const Error& error) {
+            post(connection, errorResponse(id, error.kind(), error.what()), true);
+        } catch (const std::exception& error) {
+            post(connection, errorResponse(id, ErrorKind::FailedPrecondition, error.what()), true);
+        }
+    });
+}
+
+void Server::endWatches(const std::vector<std::uint64_t>& watches) {
+    for (const std::uint64_t watch : watches)
+        runner_->post([this, watch] { runner_->endWatch(watch); });
+}
+
+pb::RunnerStatus Server::status() const {
+    const RunnerStatus present = runner_->status();
+    const std::shared_ptr<const GraphView> graph = runner_->graph();
+    const Loop& loop = runner_->loop();
+    pb::RunnerStatus status;
+    status.set_runner(runner_->name());
+    status.set_state(stateTo(present.state));
+    status.set_status(present.loop_fault);
+    status.set_simulated(present.simulated);
+    if (const std::string where = stuck(); !where.empty()) {
+        status.set_state(pb::RUNNER_STATE_STUCK);
+        status.set_status(fmt::format("stuck in {}()", where));
+    }
+    *status.mutable_settings() = settingsTo(present.settings);
+    status.set_pid(::getpid());
+    status.set_realtime_tid(loop.threadId());
+    if (loop.cpu() >= 0) status.set_loop_cpu(loop.cpu());
+    statistics_->addTo(status, *graph);
+    status.set_components(static_cast<std::uint32_t>(graph->components.size()));
+    status.set_generation(graph->generation);
+    std::uint64_t faults = 0;
+    for (const auto& component : graph->components)
+        faults += component->statistics->faults.count.value();
+    status.set_faults(faults);
+    for (const std::string& line : present.degraded) status.add_degraded(line);
+    pb::RosStatus& ros = *status.mutable_ros();
+    ros.set_enabled(present.bridge.enabled);
+    ros.set_connected(present.bridge.connected);
+    ros.set_node(present.bridge.node);
+    ros.set_master_uri(present.bridge.master_uri);
+    ros.set_publications(present.bridge.publications);
+    ros.set_subscriptions(present.bridge.subscriptions);
+    ros.set_problem(present.bridge.problem);
+    ros.set_killed(present.bridge.killed);
+    ros.set_too_large(present.too_large);
+    std::uint64_t passed_over = 0;
+    for (const auto& injector : graph->injectors) passed_over += injector->passedOver();
+    ros.set_passed_over(passed_over);
+    return status;
+}
+
+// Resets the statistics at once, or at the end of the cycle that is being counted; later cycles are
+// not counted until then.
+void Server::resetStatistics(std::uint64_t connection, std::uint64_t request) {
+    constexpr std::int64_t kPeriods = 10;
+    const std::int64_t period_ns = runner_->status().settings.loop.period_ns;
+    resets_.push_back({connection, request, monotonicNow() + kSecond + kPeriods * period_ns});
+    goOnWithResets();
+}
+
+void Server::goOnWithResets() {
+    if (resets_.empty()) return;
+    v1::Response answer;
+    std::vector<Reset> answered;
+    if (statistics_->restart()) {
+        answer.mutable_done();
+        answered.swap(resets_);
+    } else {
+        const std::int64_t now = monotonicNow();
+        const auto late =
+            std::stable_partition(resets_.begin(), resets_.end(),
+                                  [now](const Reset& each) { return now < each.until_ns; });
+        if (late == resets_.end()) return;
+        answered.assign(late, resets_.end());
+        resets_.erase(late, resets_.end());
+        if (resets_.empty()) runner_->holdStatistics(false);
+        const std::string activity = runner_->recorder().realtimeActivity();
+        answer = errorResponse(
+            0, ErrorKind::Unavailable,
+            fmt::format(
+                "the loop of {} reaches no cycle boundary: {} does not return; the statistics "
+                "are not reset",
+                runner_->name(), activity.empty() ? "a component" : activity + "()"));
+    }
+    for (const Reset& each : answered) {
+        answer.set_id(each.request);
+        respond(each.connection, answer);
+    }
 }
 
 }  // namespace rtcf::executor

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "common/error.hpp"
-#include "watch/frame_layout.hpp"
 
 namespace rtcf::executor {
 

@@ -14,7 +14,7 @@
 #include "loop/cycle.hpp"
 #include "ordering/plan.hpp"
 #include "watch/component_turns.hpp"
-#include "watch/frame_column.hpp"
+#include "watch/frame_layout.hpp"
 #include "watch/port_selection.hpp"
 
 namespace rtcf::executor {
