@@ -13,7 +13,7 @@ import rosgraph
 import rtcf
 from daemon_process import BUILD_TREE, DEADLINE_S, wait_for
 from ros_processes import Master
-from rtcf_launch import rendezvous
+from rtcf_launch import runner_entry
 from rtcf_launch.master import Master as Parameters
 
 _DEVEL = BUILD_TREE / "devel"
@@ -159,13 +159,13 @@ class Launching:
         """Yield a client of the rtcfd with a node's runner, and the runner's name."""
         parameters = Parameters(self.master.uri, "/test")
 
-        def found() -> rendezvous.Meeting | None:
-            meeting = rendezvous.find(parameters, node)
-            return None if meeting is None or meeting.starting else meeting
+        def found() -> runner_entry.RunnerEntry | None:
+            entry = runner_entry.find(parameters, node)
+            return None if entry is None or entry.starting else entry
 
-        meeting = wait_for(found, f"runner {node}")
-        with rtcf.Client(meeting.socket) as client:
-            yield client, meeting.runner
+        entry = wait_for(found, f"runner {node}")
+        with rtcf.Client(entry.socket) as client:
+            yield client, entry.runner
 
     def end(self) -> None:
         """End all remaining processes; print their output if the test failed."""

@@ -13,7 +13,7 @@ import rtcf
 from rtcf.v1 import runner_pb2
 from rtcf_shared.folders import component_folders, packages
 
-from rtcf_launch import rendezvous
+from rtcf_launch import runner_entry
 
 
 @dataclass(frozen=True)
@@ -79,5 +79,5 @@ def _address(uri: str) -> tuple[str, int | None]:
     except ValueError:
         return uri, None
     name = (parts.hostname or "").lower()
-    ours = ("localhost", "127.0.0.1", "::1", "127.0.1.1", rendezvous.host().lower())
+    ours = ("localhost", "127.0.0.1", "::1", "127.0.1.1", runner_entry.host().lower())
     return "localhost" if name in ours else name, port

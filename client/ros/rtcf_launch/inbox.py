@@ -14,14 +14,14 @@ import rtcf
 
 
 @dataclass(frozen=True)
-class Asked:
-    """The process was asked to end."""
+class EndRequest:
+    """A request to end the process."""
 
-    why: str = ""  # if not by a signal
+    why: str = ""  # empty = a signal
 
 
 @dataclass(frozen=True)
-class Lost:
+class LeaseLost:
     """A lease ended without its last message."""
 
     error: rtcf.RtcfError
@@ -37,7 +37,7 @@ class Inbox:
 
     def __init__(self) -> None:
         self._queue: SimpleQueue[Any] = SimpleQueue()
-        self.asked = False
+        self.end_requested = False
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
             signal.signal(number, self._signalled)
 
@@ -54,32 +54,32 @@ class Inbox:
 
     def pause(self, seconds: float) -> bool:
         """Wait, at most until a request to end; return whether there is one."""
-        aside = []
+        others = []
         deadline = time.monotonic() + seconds
-        while not self.asked and (left := deadline - time.monotonic()) > 0:
+        while not self.end_requested and (left := deadline - time.monotonic()) > 0:
             event = self.get(left)
-            if event is not None and not isinstance(event, Asked):
-                aside.append(event)
-        for event in aside:
+            if event is not None and not isinstance(event, EndRequest):
+                others.append(event)
+        for event in others:
             self._queue.put(event)
-        return self.asked
+        return self.end_requested
 
-    def ask(self, why: str) -> None:
+    def request_end(self, why: str) -> None:
         """Request the end of the process, as a signal does.  Any thread."""
-        self.asked = True
-        self._queue.put(Asked(why))
+        self.end_requested = True
+        self._queue.put(EndRequest(why))
 
     def master_back(self) -> None:
         """Report that the node is registered again.  Any thread."""
         self._queue.put(MasterBack())
 
     def _signalled(self, _: int, __: Any) -> None:
-        self.asked = True
-        self._queue.put(Asked())
+        self.end_requested = True
+        self._queue.put(EndRequest())
 
     def _read(self, lease: rtcf.Lease) -> None:
         try:
             for message in lease:
                 self._queue.put(message)
         except rtcf.RtcfError as error:
-            self._queue.put(Lost(error))
+            self._queue.put(LeaseLost(error))

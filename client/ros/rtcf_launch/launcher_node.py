@@ -17,12 +17,12 @@ from rtcf.v1 import control_pb2, graph_pb2
 
 from rtcf_launch import arguments, component_parameters
 from rtcf_launch.codes import Code, Ending
-from rtcf_launch.component_words import Words
-from rtcf_launch.inbox import Asked, Inbox, Lost
+from rtcf_launch.component_choice import ComponentChoice
+from rtcf_launch.inbox import EndRequest, Inbox, LeaseLost
 from rtcf_launch.master import Master, MasterSilent
-from rtcf_launch.rendezvous import Meeting
 from rtcf_launch.ros_node import RosNode, wait_until_gone
 from rtcf_launch.runner_choice import RunnerChoice
+from rtcf_launch.runner_entry import RunnerEntry
 from rtcf_launch.screen import Screen
 
 _POLL_S = 0.2
@@ -69,9 +69,9 @@ _CODES = {
 class LauncherNode:
     """One rt_launcher."""
 
-    def __init__(self, given: arguments.Arguments, words: Words) -> None:
+    def __init__(self, given: arguments.Arguments, component: ComponentChoice) -> None:
         self._given = given
-        self._component = words
+        self._component = component
         self._node = given.full_name
         self._screen = Screen(self._node)
         self._inbox = Inbox()
@@ -107,7 +107,7 @@ class LauncherNode:
             self._master.set(f"{self._node}/{name}", value)
         values = self._master.parameter(self._node, {})
         self._values = values if isinstance(values, dict) else {}
-        self._component = self._component.joined(self._values)
+        self._component = self._component.with_parameters(self._values)
         self._run_id = str(self._master.parameter("/run_id", "")) or f"{os.getpid()}"
         # What is wrong whatever the component declares is said before anything is waited for.
         component_parameters.read(self._values)
@@ -118,20 +118,20 @@ class LauncherNode:
             self._master,
             self._node,
             self._given.hostname,
-            self._inbox.ask,
+            self._inbox.request_end,
             self._screen.set_level,
         )
         before = self._ros_node.register()
         self._ros_node.stay_registered(lambda: None)
         if before and not wait_until_gone(before, self._inbox.pause, _PREDECESSOR_S):
             raise Ending(
-                Code.DONE if self._inbox.asked else Code.REFUSED,
+                Code.DONE if self._inbox.end_requested else Code.REFUSED,
                 f"a node {self._node} is there already, and does not end",
             )
 
     # -- the runner ---------------------------------------------------------
 
-    def _find_runner(self) -> Meeting:
+    def _find_runner(self) -> RunnerEntry:
         """Wait for the runner, which may start after us."""
         named = component_parameters.named_runner(self._values)
         choice = RunnerChoice(self._master, self._given.ns, named)
@@ -145,34 +145,34 @@ class LauncherNode:
         while True:
             now = time.monotonic()
             with contextlib.suppress(MasterSilent):  # it may be restarted just now
-                if meeting := choice.look() or self._yielded(now - begin):
-                    return meeting
+                if entry := choice.poll() or self._poll_unnamed(now - begin):
+                    return entry
             if now > say_at:
                 self._screen.info(f"waiting for {now - begin:.0f} s for {choice.waiting}")
                 say_at = now + _SAY_EVERY_S
             if self._inbox.pause(_POLL_S):
                 raise Ending(Code.DONE)
 
-    def _yielded(self, waited_s: float) -> Meeting | None:
-        """Return the runner there is without ~runner, if that turns out to be the component's."""
+    def _poll_unnamed(self, waited_s: float) -> RunnerEntry | None:
+        """Return the runner chosen without ~runner if the component declares that parameter."""
         if waited_s < _SAY_EVERY_S or self._unnamed is None:
             return None
-        meeting = self._unnamed.look()
-        if meeting is None:
+        entry = self._unnamed.poll()
+        if entry is None:
             return None
         type_name = self._component.type
-        with rtcf.Client(meeting.socket) as client:
+        with rtcf.Client(entry.socket) as client:
             offered = client.list_types(self._component.package).types
             types = {each.type: each for each in offered}
         declared = [each.name for each in types[type_name].parameters] if type_name in types else []
         self._unnamed = None  # asked once
-        return meeting if "runner" in declared else None
+        return entry if "runner" in declared else None
 
     # -- the component ------------------------------------------------------
 
-    def _load(self, meeting: Meeting) -> None:
-        self._meeting = meeting
-        self._client = rtcf.Client(meeting.socket)
+    def _load(self, entry: RunnerEntry) -> None:
+        self._entry = entry
+        self._client = rtcf.Client(entry.socket)
         package, type_name = self._component.package, self._component.type
         offered = {each.type: each for each in self._client.list_types(package).types}
         # A type that is not there is refused by rtcfd, which knows why.
@@ -211,12 +211,12 @@ class LauncherNode:
         assert self._client is not None
         self._lease = self._client.lease_component(
             control_pb2.OpenLease(
-                runner=self._meeting.runner,
+                runner=self._entry.runner,
                 component=self._spec,
                 on_lost=self._parameters.on_lost,
                 run_id=self._run_id,
                 holder=f"rt_launcher {self._node} (pid {os.getpid()})",
-                hold=self._meeting.token,
+                hold=self._entry.token,
                 attach=attach,
                 wait=True,
                 unseen=_prints_to_log(self._given.log_file),
@@ -232,7 +232,7 @@ class LauncherNode:
             event = self._inbox.get(left)
             if event is None:
                 return Code.DONE  # rtcfd sees our end
-            if isinstance(event, Asked):
+            if isinstance(event, EndRequest):
                 if event.why:
                     self._screen.warn(f"asked to end: {event.why}")
                 if self._lease is None or self._lost_since is not None:
@@ -241,7 +241,7 @@ class LauncherNode:
                     self._lease.end()
                     deadline = time.monotonic() + _END_S
                 continue
-            if isinstance(event, Lost):
+            if isinstance(event, LeaseLost):
                 if deadline is not None:
                     return Code.DONE
                 self._reconnect(event.error)
@@ -265,7 +265,7 @@ class LauncherNode:
             return
         self._loaded = True
         kind = f"{self._spec.package}/{self._spec.type}"
-        self._screen.info(f"{kind} loaded into runner {self._meeting.runner}")
+        self._screen.info(f"{kind} loaded into runner {self._entry.runner}")
         for note in result.notes:
             self._screen.warn(note)
 
@@ -307,7 +307,7 @@ def main(argv: Sequence[str] | None = None, build_tree: Path | None = None) -> i
         return Code.DONE
     try:
         given = arguments.parse(words, os.environ, "")
-        component = Words.parse(given.words)
+        component = ComponentChoice.parse(given.words)
     except (ValueError, Ending) as error:
         print(f"rt_launcher: {error}\n{USAGE}", file=sys.stderr, end="")
         return Code.USAGE

@@ -1,13 +1,13 @@
-"""Which runner a launcher loads into: the one that it names, else the nearest rt_runner, else the
-only runner of the launch.  Only runners that live count: parameters of others may be left over."""
+"""The runner that a launcher loads into: the named one, else the nearest rt_runner, else the only
+runner of the launch.  Only living runners count: entries of others may be left over."""
 
 import os
 import time
 
-from rtcf_launch import arguments, rendezvous
+from rtcf_launch import arguments, runner_entry
 from rtcf_launch.codes import Code, Ending
 from rtcf_launch.master import Master
-from rtcf_launch.rendezvous import Meeting
+from rtcf_launch.runner_entry import RunnerEntry
 
 # roslaunch has set the parameters of all nodes before it starts any: so long a runner that has
 # some may need to come to life.
@@ -17,7 +17,7 @@ _SETTLE_S = 2.0
 
 
 class RunnerChoice:
-    """Asked again and again until it knows one; `waiting` then says what is missing."""
+    """The choice of a runner, polled until there is one; `waiting` names what is missing."""
 
     def __init__(self, master: Master, ns: str, named: str | None) -> None:
         self._master = master
@@ -26,16 +26,16 @@ class RunnerChoice:
         self._begin = time.monotonic()
         self.waiting = ""
 
-    def look(self) -> Meeting | None:
-        """Return a runner that can be used.  Raises Ending if waiting is no use."""
+    def poll(self) -> RunnerEntry | None:
+        """Return a ready runner, or None.  Raises Ending if waiting cannot help."""
         if self._named is not None:
-            return self._of(arguments.resolve(self._named, self._ns))
+            return self._runner_of(arguments.resolve(self._named, self._ns))
         passed = time.monotonic() - self._begin
         near = arguments.upward("rt_runner", self._ns)
         for node in near:
             if not self._master.has(node):
                 continue
-            found = self._of(node)
+            found = self._runner_of(node)
             if found is not None or self._is_starting(node) or passed < _GRACE_S:
                 return found
         if passed < _SETTLE_S:
@@ -43,28 +43,28 @@ class RunnerChoice:
             return None
         return self._only_one(near[0])
 
-    def _of(self, node: str) -> Meeting | None:
-        meeting = rendezvous.find(self._master, node)
-        if meeting is not None and meeting.host != rendezvous.host():
+    def _runner_of(self, node: str) -> RunnerEntry | None:
+        entry = runner_entry.find(self._master, node)
+        if entry is not None and entry.host != runner_entry.host():
             raise Ending(
                 Code.REFUSED,
-                f"runner {node} is on {meeting.host}, this launcher on {rendezvous.host()}: "
+                f"runner {node} is on {entry.host}, this launcher on {runner_entry.host()}: "
                 "start both on one machine",
             )
-        if meeting is not None and rendezvous.alive(meeting):
+        if entry is not None and runner_entry.alive(entry):
             self.waiting = f"runner {node}, which starts"
-            return None if meeting.starting else meeting
+            return None if entry.starting else entry
         left_over = self._master.has(node)
         what = "its parameters are there, it is not" if left_over else "there is none of that name"
         self.waiting = f"runner {node}: {what}{self._others()}"
         return None
 
     def _is_starting(self, node: str) -> bool:
-        meeting = rendezvous.find(self._master, node)
-        return meeting is not None and meeting.starting and rendezvous.alive(meeting)
+        entry = runner_entry.find(self._master, node)
+        return entry is not None and entry.starting and runner_entry.alive(entry)
 
-    def _only_one(self, nearest: str) -> Meeting | None:
-        there = self._living()
+    def _only_one(self, nearest: str) -> RunnerEntry | None:
+        there = self._living_runners()
         ours = {
             node: each for node, each in there.items() if each.launch == str(os.getppid())
         } or there
@@ -75,20 +75,20 @@ class RunnerChoice:
         if not ours:
             self.waiting = f"runner {nearest}: no rt_runner runs at this ROS master"
             return None
-        ((node, meeting),) = ours.items()
+        ((node, entry),) = ours.items()
         self.waiting = f"runner {node}, which starts"
-        return None if meeting.starting else meeting
+        return None if entry.starting else entry
 
-    def _living(self) -> dict[str, Meeting]:
+    def _living_runners(self) -> dict[str, RunnerEntry]:
         found = {
-            node: rendezvous.find(self._master, node) for node in rendezvous.nodes(self._master)
+            node: runner_entry.find(self._master, node) for node in runner_entry.nodes(self._master)
         }
         return {
             node: each
             for node, each in found.items()
-            if each is not None and each.host == rendezvous.host() and rendezvous.alive(each)
+            if each is not None and each.host == runner_entry.host() and runner_entry.alive(each)
         }
 
     def _others(self) -> str:
-        there = ", ".join(self._living())
+        there = ", ".join(self._living_runners())
         return f" (there are: {there}; ~runner names another)" if there else ""

@@ -1,5 +1,7 @@
 """The output of the rosrun tools for a rtcf_msgs/RunnerInfo: the texts of RTCF 2021, for scripts.
-Each raises NotThere, with the text of that time, where there is nothing to show."""
+
+Functions raise NotFoundError, with the text of RTCF 2021, if there is nothing to show.
+"""
 
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -7,7 +9,7 @@ from typing import Any
 _LINE = "-" * 80
 
 
-class NotThere(Exception):
+class NotFoundError(Exception):
     """There is no such component, connection or order."""
 
 
@@ -30,7 +32,7 @@ def component_info(info: Any, name: str) -> list[str]:
 def component_order(info: Any, _: str) -> list[str]:
     """Return the components in the order in which they run, numbered."""
     if not info.component_order:
-        raise NotThere("Empty order!")
+        raise NotFoundError("Empty order!")
     numbered = [f"{number}. {name}" for number, name in enumerate(info.component_order, 1)]
     return ["Real-time execution order is:", *numbered, "", f"Total: {len(numbered)}"]
 
@@ -38,7 +40,7 @@ def component_order(info: Any, _: str) -> list[str]:
 def connection_list(info: Any, _: str) -> list[str]:
     """Return the connections' names."""
     if not info.connections:
-        raise NotThere("No connections found!")
+        raise NotFoundError("No connections found!")
     return sorted(each.name for each in info.connections)
 
 
@@ -58,10 +60,10 @@ def connection_info(info: Any, name: str) -> list[str]:
 def _named(there: Iterable[Any], name: str, what: str) -> Any:
     by_name = {each.name: each for each in there}
     if not by_name:
-        raise NotThere(f"No {what}s found!")
+        raise NotFoundError(f"No {what}s found!")
     found = by_name.get(name) or by_name.get(f"/{name}")
     if found is None:
-        raise NotThere(f"Given {what} not found!")
+        raise NotFoundError(f"Given {what} not found!")
     return found
 
 

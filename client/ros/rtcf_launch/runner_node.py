@@ -21,10 +21,10 @@ from rtcf.refusals import ExpressionInvalidError
 from rtcf.v1 import control_pb2, runner_pb2
 from rtcf_shared.enums import word
 
-from rtcf_launch import arguments, loop_statistics, rendezvous, runner_parameters
+from rtcf_launch import arguments, loop_statistics, runner_entry, runner_parameters
 from rtcf_launch.codes import Code, Ending
 from rtcf_launch.daemon_choice import choose
-from rtcf_launch.inbox import Asked, Inbox, Lost, MasterBack
+from rtcf_launch.inbox import EndRequest, Inbox, LeaseLost, MasterBack
 from rtcf_launch.master import Master, MasterSilent
 from rtcf_launch.ros_node import RosNode, wait_until_gone
 from rtcf_launch.screen import Screen
@@ -145,23 +145,23 @@ class RunnerNode:
             self._master,
             own_node(self._node),
             self._given.hostname,
-            self._inbox.ask,
+            self._inbox.request_end,
             self._screen.set_level,
         )
         before = self._ros_node.register()
         self._ros_node.stay_registered(self._inbox.master_back)
         if before and not wait_until_gone(before, self._inbox.pause, _DISPLACED_S):
             raise Ending(
-                Code.DONE if self._inbox.asked else Code.REFUSED,
+                Code.DONE if self._inbox.end_requested else Code.REFUSED,
                 f"a runner {self._node} is there already at this ROS master, and does not end: "
                 "end its launch, or give this one another name",
             )
-        self._announce(rendezvous.meeting(self._runner))
+        self._announce(runner_entry.own_entry(self._runner))
         self._announced = True
 
-    def _announce(self, meeting: rendezvous.Meeting) -> None:
-        self._meeting = meeting
-        rendezvous.announce(self._master, self._node, meeting)
+    def _announce(self, entry: runner_entry.RunnerEntry) -> None:
+        self._entry = entry
+        runner_entry.announce(self._master, self._node, entry)
 
     def _last_calls(self) -> Master:
         return Master(self._given.master_uri, own_node(self._node), _LAST_CALL_S)
@@ -221,14 +221,14 @@ class RunnerNode:
     def _serve(self) -> Code:
         while True:
             event = self._inbox.get()
-            if isinstance(event, Asked):
+            if isinstance(event, EndRequest):
                 if event.why:
                     self._screen.warn(f"asked to end: {event.why}")
                 return Code.DONE
             if isinstance(event, MasterBack):
                 self._come_back()
                 continue
-            if isinstance(event, Lost):
+            if isinstance(event, LeaseLost):
                 self._reconnect(event.error)
                 continue
             kind = event.WhichOneof("kind")
@@ -248,7 +248,7 @@ class RunnerNode:
             self._screen.info("rtcfd is back, the runner is kept")
             return
         assert self._client is not None
-        self._announce(rendezvous.meeting(self._runner, self._client.socket, self._token))
+        self._announce(runner_entry.own_entry(self._runner, self._client.socket, self._token))
         self._taken_once = True
         threading.Thread(target=self._watch_node, args=(self._client,), daemon=True).start()
         if self._parameters.mode == "wait_for_components":
@@ -266,7 +266,7 @@ class RunnerNode:
     def _come_back(self) -> None:
         """After a restart of the master: launchers and tools look for us there."""
         with contextlib.suppress(MasterSilent):  # it has gone again
-            self._announce(self._meeting)
+            self._announce(self._entry)
             self._screen.info("registered again at the ROS master")
 
     def _watch_node(self, client: rtcf.Client) -> None:
@@ -275,7 +275,7 @@ class RunnerNode:
             with contextlib.suppress(rtcf.RtcfError, ValueError):  # closed meanwhile
                 (status,) = client.get_status(self._runner).runners
                 if status.ros.killed:
-                    self._inbox.ask("a ROS node has asked it to end")
+                    self._inbox.request_end("a ROS node has asked it to end")
 
     def _report(self, report: control_pb2.HoldReport) -> None:
         if report.running and not self._was_running:
@@ -373,9 +373,9 @@ class RunnerNode:
         if self._announced:
             try:
                 master = self._last_calls()
-                found = rendezvous.find(master, self._node)
+                found = runner_entry.find(master, self._node)
                 if found is not None and found.pid == str(os.getpid()):
-                    rendezvous.withdraw(master, self._node)
+                    runner_entry.withdraw(master, self._node)
             except MasterSilent:
                 pass
         if self._client is not None and self._was_running:
@@ -393,7 +393,7 @@ class RunnerNode:
         deadline = time.monotonic() + _END_S
         while (left := deadline - time.monotonic()) > 0:
             event = self._inbox.get(left)
-            if isinstance(event, Lost):
+            if isinstance(event, LeaseLost):
                 return
             if hasattr(event, "WhichOneof"):
                 kind = event.WhichOneof("kind")

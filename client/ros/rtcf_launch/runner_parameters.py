@@ -11,7 +11,7 @@ from rtcf_shared.quantities import ROS, RUNNER, Quantity
 
 from rtcf_launch.codes import Code, Ending
 from rtcf_launch.parameters import Parameters, as_integer, close_to
-from rtcf_launch.rendezvous import NAME as RENDEZVOUS
+from rtcf_launch.runner_entry import NAME as RUNNER_ENTRY
 
 MODES = ("wait_for_components", "no_wait", "wait_for_trigger")
 DAEMONS = ("auto", "system", "private")
@@ -102,7 +102,7 @@ def read(values: dict[str, Any]) -> tuple[RunnerParameters, list[str]]:
         exit_on_fault=(given.word("on_fault", ("exit", "stay")) or "exit") == "exit",
     )
     # What is no word of ours may be a slip of the pen, or somebody else's.
-    unknown = sorted(name for name in given.rest() if name != RENDEZVOUS)
+    unknown = sorted(name for name in given.rest() if name != RUNNER_ENTRY)
     return result, [
         f"parameter ~{name} is not known to rt_runner{close_to(name, _NAMES)}" for name in unknown
     ]

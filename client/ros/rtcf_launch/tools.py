@@ -14,7 +14,7 @@ import rtcf
 from rtcfctl.graph import component, connections
 from rtcfctl.terminal.output import Output
 
-from rtcf_launch import arguments, rendezvous, runner_info, tcpros
+from rtcf_launch import arguments, runner_entry, runner_info, tcpros
 from rtcf_launch.master import Master, MasterSilent
 from rtcf_launch.runner_node import runner_name
 
@@ -68,7 +68,7 @@ def main(tool: str, argv: Sequence[str] | None = None, build_tree: Path | None =
         else:
             _show(TOOLS[tool], args, given)
         sys.stdout.flush()
-    except runner_info.NotThere as error:
+    except runner_info.NotFoundError as error:
         print(error)
         return REFUSED
     except (rtcf.DaemonUnreachableError, tcpros.CallFailed, MasterSilent) as error:
@@ -141,9 +141,9 @@ def _place(args: argparse.Namespace, given: arguments.Arguments) -> tuple[str | 
     master = Master(given.master_uri, given.full_name, _CALL_S)
     try:
         for node in arguments.upward(args.runner, given.ns):
-            meeting = rendezvous.find(master, node)
-            if meeting is not None and not meeting.starting and meeting.host == rendezvous.host():
-                return meeting.socket, meeting.runner
+            entry = runner_entry.find(master, node)
+            if entry is not None and not entry.starting and entry.host == runner_entry.host():
+                return entry.socket, entry.runner
     except MasterSilent:
         pass
     return None, runner_name(args.runner)

@@ -7,7 +7,7 @@ import pytest
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 from rtcf_launch import arguments, component_parameters, daemon_choice, runner_parameters
 from rtcf_launch.codes import Code, Ending
-from rtcf_launch.component_words import Words
+from rtcf_launch.component_choice import ComponentChoice
 from rtcf_launch.runner_node import runner_name
 
 
@@ -281,10 +281,14 @@ def test_masters_are_equal_if_host_and_port_are() -> None:
 
 def test_the_component_is_named_by_arguments_or_parameters() -> None:
     for words in (["-f", "pkg", "T"], ["--is_first", "pkg", "ns::T"], ["pkg", " T ", "-f"]):
-        assert Words.parse(words).joined({"gain": 1}) == Words("pkg", "T", True)
-    assert Words.parse(["pkg", "T"]).joined({}) == Words("pkg", "T")
+        assert ComponentChoice.parse(words).with_parameters({"gain": 1}) == ComponentChoice(
+            "pkg", "T", True
+        )
+    assert ComponentChoice.parse(["pkg", "T"]).with_parameters({}) == ComponentChoice("pkg", "T")
     values = {"rt_package": "pkg", "rt_type": "T", "gain": 1}
-    assert Words.parse(["-f"]).joined(values) == Words("pkg", "T", True)
+    assert ComponentChoice.parse(["-f"]).with_parameters(values) == ComponentChoice(
+        "pkg", "T", True
+    )
     assert values == {"gain": 1}  # only the component's
 
 
@@ -305,6 +309,6 @@ def test_a_component_named_not_exactly_once_is_rejected(
     words: list[str], values: dict[str, Any], message: str
 ) -> None:
     with pytest.raises(Ending) as raised:
-        Words.parse(words).joined(values)
+        ComponentChoice.parse(words).with_parameters(values)
     assert message in str(raised.value)
     assert raised.value.code == Code.USAGE

@@ -1,4 +1,4 @@
-"""Which component rt_launcher loads: by the words of its command line, or by parameters."""
+"""The component that rt_launcher loads, from its arguments or its private parameters."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,15 +12,15 @@ _FIRST_FLAGS = ("-f", "--is_first")
 
 
 @dataclass(frozen=True)
-class Words:
-    """A package, a component type, and whether the component is first; empty = not said."""
+class ComponentChoice:
+    """A package, a component type, and whether the component is first; empty = not given."""
 
     package: str = ""
     type: str = ""
     first: bool = False
 
     @classmethod
-    def parse(cls, words: Sequence[str]) -> "Words":
+    def parse(cls, words: Sequence[str]) -> "ComponentChoice":
         """Take `[-f|--is_first] [PACKAGE COMPONENT]` in any order.  Raises Ending."""
         names = []
         first = False
@@ -40,9 +40,12 @@ class Words:
         package, type_name = names or ("", "")
         return cls(package, type_name, first)
 
-    def joined(self, values: dict[str, Any]) -> "Words":
-        """Return them with ~rt_package, ~rt_type (taken out of `values`) and ~is_first.  Raises
-        Ending for a word that is given twice, or not at all."""
+    def with_parameters(self, values: dict[str, Any]) -> "ComponentChoice":
+        """Return the choice of these arguments and of ~rt_package, ~rt_type and ~is_first.
+
+        Removes ~rt_package and ~rt_type from `values`.  Raises Ending if the component is named
+        twice or not at all.
+        """
         package, type_name = self.package, self.type
         given = Parameters(values)
         named = [name for name in _NAMES if given.has(name)]
@@ -63,4 +66,4 @@ class Words:
         for name in named:
             del values[name]
         # RTCF 2021 named namespaces, too; classes are registered by their last name.
-        return Words(package, type_name.rpartition("::")[2], self.first)
+        return ComponentChoice(package, type_name.rpartition("::")[2], self.first)
