@@ -28,7 +28,7 @@ from rtcf_scope.printable import printable
 
 _MOST_SESSIONS = 256  # the least recently used ones are removed
 _SESSION_PROTOCOL = "session."  # subprotocol prefix; pages cannot set WebSocket headers
-_STRANGER_S = 5.0  # deadline of the first authenticated request
+_LOGIN_S = 5.0  # deadline of the first authenticated request
 _LONGEST = 80  # characters of a request that an error quotes
 _CROWDED = (
     b"HTTP/1.1 503 Service Unavailable\r\nContent-Type: text/plain\r\nConnection: close\r\n\r\n"
@@ -58,7 +58,7 @@ class Authentication:
         self._sessions: OrderedDict[bytes, None] = OrderedDict()  # by hash, last used last
         self._tickets: dict[bytes, Callable[[], None]] = {}  # by hash
         self._new: set[Any] = set()  # connections that the server has not counted yet
-        self._known: set[Any] = set()  # authenticated connections
+        self._authenticated: set[Any] = set()  # authenticated connections
 
     def ticket(self, used: Callable[[], None]) -> str:
         """Return a token for a single session; call `used` when it is exchanged."""
@@ -73,22 +73,22 @@ class Authentication:
         if used is not None:
             used()
         elif not self._is_token(given):
-            raise self._stranger()
+            raise self._forbidden()
         session = secrets.token_urlsafe(24)
         self._sessions[_hash(session)] = None
         if len(self._sessions) > _MOST_SESSIONS:
             self._sessions.popitem(last=False)
-        self._known.add(request.protocol)
+        self._authenticated.add(request.protocol)
         return web.json_response({"session": session})
 
     def middleware(self) -> Any:
         """Return the aiohttp middleware that checks each request and adds security headers."""
 
         @web.middleware
-        async def look(request: web.Request, handler: Handler) -> web.StreamResponse:
+        async def check(request: web.Request, handler: Handler) -> web.StreamResponse:
             return await self._middleware(request, handler)
 
-        return look
+        return check
 
     def open(self, server: web.Server) -> Callable[[], asyncio.Protocol]:
         """Return the factory of connections; above the limit, connections answer 503 and close."""
@@ -96,27 +96,27 @@ class Authentication:
 
         def connection() -> asyncio.Protocol:
             there = {*server.connections}
-            self._known &= there
+            self._authenticated &= there
             # The server counts a connection only in connection_made().
             if len(there | self._new) >= self._most:
-                return _Refusal()
+                return _Rejection()
             protocol = Connection(server, loop, self._new.discard)
             self._new.add(protocol)
-            loop.call_later(_STRANGER_S, self._drop_stranger, protocol)
+            loop.call_later(_LOGIN_S, self._drop_unauthenticated, protocol)
             return protocol
 
         return connection
 
-    def _drop_stranger(self, protocol: web.RequestHandler) -> None:
-        if protocol not in self._known:
+    def _drop_unauthenticated(self, protocol: web.RequestHandler) -> None:
+        if protocol not in self._authenticated:
             protocol.force_close()
 
     async def _middleware(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         try:
             self._check(request)
             answer = await handler(request)
-        except web.HTTPException as refusal:
-            refusal.headers.update(HEADERS)
+        except web.HTTPException as error:
+            error.headers.update(HEADERS)
             raise
         if not answer.prepared:
             answer.headers.update(HEADERS)
@@ -124,7 +124,7 @@ class Authentication:
 
     def _check(self, request: web.Request) -> None:
         host = request.headers.get("Host", "")
-        if not self._is_ours(host):
+        if not self._is_own_host(host):
             text = f"unknown host name {printable(host[:_LONGEST])}: allow it with --name\n"
             raise web.HTTPForbidden(text=text)
         origin = request.headers.get("Origin")
@@ -134,11 +134,13 @@ class Authentication:
             )
         if is_public(request.path):
             return
-        if not self._knows(_bearer(request)) and not self._knows(_session_of_protocols(request)):
-            raise self._stranger()
-        self._known.add(request.protocol)
+        if not self._is_authenticated(_bearer(request)) and not self._is_authenticated(
+            _session_of_protocols(request)
+        ):
+            raise self._forbidden()
+        self._authenticated.add(request.protocol)
 
-    def _knows(self, given: str) -> bool:
+    def _is_authenticated(self, given: str) -> bool:
         if self._is_token(given):
             return True
         session = _hash(given)
@@ -147,10 +149,10 @@ class Authentication:
         self._sessions.move_to_end(session)
         return True
 
-    def _stranger(self) -> web.HTTPForbidden:
+    def _forbidden(self) -> web.HTTPForbidden:
         return web.HTTPForbidden(text=f"access requires the token: open {self._where}\n")
 
-    def _is_ours(self, host: str) -> bool:
+    def _is_own_host(self, host: str) -> bool:
         try:
             found = urlsplit(f"//{host}")
             return found.hostname in self._names and found.port != 0
@@ -161,7 +163,7 @@ class Authentication:
         return hmac.compare_digest(_bytes(given), self._token)
 
 
-class _Refusal(asyncio.Protocol):
+class _Rejection(asyncio.Protocol):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         assert isinstance(transport, asyncio.Transport)
         transport.write(_CROWDED)

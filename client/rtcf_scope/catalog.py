@@ -13,7 +13,7 @@ from rtcf_shared.enums import word
 
 from rtcf_scope.chunk import traces
 
-_RARELY = 1_000_000  # cycles; decimation of a stream opened only for its schema
+_SCHEMA_DECIMATION = 1_000_000  # cycles; decimation of a stream opened only for its schema
 
 
 def runners(client: rtcf.Client) -> list[dict[str, Any]]:
@@ -42,7 +42,7 @@ def graph(client: rtcf.Client, name: str) -> dict[str, Any]:
 
     Raises RtcfError.
     """
-    with client.watch_ports([], name, _RARELY) as stream:
+    with client.watch_ports([], name, _SCHEMA_DECIMATION) as stream:
         schema = stream.schema
     return {
         "signals": traces(schema),
@@ -69,15 +69,15 @@ def component(info: graph_pb2.ComponentInfo) -> dict[str, Any]:
 
 def statistics(client: rtcf.Client, name: str) -> dict[str, Any]:
     """Return the times of cycles and components, in µs; raises RtcfError."""
-    figures = client.get_statistics(name)
+    found = client.get_statistics(name)
     return {
-        "iterations": figures.iterations,
-        "overruns": figures.overruns,
-        "duration": _distribution(figures.duration),
-        "latency": _distribution(figures.latency),
+        "iterations": found.iterations,
+        "overruns": found.overruns,
+        "duration": _distribution(found.duration),
+        "latency": _distribution(found.latency),
         "components": {
             each.component: _distribution(each.duration) | {"overruns": each.overruns}
-            for each in figures.components
+            for each in found.components
         },
     }
 
@@ -119,10 +119,10 @@ def lost(count: int, what: str) -> dict[str, Any]:
     }
 
 
-def value(told: graph_pb2.ParameterValue) -> Any:
+def value(parameter: graph_pb2.ParameterValue) -> Any:
     """Return a parameter's value for JSON: NaN and infinities as text."""
-    kind = told.WhichOneof("kind")
-    found = None if kind is None else getattr(told, kind)
+    kind = parameter.WhichOneof("kind")
+    found = None if kind is None else getattr(parameter, kind)
     return str(found) if isinstance(found, float) and not math.isfinite(found) else found
 
 
@@ -137,25 +137,25 @@ def history(client: rtcf.Client, runner_name: str, most: int) -> list[dict[str, 
     ]  # fmt: skip
 
 
-def setting(info: graph_pb2.ParameterInfo, told: Any) -> graph_pb2.ParameterSetting:
+def setting(info: graph_pb2.ParameterInfo, given: Any) -> graph_pb2.ParameterSetting:
     """Return the setting of a parameter to a page's value.
 
     Raises ValueError if the value does not fit the parameter's type.
     """
     found = graph_pb2.ParameterValue()
     try:
-        if info.type == "bool" and isinstance(told, bool):
-            found.bool_value = told
-        elif info.type == "int" and isinstance(told, int) and not isinstance(told, bool):
-            found.int_value = told
-        elif info.type == "double" and isinstance(told, int | float) and told == told:
-            found.double_value = float(told)
-        elif info.type in ("string", "enum") and isinstance(told, str):
-            found.string_value = told
+        if info.type == "bool" and isinstance(given, bool):
+            found.bool_value = given
+        elif info.type == "int" and isinstance(given, int) and not isinstance(given, bool):
+            found.int_value = given
+        elif info.type == "double" and isinstance(given, int | float) and given == given:
+            found.double_value = float(given)
+        elif info.type in ("string", "enum") and isinstance(given, str):
+            found.string_value = given
     except (OverflowError, ValueError):
         pass
     if found.WhichOneof("kind") is None:
-        raise ValueError(f"{info.name} has type {info.type}: invalid value {told!r}")
+        raise ValueError(f"{info.name} has type {info.type}: invalid value {given!r}")
     return graph_pb2.ParameterSetting(name=info.name, value=found)
 
 

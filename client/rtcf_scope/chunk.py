@@ -1,4 +1,4 @@
-"""Chunks of consecutive cycles for the tabs of a runner, and a bounded memory of the last ones."""
+"""Chunks of consecutive cycles for the tabs of a runner, and a bounded history of them."""
 
 import re
 from collections import deque
@@ -54,14 +54,14 @@ class Chunk:
 
     def values(self, name: str) -> NDArray[np.float64]:
         """Return the values of a trace, one per cycle; NaN if the graph lacks the signal."""
-        if not is_there(self.batch.schema, name):
+        if not has_trace(self.batch.schema, name):
             return np.full(len(self), np.nan)
         signal, index = split_element(name)
         values: NDArray[Any] = self.batch[signal].reshape(len(self), -1)
         return values[:, index].astype(np.float64)
 
 
-class Memory:
+class History:
     """The last chunks of a runner, at most `most_bytes` of them."""
 
     def __init__(self, most_bytes: int) -> None:
@@ -80,9 +80,9 @@ class Memory:
         self._chunks.append(chunk)
         self._bytes += _size(chunk)
         while self._bytes > self._most and len(self._chunks) > 1:
-            gone = self._chunks.popleft()
-            self._bytes -= _size(gone)
-            gone.packed.clear()
+            removed = self._chunks.popleft()
+            self._bytes -= _size(removed)
+            removed.packed.clear()
 
     def between(self, begin: int, end: int) -> list[Chunk]:
         """Return the chunks with any of the cycles [begin, end), counted as `Chunk.at`."""
@@ -115,7 +115,7 @@ def column_of(name: str) -> str:
     return found[0] if found else ""
 
 
-def is_there(schema: PortSchema, name: str) -> bool:
+def has_trace(schema: PortSchema, name: str) -> bool:
     """Return whether a stream has values of a trace."""
     signal, index = split_element(name)
     found = schema.signals.get(signal)

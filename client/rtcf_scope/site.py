@@ -63,18 +63,18 @@ class Site:
         route.add_get("/", self._file)
         route.add_get("/page/{name:.*}", self._file)
         route.add_post("/api/session", authentication.enter)
-        route.add_get("/api/about", self._told(self._about))
-        route.add_get("/api/graph", self._told(self._graph))
-        route.add_get("/api/statistics", self._told(self._statistics))
-        route.add_get("/api/component", self._told(self._component))
-        route.add_get("/api/history", self._told(self._history))
-        route.add_post("/api/parameter", self._told(self._set))
-        route.add_get("/api/layouts", self._told(self._list_layouts))
-        route.add_get("/api/layouts/{name}", self._told(self._read_layout))
-        route.add_put("/api/layouts/{name}", self._told(self._write_layout))
-        route.add_delete("/api/layouts/{name}", self._told(self._remove_layout))
-        route.add_get("/api/recordings", self._told(self._list_recordings))
-        route.add_get("/api/recordings/{name}", self._told(self._describe_recording))
+        route.add_get("/api/about", self._json(self._about))
+        route.add_get("/api/graph", self._json(self._graph))
+        route.add_get("/api/statistics", self._json(self._statistics))
+        route.add_get("/api/component", self._json(self._component))
+        route.add_get("/api/history", self._json(self._history))
+        route.add_post("/api/parameter", self._json(self._set))
+        route.add_get("/api/layouts", self._json(self._list_layouts))
+        route.add_get("/api/layouts/{name}", self._json(self._read_layout))
+        route.add_put("/api/layouts/{name}", self._json(self._write_layout))
+        route.add_delete("/api/layouts/{name}", self._json(self._remove_layout))
+        route.add_get("/api/recordings", self._json(self._list_recordings))
+        route.add_get("/api/recordings/{name}", self._json(self._describe_recording))
         route.add_get("/api/recordings/{name}/columns", self._recorded)
         route.add_get("/api/mcap", self._mcap)
         route.add_get("/stream", self._stream)
@@ -93,53 +93,53 @@ class Site:
         data, kind = self._files[path]
         return web.Response(body=data, content_type=kind, charset="utf-8")
 
-    def _told(self, answer: Callable[[web.Request], Awaitable[Any]]) -> Handler:
+    def _json(self, answer: Callable[[web.Request], Awaitable[Any]]) -> Handler:
         """Return a handler that answers with the result of `answer` or an error, as JSON."""
 
         async def handle(request: web.Request) -> web.StreamResponse:
             try:
                 return web.json_response(await answer(request))
             except (RtcfError, LayoutError, ValueError) as error:
-                return refused(error)
+                return error_response(error)
             except RecursionError:
-                return refused("the JSON is nested too deeply")
+                return error_response("the JSON is nested too deeply")
             except LookupError as error:  # unknown encoding in Content-Type
-                return refused(error)
+                return error_response(error)
 
         return handle
 
-    async def _ask(self, what: Callable[..., Any], *words: Any) -> Any:
+    async def _call(self, what: Callable[..., Any], *words: Any) -> Any:
         return await asyncio.to_thread(what, *words)
 
     async def _about(self, request: web.Request) -> Any:
-        found = await self._ask(catalog.runners, self._client)
+        found = await self._call(catalog.runners, self._client)
         return {"version": rtcf.__version__, "right": self._right, "runners": found,
                 "socket": self._client.socket}  # fmt: skip
 
     async def _graph(self, request: web.Request) -> Any:
-        return await self._ask(catalog.graph, self._client, runner_of(request))
+        return await self._call(catalog.graph, self._client, runner_of(request))
 
     async def _statistics(self, request: web.Request) -> Any:
-        return await self._ask(catalog.statistics, self._client, runner_of(request))
+        return await self._call(catalog.statistics, self._client, runner_of(request))
 
     async def _history(self, request: web.Request) -> Any:
-        return await self._ask(catalog.history, self._client, runner_of(request), 50)
+        return await self._call(catalog.history, self._client, runner_of(request), 50)
 
     async def _component(self, request: web.Request) -> Any:
         name = request.query.get("name", "")
-        info = await self._ask(self._client.get_component, name, runner_of(request))
+        info = await self._call(self._client.get_component, name, runner_of(request))
         return catalog.component(info)
 
     async def _set(self, request: web.Request) -> Any:
         if self._right == "observe":
             raise ValueError("the scope is read-only: start it with --right tune to set parameters")
-        told = await request.json()
+        change = await request.json()
         try:
-            component, name, value = told["component"], told["parameter"], told["value"]
+            component, name, value = change["component"], change["parameter"], change["value"]
         except (KeyError, TypeError):
             raise ValueError("a change needs component, parameter and value") from None
 
-        def change() -> Any:
+        def apply() -> Any:
             runner = runner_of(request)
             info = self._client.get_component(str(component), runner)
             found = next((each for each in info.parameters if each.name == name), None)
@@ -149,7 +149,7 @@ class Site:
             result = self._client.set_parameters(info.full_name, [setting], runner)
             return {"notes": list(result.notes)}
 
-        return await self._ask(change)
+        return await self._call(apply)
 
     async def _list_layouts(self, request: web.Request) -> Any:
         return self._layouts.names()
@@ -158,16 +158,16 @@ class Site:
         return self._layouts.read(request.match_info["name"])
 
     async def _write_layout(self, request: web.Request) -> Any:
-        await self._ask(self._layouts.write, request.match_info["name"], await request.text())
+        await self._call(self._layouts.write, request.match_info["name"], await request.text())
 
     async def _remove_layout(self, request: web.Request) -> Any:
         self._layouts.remove(request.match_info["name"])
 
     async def _list_recordings(self, request: web.Request) -> Any:
-        return await self._ask(self._recordings.names)
+        return await self._call(self._recordings.names)
 
     async def _describe_recording(self, request: web.Request) -> Any:
-        return await self._ask(self._recordings.describe, request.match_info["name"])
+        return await self._call(self._recordings.describe, request.match_info["name"])
 
     async def _recorded(self, request: web.Request) -> web.StreamResponse:
         traces: list[str] = request.query.getall("trace", [])
@@ -177,12 +177,12 @@ class Site:
                 for name, value in (("begin", -math.inf), ("end", math.inf))
             )
         except ValueError:
-            return refused("begin and end must be numbers, in seconds")
+            return error_response("begin and end must be numbers, in seconds")
         name = request.match_info["name"]
         try:
-            data = await self._ask(self._recordings.columns, name, traces, begin, end)
+            data = await self._call(self._recordings.columns, name, traces, begin, end)
         except RtcfError as error:
-            return refused(error)
+            return error_response(error)
         return web.Response(body=data, content_type="application/octet-stream")
 
     async def _mcap(self, request: web.Request) -> web.StreamResponse:
@@ -191,14 +191,14 @@ class Site:
         try:
             first, last = (float(request.query.get(each, "nan")) for each in ("first", "last"))
         except ValueError:
-            return refused("first and last must be cycle numbers")
+            return error_response("first and last must be cycle numbers")
         hub = self._hubs.get(runner)
         batches = [] if hub is None else [
-            chunk.batch for chunk in hub.memory
+            chunk.batch for chunk in hub.history
             if not (chunk.cycles[-1] < first or chunk.cycles[0] > last)
         ]  # fmt: skip
         if not batches:
-            return refused("these cycles are no longer in memory")
+            return error_response("these cycles are no longer in memory")
 
         def write() -> bytes:
             file = io.BytesIO()
@@ -212,16 +212,16 @@ class Site:
 
         name = quote(runner, errors="replace")
         return web.Response(
-            body=await self._ask(write),
+            body=await self._call(write),
             content_type="application/octet-stream",
             headers={"Content-Disposition": f'attachment; filename="{name}.mcap"'},
         )
 
     async def _stream(self, request: web.Request) -> web.StreamResponse:
         if len(self._tabs) >= MOST_TABS:
-            return refused(f"{MOST_TABS} pages are already open: close some", 503)
+            return error_response(f"{MOST_TABS} pages are already open: close some", 503)
         if not web.WebSocketResponse(protocols=(PROTOCOL,)).can_prepare(request):
-            return refused("/stream requires a WebSocket")
+            return error_response("/stream requires a WebSocket")
         runner = runner_of(request) or "rt_runner"
         hub = self._hubs.setdefault(runner, Hub(self._client, runner))
         feed = self._feeds.setdefault(runner, StatusFeed(self._client, runner))
@@ -244,7 +244,7 @@ def runner_of(request: web.Request) -> str:
     return request.query.get("runner", "")
 
 
-def refused(error: object, status: int = 400) -> web.Response:
+def error_response(error: object, status: int = 400) -> web.Response:
     """Return a JSON response with an error message of one line."""
     text = json.dumps({"refused": " ".join(str(error).split())[:_LONGEST]})
     return web.Response(text=text, content_type="application/json", status=status)

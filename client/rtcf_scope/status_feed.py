@@ -67,24 +67,24 @@ class StatusFeed:
         ended: threading.Event,
         loop: asyncio.AbstractEventLoop,
     ) -> None:
-        def tell(message: dict[str, Any]) -> None:
+        def send(message: dict[str, Any]) -> None:
             try:
-                loop.call_soon_threadsafe(self._tell, ended, message)
+                loop.call_soon_threadsafe(self._send_all, ended, message)
             except RuntimeError:
                 ended.set()  # the server has ended
 
         while not ended.is_set():
             try:
-                follow(ended, tell)
+                follow(ended, send)
             except (RtcfError, ValueError) as error:  # ValueError: the name is not valid UTF-8
-                tell({"kind": "state", "state": "unknown", "status": str(error)})
+                send({"kind": "state", "state": "unknown", "status": str(error)})
             ended.wait(_EVERY_S)
 
-    def _tell(self, ended: threading.Event, message: dict[str, Any]) -> None:
+    def _send_all(self, ended: threading.Event, message: dict[str, Any]) -> None:
         if ended.is_set():
             return
         for tab in tuple(self._tabs):
-            tab.tell(message)
+            tab.send(message)
 
     @contextlib.contextmanager
     def _closed_with(self, stream: Any) -> Iterator[None]:
@@ -96,39 +96,39 @@ class StatusFeed:
             with contextlib.suppress(ValueError):  # closed meanwhile
                 self._streams.remove(stream)
 
-    def _follow_state(self, ended: threading.Event, tell: Callable[[dict[str, Any]], None]) -> None:
+    def _follow_state(self, ended: threading.Event, send: Callable[[dict[str, Any]], None]) -> None:
         for status in self._client.get_status(self._runner).runners:
-            tell({"kind": "state"} | catalog.runner(status))
+            send({"kind": "state"} | catalog.runner(status))
 
     def _follow_events(
-        self, ended: threading.Event, tell: Callable[[dict[str, Any]], None]
+        self, ended: threading.Event, send: Callable[[dict[str, Any]], None]
     ) -> None:
         with self._client.watch_events([self._runner]) as stream, self._closed_with(stream):
             if ended.is_set():
                 return
             for found in stream:
                 if isinstance(found, Lost):
-                    tell(catalog.lost(found.count, "events"))
+                    send(catalog.lost(found.count, "events"))
                 else:
-                    tell(catalog.event(found))
+                    send(catalog.event(found))
 
-    def _follow_logs(self, ended: threading.Event, tell: Callable[[dict[str, Any]], None]) -> None:
+    def _follow_logs(self, ended: threading.Event, send: Callable[[dict[str, Any]], None]) -> None:
         with (
             self._client.watch_logs(self._runner, level="info") as stream,
             self._closed_with(stream),
         ):
             if ended.is_set():
                 return
-            begin, told, left_out = time.monotonic(), 0, 0
+            begin, sent, dropped = time.monotonic(), 0, 0
             for found in stream:
                 if time.monotonic() - begin > _EVERY_S:
-                    if left_out:
-                        tell(catalog.lost(left_out, "log records"))
-                    begin, told, left_out = time.monotonic(), 0, 0
+                    if dropped:
+                        send(catalog.lost(dropped, "log records"))
+                    begin, sent, dropped = time.monotonic(), 0, 0
                 if isinstance(found, Lost):
-                    left_out += found.count
-                elif told < _MOST_RECORDS:
-                    told += 1
-                    tell(catalog.record(found))
+                    dropped += found.count
+                elif sent < _MOST_RECORDS:
+                    sent += 1
+                    send(catalog.record(found))
                 else:
-                    left_out += 1
+                    dropped += 1

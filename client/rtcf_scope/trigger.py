@@ -42,21 +42,21 @@ class Trigger:
         return [self.signal] if self.condition is None else self.condition.signals
 
 
-def parse(told: Any) -> Trigger:
+def parse(request: Any) -> Trigger:
     """Return the trigger of a page's request; raises TriggerError."""
     try:
-        kind = str(told["kind"])
+        kind = str(request["kind"])
         if kind not in KINDS:
             raise TriggerError(f"trigger kind {kind!r}: must be one of {', '.join(KINDS)}")
-        slope = str(told.get("slope") or _SLOPES[kind][0])
+        slope = str(request.get("slope") or _SLOPES[kind][0])
         if slope not in _SLOPES[kind]:
             raise TriggerError(f"{kind} {slope!r}: must be one of {', '.join(_SLOPES[kind])}")
-        condition = Condition(str(told["condition"])) if kind == "condition" else None
+        condition = Condition(str(request["condition"])) if kind == "condition" else None
         trigger = Trigger(
-            str(told["signal"]) if condition is None else "", kind, slope,
-            float(told.get("low", 0.0)), float(told.get("high", 0.0)),
-            int(told["before"]), int(told["after"]), int(told.get("holdoff", 0)),
-            bool(told.get("single", False)), condition,
+            str(request["signal"]) if condition is None else "", kind, slope,
+            float(request.get("low", 0.0)), float(request.get("high", 0.0)),
+            int(request["before"]), int(request["after"]), int(request.get("holdoff", 0)),
+            bool(request.get("single", False)), condition,
         )  # fmt: skip
     except ConditionError as error:
         raise TriggerError(str(error)) from None

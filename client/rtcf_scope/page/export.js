@@ -2,7 +2,7 @@
 import { colour, ink } from "./drawing/palette.js";
 import { query, request } from "./server.js";
 
-function hand(blob, name) {
+function download(blob, name) {
   const link = document.createElement("a");
   link.href = URL.createObjectURL(blob);
   link.download = name;
@@ -34,7 +34,7 @@ export function toPng(scope) {
     }
     top += sizes[i][1] + head;
   });
-  canvas.toBlob((blob) => hand(blob, "scope.png"));
+  canvas.toBlob((blob) => download(blob, "scope.png"));
 }
 
 export function csv(scope) {
@@ -52,12 +52,12 @@ export function csv(scope) {
   return lines.join("\n") + "\n";
 }
 
-export function toCsv(scope) { hand(new Blob([csv(scope)], { type: "text/csv" }), "scope.csv"); }
+export function toCsv(scope) { download(new Blob([csv(scope)], { type: "text/csv" }), "scope.csv"); }
 
 export async function toMcap(scope, runner) {
   const { store, view } = scope;
   if (scope.mode === "recording") throw new Error("this is a recording already");
   const first = store.cycle(Math.min(store.find(view.begin), store.end - 1)), last = store.cycle(Math.min(store.find(view.end), store.end - 1));
   const response = await request(`/api/mcap?${query({ runner, first, last })}`);
-  hand(await response.blob(), `${runner}.mcap`);
+  download(await response.blob(), `${runner}.mcap`);
 }

@@ -10,7 +10,7 @@ export const KEYS = [
   ["Click", "cursor A; with Shift B"], ["Double click", "fit the scale, no cursors"],
 ];
 
-export function mind(scope, does) {
+export function bindKeys(scope, does) {
   const keys = {
     " ": () => does.freeze(), "+": () => scope.view.step(-1), "=": () => scope.view.step(-1), "-": () => scope.view.step(1),
     ArrowLeft: () => { scope.freeze(); scope.view.pan(-scope.view.span / 10); },

@@ -9,7 +9,7 @@ export function taken(scope, runner, drawer, xy) {
   const { trigger, panes, view, mode, ruler } = scope;
   return {
     runner, mode: mode === "recording" ? "roll" : mode, drawer, span: Number((mode === "roll" ? view.span : scope.rollSpan ?? 10).toPrecision(4)),
-    ruler, panes: panes.map(paneTaken), trigger: trigger.told, xy: { ...xy.chosen, equal: xy.isEqual },
+    ruler, panes: panes.map(paneTaken), trigger: trigger.settings, xy: { ...xy.chosen, equal: xy.isEqual },
   };
 }
 
@@ -63,7 +63,7 @@ export function given(scope, layout) {
   if (layout.span > 0 && Number.isFinite(layout.span)) scope.view.span = scope.rollSpan = layout.span;
   for (const [name, type] of Object.entries(TRIGGER)) {
     const value = layout.trigger?.[name];
-    if (typeof value === type && (type !== "number" || Number.isFinite(value))) scope.trigger.told[name] = value;
+    if (typeof value === type && (type !== "number" || Number.isFinite(value))) scope.trigger.settings[name] = value;
   }
   scope.setRuler(layout.ruler);
   scope.onTraces();

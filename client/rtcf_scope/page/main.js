@@ -1,7 +1,7 @@
 // Assembles the page: the scope, its panels, the stream and the buttons.
 import { scaled } from "./drawing/axes.js";
 import * as exporting from "./export.js";
-import { KEYS, mind } from "./keys.js";
+import { KEYS, bindKeys } from "./keys.js";
 import * as layout from "./layout.js";
 import { Cycles } from "./panels/cycles.js";
 import { Derive } from "./panels/derive.js";
@@ -20,34 +20,34 @@ import { Stream, ask, enter, onSession, query } from "./server.js";
 import { sources } from "./data/derived.js";
 import { DURATION, LATENCY } from "./data/store.js";
 
-const SLOW_MS = 250; // between two looks at figures
+const SLOW_MS = 250; // between two updates of slow parts
 const CYCLES = [{ name: LATENCY, unit: "µs", kind: "number" }, { name: DURATION, unit: "µs", kind: "number" }];
 const $ = (id) => document.getElementById(id);
 const drawerOf = (name) => document.querySelector(`.drawer[data-drawer=${name}]`);
 
 const scope = new Scope($("panes"));
-const told = { right: "observe", runner: () => $("runner").value, trouble: (text) => trouble("page", text) };
+const page = { right: "observe", runner: () => $("runner").value, setError: (text) => setError("page", text) };
 const tree = new Tree(scope, $("tree"), $("search"));
-const parameters = new Parameters($("parameters"), told);
-const recordings = new Recordings(scope, $("recordings"), told.trouble);
+const parameters = new Parameters($("parameters"), page);
+const recordings = new Recordings(scope, $("recordings"), page.setError);
 const triggering = new TriggerPanel(scope, $("trigger"), arm);
 const measurements = new Measurements(scope, drawerOf("measurements"));
 const spectrum = new Spectrum(scope, $("spectrum"));
 const xy = new XY(scope, drawerOf("xy"));
 const cycles = new Cycles(scope, $("cycles"));
 const events = new Events(scope, drawerOf("events"));
-const graph = new Graph(drawerOf("graph"), async (name) => (await ask(`/api/component?${query({ runner: told.runner(), name })}`)).values);
-const figures = { frames: 0, perSecond: 0, since: performance.now(), state: {} };
+const graph = new Graph(drawerOf("graph"), async (name) => (await ask(`/api/component?${query({ runner: page.runner(), name })}`)).values);
+const counters = { frames: 0, perSecond: 0, since: performance.now(), state: {} };
 new Derive(scope, $("derive"));
 let stream = null, drawer = "measurements", generation = -1, liveCatalog = [];
-const troubles = new Map();
+const errors = new Map();
 window.scope = scope; // for tests and the browser's tools
-window.figures = figures;
+window.counters = counters;
 
-function trouble(source, text) {
-  if (text) troubles.set(source, text); else troubles.delete(source);
-  $("trouble").hidden = !troubles.size;
-  $("trouble").textContent = [...troubles.values()].join(" · ");
+function setError(source, text) {
+  if (text) errors.set(source, text); else errors.delete(source);
+  $("error").hidden = !errors.size;
+  $("error").textContent = [...errors.values()].join(" · ");
 }
 
 function arm(trigger) {
@@ -55,7 +55,7 @@ function arm(trigger) {
   stream?.want({ trigger });
 }
 
-// What the panes show is watched: said once, however much is changed at a time.
+// What the panes show is watched: one request for all changes at a time.
 let watching = false;
 function watch() {
   if (watching) return;
@@ -70,7 +70,7 @@ function watch() {
 
 function triggerIs(words) {
   Object.assign(scope.trigger, words);
-  triggering.tell();
+  triggering.showState();
 }
 const OFF = { state: "off", armed: [], missing: [] };
 
@@ -79,7 +79,7 @@ scope.onTraces = () => {
   watch();
   tree.show();
   if (scope.mode === "trigger") triggering.show();
-  if (scope.mode === "recording" && recordings.open.length) recordings.load().catch((error) => told.trouble(error.message));
+  if (scope.mode === "recording" && recordings.open.length) recordings.load().catch((error) => page.setError(error.message));
 };
 
 function connect(runner) {
@@ -89,21 +89,21 @@ function connect(runner) {
   scope.events = [];
   generation = -1;
   liveCatalog = [];
-  for (const source of ["rtcfd", "missing", "graph"]) trouble(source, "");
+  for (const source of ["rtcfd", "missing", "graph"]) setError(source, "");
   triggerIs(OFF);
   stream = new Stream(runner, {
     connected: (is, why) => {
-      trouble("connection", why);
+      setError("connection", why);
       if (is) {
-        for (const source of ["rtcfd", "missing"]) trouble(source, "");
+        for (const source of ["rtcfd", "missing"]) setError(source, "");
         generation = -1; // request the changes since then
       }
       // One that waits is armed again with the connection.
       else if (scope.trigger.state !== "armed") stream.wanted.trigger = null;
     },
-    message: hear,
+    message: receive,
     cycles: (message, names) => {
-      if (message.kind === 2) { scope.addShot(message, names); triggering.tell(); }
+      if (message.kind === 2) { scope.addShot(message, names); triggering.showState(); }
       else scope.live.push(message, names);
     },
   });
@@ -111,10 +111,10 @@ function connect(runner) {
   catalog();
 }
 
-function hear(message) {
-  if (message.kind === "trouble") trouble("rtcfd", message.text);
-  else if (message.kind === "missing") { trouble("missing", message.text); triggerIs({ missing: message.trigger }); }
-  else if (message.kind === "refused") told.trouble(message.text);
+function receive(message) {
+  if (message.kind === "error") setError("rtcfd", message.text);
+  else if (message.kind === "missing") { setError("missing", message.text); triggerIs({ missing: message.trigger }); }
+  else if (message.kind === "refused") page.setError(message.text);
   else if (message.kind === "watching") rebase(BigInt(message.base_ns));
   else if (message.kind === "trigger") triggerIs(message.state === "armed" ? { state: "armed", armed: message.signals } : { ...OFF, state: message.state });
   else if (message.kind === "state") state(message);
@@ -134,7 +134,7 @@ function rebase(baseNs) {
 }
 
 function state(message) {
-  figures.state = message;
+  counters.state = message;
   scope.rate = message.frequency_hz;
   $("state").textContent = message.frequency_hz ? `${message.state}, ${scaled(message.frequency_hz, "Hz")}` : message.state;
   $("state").className = message.state;
@@ -147,7 +147,7 @@ function state(message) {
 async function runners() {
   const about = await ask("/api/about");
   const names = about.runners.map(({ runner }) => runner);
-  const shown = told.runner();
+  const shown = page.runner();
   const all = shown && !names.includes(shown) ? [...names, shown] : names;
   const options = all.map((name) => new Option(names.includes(name) ? name : `${name} (not there)`, name));
   // A list that is open stays.
@@ -160,17 +160,17 @@ async function runners() {
 
 // Requests the graph again: all of it, or only values of parameters.
 async function renew(all) {
-  const runner = told.runner();
+  const runner = page.runner();
   try {
     const found = await ask(`/api/graph?${query({ runner })}`);
-    if (runner !== told.runner()) return;
+    if (runner !== page.runner()) return;
     liveCatalog = found.signals;
     scope.know(found.signals);
     if (all) { catalog(); parameters.show(found.components); graph.show(found); watch(); }
-    else parameters.tell(found.components);
+    else parameters.update(found.components);
     await parameters.who();
-    trouble("graph", "");
-  } catch (error) { if (runner === told.runner()) trouble("graph", error.message); }
+    setError("graph", "");
+  } catch (error) { if (runner === page.runner()) setError("graph", error.message); }
 }
 
 function catalog() {
@@ -205,30 +205,30 @@ function open(name) {
 // Expensive updates: a few times a second, and only of visible parts.
 async function slow() {
   const now = performance.now();
-  if (now - figures.since > 1000) {
-    figures.perSecond = figures.frames / (now - figures.since) * 1000;
-    figures.frames = 0;
-    figures.since = now;
+  if (now - counters.since > 1000) {
+    counters.perSecond = counters.frames / (now - counters.since) * 1000;
+    counters.frames = 0;
+    counters.since = now;
     if (drawer === "cycles" || drawer === "graph") {
       try {
-        cycles.figures = await ask(`/api/statistics?${query({ runner: told.runner() })}`);
-        graph.tell(cycles.figures);
-        trouble("figures", "");
-      } catch (error) { trouble("figures", error.message); }
+        cycles.statistics = await ask(`/api/statistics?${query({ runner: page.runner() })}`);
+        graph.showStatistics(cycles.statistics);
+        setError("statistics", "");
+      } catch (error) { setError("statistics", error.message); }
     }
   }
-  if (scope.mode === "recording") recordings.look();
-  for (const pane of scope.panes) pane.tell();
+  if (scope.mode === "recording") recordings.loadVisible();
+  for (const pane of scope.panes) pane.update();
   ({ measurements, spectrum, xy, cycles, events }[drawer] ?? { show() {} }).show();
   $("span").textContent = scaled(scope.view.span, "s");
   const frozen = scope.mode === "roll" && !scope.view.follows;
   $("freeze").textContent = frozen ? "Run" : "Freeze";
   $("freeze").classList.toggle("frozen", frozen);
   $("freeze").disabled = scope.mode !== "roll";
-  const { overruns = 0 } = figures.state;
+  const { overruns = 0 } = counters.state;
   const { lost } = scope.live;
-  $("figures").textContent = [`${overruns} overrun${overruns === 1 ? "" : "s"}`, ...(lost ? [`${lost} cycles not seen here`] : []),
-    `${Math.round(figures.perSecond)} frames/s`].join(" · ");
+  $("counters").textContent = [`${overruns} overrun${overruns === 1 ? "" : "s"}`, ...(lost ? [`${lost} cycles not seen here`] : []),
+    `${Math.round(counters.perSecond)} frames/s`].join(" · ");
 }
 
 async function layouts() {
@@ -240,7 +240,7 @@ async function layouts() {
 async function chooseLayout(choice) {
   if (choice === "save") {
     const name = prompt("Save this layout as");
-    if (name) await layout.save(name, layout.taken(scope, told.runner(), drawer, xy));
+    if (name) await layout.save(name, layout.taken(scope, page.runner(), drawer, xy));
   } else if (choice === "remove") {
     const name = prompt("Remove which layout?");
     if (name) await layout.remove(name);
@@ -249,13 +249,13 @@ async function chooseLayout(choice) {
 }
 
 function apply(found) {
-  if (typeof found?.runner === "string" && found.runner && found.runner !== told.runner()) {
+  if (typeof found?.runner === "string" && found.runner && found.runner !== page.runner()) {
     if (![...$("runner").options].some((each) => each.value === found.runner)) $("runner").append(new Option(`${found.runner} (not there)`, found.runner));
     $("runner").value = found.runner;
     connect(found.runner);
   } else arm(null); // the layout's is another
   xy.take(found?.xy ?? {});
-  trouble("layout", layout.given(scope, found ?? {}));
+  setError("layout", layout.given(scope, found ?? {}));
   mode(found?.mode === "trigger" ? "trigger" : "roll");
   if (["measurements", "spectrum", "xy", "cycles", "graph", "events"].includes(found?.drawer)) open(found.drawer);
 }
@@ -270,7 +270,7 @@ function theme() {
   scope.changed();
 }
 
-const trying = (does) => Promise.resolve().then(does).then(() => told.trouble(""), (error) => told.trouble(error.message));
+const trying = (does) => Promise.resolve().then(does).then(() => page.setError(""), (error) => page.setError(error.message));
 
 function buttons() {
   const freeze = () => (scope.view.follows ? scope.freeze() : scope.run());
@@ -286,14 +286,14 @@ function buttons() {
   $("pane").onclick = () => scope.addPane();
   $("theme").onclick = other;
   $("help").onclick = () => $("keys").showModal();
-  $("runner").onchange = () => connect(told.runner());
+  $("runner").onchange = () => connect(page.runner());
   $("runner").onfocus = () => runners().catch(() => {}); // the stream reports the error
   $("trigger").onsubmit = (event) => event.preventDefault();
   $("layouts").onchange = ({ target }) => { const choice = target.value; target.value = ""; trying(() => chooseLayout(choice)); };
   $("export").onchange = ({ target }) => {
     const choice = target.value;
     target.value = "";
-    trying(() => ({ png: exporting.toPng, csv: exporting.toCsv, mcap: exporting.toMcap })[choice](scope, told.runner()));
+    trying(() => ({ png: exporting.toPng, csv: exporting.toCsv, mcap: exporting.toMcap })[choice](scope, page.runner()));
   };
   for (const each of document.querySelectorAll("footer [role=tab]")) each.onclick = () => open(each.dataset.drawer);
   for (const each of document.querySelectorAll("aside [role=tab]")) each.onclick = () => {
@@ -308,12 +308,12 @@ function buttons() {
   };
   sizesPart($("beside"), "--list", { axis: "x", sign: 1, size: () => $("list").offsetWidth, least: 140, most: () => innerWidth * 0.6 });
   sizesPart($("above"), "--drawer", { axis: "y", sign: -1, size: () => drawerOf(drawer).offsetHeight, least: 60, most: () => innerHeight * 0.65 });
-  mind(scope, { freeze, pointing, theme: other, search: () => $("search").focus(), help: () => $("keys").showModal(),
+  bindKeys(scope, { freeze, pointing, theme: other, search: () => $("search").focus(), help: () => $("keys").showModal(),
     mode: () => mode(scope.mode === "trigger" ? "roll" : "trigger") });
 }
 
 function frame(now) {
-  if (scope.frame(now)) figures.frames++;
+  if (scope.frame(now)) counters.frames++;
   requestAnimationFrame(frame);
 }
 
@@ -324,11 +324,11 @@ async function begin() {
   const asked = layout.ofAddress();
   await enter();
   const about = await runners();
-  told.right = about.right;
-  connect(told.runner());
+  page.right = about.right;
+  connect(page.runner());
   if (asked) apply(asked);
   // Not earlier: until then the address has the requested layout.
-  scope.onLayout = () => layout.toAddress(() => layout.taken(scope, told.runner(), drawer, xy));
+  scope.onLayout = () => layout.toAddress(() => layout.taken(scope, page.runner(), drawer, xy));
   await Promise.all([layouts(), recordings.show()]);
   new ResizeObserver(() => scope.changed()).observe($("panes"));
   setInterval(slow, SLOW_MS);
@@ -336,7 +336,7 @@ async function begin() {
 }
 
 begin().catch((error) => {
-  trouble("page", error.message);
+  setError("page", error.message);
   onSession(() => location.reload());
 });
 // A file that is opened has other signals than the stream.

@@ -2,7 +2,7 @@
 // `changed` redraws everything in the next frame.
 import { Pane } from "./drawing/pane.js";
 import { Pace, View } from "./drawing/view.js";
-import { minded } from "./drawing/pointer.js";
+import { bindPointer } from "./drawing/pointer.js";
 import { RULERS, rulerOf, secondOfDay } from "./drawing/ruler.js";
 import { DURATION, LATENCY, Store } from "./data/store.js";
 import { sizesPanes } from "./resize.js";
@@ -28,9 +28,9 @@ export class Scope {
     this.shotNumber = -1;
     this.recordings = []; // {name, store, shift, beginNs}: one, or two over each other
     this.events = []; // newest last
-    // `told`: the settings; `armed`: the signals that the server watches; `missing`: those of them that
+    // `settings`; `armed`: the signals that the server watches; `missing`: those of them that
     // the graph does not have.
-    this.trigger = { told: { kind: "edge", signal: "", slope: "rising", low: 0, high: 1 }, state: "off", armed: [], missing: [] };
+    this.trigger = { settings: { kind: "edge", signal: "", slope: "rising", low: 0, high: 1 }, state: "off", armed: [], missing: [] };
     this.baseNs = 0n;
     this.onTraces = () => {}; // others are watched
     this.onActive = () => {}; // another pane is the active one
@@ -135,7 +135,7 @@ export class Scope {
 
   addPane() {
     const pane = new Pane(this);
-    minded(pane, this);
+    bindPointer(pane, this);
     sizesPanes(pane.bar, pane, this);
     this.panes.push(pane);
     this.box.append(pane.box);

@@ -29,10 +29,10 @@ export async function request(path, options = {}) {
   const headers = { ...options.headers, Authorization: `Bearer ${session()}` };
   const response = await fetch(path, { ...options, headers }).catch(() => { throw new Error("no connection to the scope's server"); });
   if (response.ok) return response;
-  const told = await response.text();
+  const text = await response.text();
   let refused;
-  try { ({ refused } = JSON.parse(told)); } catch { /* it is a line */ }
-  throw Object.assign(new Error(refused ?? told.trim()), { status: response.status });
+  try { ({ refused } = JSON.parse(text)); } catch { /* it is a line */ }
+  throw Object.assign(new Error(refused ?? text.trim()), { status: response.status });
 }
 
 export async function ask(path, options = {}) {

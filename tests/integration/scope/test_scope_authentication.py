@@ -117,7 +117,7 @@ def test_the_token_leaves_the_address_and_the_layout_stays(
     assert _kept(page) not in ("", scope.token)
     # A bookmark with the layout opens with the session, in any tab.
     marked = chromium.page(f"http://127.0.0.1:{scope.port}/#{quote(LAYOUT)}")
-    marked.wait("scope.live.end > 10 && document.getElementById('trouble').hidden")
+    marked.wait("scope.live.end > 10 && document.getElementById('error').hidden")
     assert page.errors == marked.errors == []
 
 
@@ -126,12 +126,12 @@ def test_a_page_without_a_session_explains_how_to_get_one(
 ) -> None:
     page = chromium.page(f"http://127.0.0.1:{scope.port}/#{quote(LAYOUT)}")
     page.wait(
-        "document.getElementById('trouble').textContent === "
+        "document.getElementById('error').textContent === "
         "'access requires the token: open the address that rtcfctl scope printed'"
     )
     # It continues once another tab has a session.
     chromium.page(scope.address).wait("scope.rate")
-    page.wait("scope.live.end > 10 && document.getElementById('trouble').hidden")
+    page.wait("scope.live.end > 10 && document.getElementById('error').hidden")
     assert page.ask("scope.traces().length") == 1
 
 
@@ -142,11 +142,11 @@ def test_a_page_of_a_restarted_server_explains_how_to_continue(
     with ScopeProcess(loop, *kept) as before:
         page = chromium.page(f"{before.address}#{quote(LAYOUT)}")
         page.wait("scope.live.end > 10")
-    page.wait("document.getElementById('trouble').textContent.includes('no connection')")
+    page.wait("document.getElementById('error').textContent.includes('no connection')")
     with ScopeProcess(loop, *kept, "--port", str(before.port)) as after:
-        page.wait("document.getElementById('trouble').textContent.includes('requires the token')")
+        page.wait("document.getElementById('error').textContent.includes('requires the token')")
         chromium.page(after.address).wait("scope.rate")
-        page.wait("document.getElementById('trouble').hidden")
+        page.wait("document.getElementById('error').hidden")
 
 
 class _Recorder:

@@ -91,7 +91,7 @@ def test_derived_signals_of_a_bookmark_are_shown_and_wrong_ones_are_named(visit:
     page = visit('{"panes":[{"traces":["= low(/w0.wave, 5)","= lo(/w0.wave)","= /w0.wave +"]}]}')
     page.wait("!!(scope.live.column('= low(/w0.wave, 5)'))")
     assert page.ask("scope.traces().map((each) => each.name)") == ["= low(/w0.wave, 5)"]
-    told = page.ask("document.getElementById('trouble').textContent")
+    told = page.ask("document.getElementById('error').textContent")
     assert told.startswith('left out: = lo(/w0.wave): "lo" is none of the functions d, diff,')
     assert told.endswith("= /w0.wave +: it ends too early")
     assert page.errors == []

@@ -88,7 +88,7 @@ class _Healthy:
             if pair[1] != pair[0] + 1
         ]
         assert not gaps and not self.lost
-        bad = ("missing", "refused", "trouble")
+        bad = ("missing", "refused", "error")
         wrong = [each for each in self.texts if each["kind"] in bad and each["text"]]
         assert not wrong
 
@@ -224,18 +224,18 @@ def test_a_missing_runner_is_reported_to_its_page_until_it_exists(
     async def look() -> None:
         async with _Healthy().watching(scope) as healthy, Visit(scope, "later") as page:
             await page.say(watch=["/wave.phase"])
-            while "later" not in (await page.text("trouble"))["text"]:
+            while "later" not in (await page.text("error"))["text"]:
                 pass
             for _ in range(2):
                 await asyncio.to_thread(client.add_runner, "later")
                 await asyncio.to_thread(client.load, _wave("wave"), runner="later")
                 await asyncio.to_thread(client.start, "later")
                 await page.binary(CYCLES, traces=1)
-                assert not [each for each in page.texts if each["kind"] == "trouble"][-1]["text"]
+                assert not [each for each in page.texts if each["kind"] == "error"][-1]["text"]
                 await asyncio.to_thread(client.stop, "later")
                 await asyncio.to_thread(client.unload, ["wave"], runner="later")
                 await asyncio.to_thread(client.remove_runner, "later")
-                while "later" not in (await page.text("trouble"))["text"]:
+                while "later" not in (await page.text("error"))["text"]:
                     pass
             await healthy.some()
             healthy.check()

@@ -125,13 +125,13 @@ def test_a_trigger_on_a_removed_signal_reports_it_and_arms_no_other(
     _press(page, "#trigger [name=arm]")
     page.wait(f"{_SAID} === 'waiting for /gone.wave: not there'")
     assert page.ask("scope.trigger.armed") == ["/gone.wave"]
-    assert page.ask("document.getElementById('trouble').textContent") == (
+    assert page.ask("document.getElementById('error').textContent") == (
         "the trigger waits until its signals exist: /gone.wave"
     )
     # The user selects another signal: the trigger is armed, and hits.
     page.ask(f"{_SIGNAL}.value = '/w2.wave'; {_SIGNAL}.onchange()")
     page.wait("scope.trigger.state === 'done' && scope.shot")
-    page.wait("document.getElementById('trouble').hidden")
+    page.wait("document.getElementById('error').hidden")
     assert page.errors == []
 
 
@@ -152,14 +152,14 @@ def test_a_new_layout_or_runner_disarms_the_trigger(
             page.wait("scope.catalog.some((each) => each.name === '/other.wave')")
             assert page.ask("[scope.trigger.state, scope.trigger.armed]") == ["off", []]
             assert page.ask(f"{_SIGNAL}.selectedOptions[0].text") == "/w3.wave (not there)"
-            assert page.ask("document.getElementById('trouble').textContent") == (
+            assert page.ask("document.getElementById('error').textContent") == (
                 "signals omitted until they exist: /w0.phase"
             )
         finally:
             client.remove_runner("second")
-    page.wait("document.getElementById('trouble').textContent.includes('second')")
+    page.wait("document.getElementById('error').textContent.includes('second')")
     _choose_runner(page, "rt_runner")
-    page.wait("document.getElementById('trouble').hidden && scope.catalog.length > 2")
+    page.wait("document.getElementById('error').hidden && scope.catalog.length > 2")
     _press(page, "#trigger [name=arm]")
     page.wait("scope.trigger.state === 'armed'")
     saved = _TRIGGER.format("/w4.wave", 1e9).replace('"single":true', '"single":false')
@@ -185,7 +185,7 @@ def test_the_legend_of_a_shot_shows_the_values_at_its_hit(
         """(async () => {
           const { figure } = await import("/page/drawing/axes.js");
           const { store } = scope.shot, column = store.column("/w0.phase");
-          scope.panes[0].tell();
+          scope.panes[0].update();
           return [scope.panes[0].traces[0].value.textContent,
             figure(column.get(store.nearest(0)), ""), figure(column.get(store.end - 1), "")];
         })()"""
@@ -218,7 +218,7 @@ def test_an_invalid_bookmark_opens(visit: Opener, scope: ScopeProcess) -> None:
     ):  # fmt: skip
         page = visit(scope, layout)
         page.wait("scope.rate && scope.catalog.length > 2")
-        assert page.ask("document.getElementById('trouble').hidden")
+        assert page.ask("document.getElementById('error').hidden")
         assert page.errors == []
 
 
@@ -243,7 +243,7 @@ def test_cycles_before_a_page_opens_do_not_count_as_dropped(
         page = visit(scope, '{"panes":[{"traces":["/w5.wave"]}]}')
         page.wait("scope.live.end > 1000")
         assert page.ask("scope.live.lost") == 0
-        assert "not seen" not in page.ask("document.getElementById('figures').textContent")
+        assert "not seen" not in page.ask("document.getElementById('counters').textContent")
         page.ask("scope.toggle('/w5.wave')")
         page.wait("scope.traces().length === 0")
 

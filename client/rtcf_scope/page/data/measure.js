@@ -1,4 +1,4 @@
-// What a stretch of a trace is, in figures.
+// Measurements of a part of a trace.
 const MOST = 400_000; // values
 
 // The values of a column between two times, those that are no numbers left out. The arrays are used

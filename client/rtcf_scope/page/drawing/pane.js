@@ -2,7 +2,7 @@
 import { figure } from "./axes.js";
 import { drawMark, Marks } from "./marks.js";
 import { colour, ink, isInSymbol, symbol } from "./palette.js";
-import { drawColumns, newsOf } from "./picture.js";
+import { drawColumns, changesOf } from "./columns.js";
 import { Raster } from "./raster.js";
 import { Readout } from "./readout.js";
 import { Scale } from "./scale.js";
@@ -92,7 +92,7 @@ export class Pane {
   #on(axis) { return this.traces.filter((each) => this.axisOf(each) === axis); }
   #scaleOf(trace) { return { left: this.left, right: this.right }[this.axisOf(trace)] ?? trace.own; }
 
-  // Rebuilds the legend after a change of traces. `tell` updates its values.
+  // Rebuilds the legend after a change of traces. `update` updates its values.
   describe() {
     this.content = this.#contents();
     this.legend.replaceChildren(...this.traces.map((trace) => this.#chip(trace)));
@@ -103,7 +103,7 @@ export class Pane {
     }
     this.face.setAttribute("aria-label", `traces ${this.traces.map((each) => each.name).join(", ")}`);
     this.scope.arrange();
-    this.tell();
+    this.update();
   }
 
   #contents() { return this.traces.map((each) => `${each.name} ${each.number} ${this.axisOf(each)}`).join("\n"); }
@@ -141,7 +141,7 @@ export class Pane {
   }
 
   // The values at cursor A, at the hit of a trigger, or the newest ones; and the scales that have no axis.
-  tell() {
+  update() {
     const { scope } = this, { a } = scope.cursors;
     const store = scope.sources()[0];
     const at = a === null ? scope.readAt : store.nearest(a);
@@ -241,7 +241,7 @@ export class Pane {
     const key = [sight.seconds, sight.height, sight.ratio, sight.low, sight.high, sight.ruler.state, document.documentElement.dataset.theme,
       ...sources.map((each) => each.serial), this.content,
       ...drawn.map((each) => `${each.sight.low} ${each.sight.high} ${each.sight.top} ${each.sight.bottom}`)].join(" ");
-    this.tiles.show(sight, key, newsOf(sight, sources, drawn), (raster, base, from, to) => drawColumns(raster, sight, base, from, to, sources, drawn));
+    this.tiles.show(sight, key, changesOf(sight, sources, drawn), (raster, base, from, to) => drawColumns(raster, sight, base, from, to, sources, drawn));
     this.times.show(sight);
     this.values.show(left, sight, this.#units("left"));
     this.rightValues.show(right, sight, this.#units("right"), this.#rightInk());
@@ -263,10 +263,10 @@ export class Pane {
 
   // The values that the trigger compares with, and where they are, if its signal is here.
   #thresholds(drawn) {
-    const { trigger: { told }, mode } = this.scope;
-    const sight = drawn.find(({ name }) => name === told.signal)?.sight;
-    if (mode !== "trigger" || !sight || !["edge", "level", "window"].includes(told.kind)) return [];
-    return (told.kind === "window" ? [told.low, told.high] : [told.low]).filter((level) => level >= sight.low && level <= sight.high)
+    const { trigger: { settings }, mode } = this.scope;
+    const sight = drawn.find(({ name }) => name === settings.signal)?.sight;
+    if (mode !== "trigger" || !sight || !["edge", "level", "window"].includes(settings.kind)) return [];
+    return (settings.kind === "window" ? [settings.low, settings.high] : [settings.low]).filter((level) => level >= sight.low && level <= sight.high)
       .map((level) => ({ level, y: Math.round(sight.y(level)) }));
   }
 

@@ -4,7 +4,7 @@ import { LEFT, TOP } from "./values.js";
 
 const DRAG = 4; // pixels that make a click a drag
 
-export function minded(pane, scope) {
+export function bindPointer(pane, scope) {
   const { face } = pane;
   let held = null;
   const place = ({ clientX, clientY }) => {

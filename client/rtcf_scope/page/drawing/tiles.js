@@ -14,9 +14,9 @@ export class Tiles {
     this.raster = null;
   }
 
-  // Draws all tiles again if `key` has changed. `news` comes from newsOf() in picture.js; its `stamp`
-  // changes with new cycles.
-  show(sight, key, news, draw) {
+  // Draws all tiles again if `key` has changed. `changes` comes from changesOf() in columns.js; its
+  // `stamp` rises with new cycles.
+  show(sight, key, changes, draw) {
     this.strip.move(sight);
     if (key !== this.key) this.#begin(sight, key);
     const begin = Math.floor(sight.first / WIDE), end = Math.floor((sight.first + sight.width - 1) / WIDE);
@@ -25,7 +25,7 @@ export class Tiles {
     for (let number = begin; number <= end; number++) {
       const tile = there.get(number) ?? this.#take(others.pop(), number);
       if (tile.place !== this.strip.number) { tile.place = this.strip.number; tile.canvas.style.left = this.strip.left(number * WIDE); }
-      this.#tell(tile, news, draw);
+      this.#update(tile, changes, draw);
     }
     // One more than fill the view is used again and again.
     for (const tile of others.slice(1)) {
@@ -63,7 +63,7 @@ export class Tiles {
     Object.assign(tile, { number: NaN, place: NaN });
   }
 
-  #tell(tile, { stamp, final, drawn, held, gone }, draw) {
+  #update(tile, { stamp, final, drawn, held, gone }, draw) {
     const base = tile.number * WIDE;
     let from = tile.ready, to = WIDE;
     if (base < held && !tile.old) from = 0; // some of its cycles are gone

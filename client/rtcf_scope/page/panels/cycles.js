@@ -9,7 +9,7 @@ const AREA = { left: 64, top: 8, right: 12, bottom: 22 };
 const STACK = 26; // pixels of the bar of components
 
 export class Cycles {
-  constructor(scope, canvas) { this.scope = scope; this.canvas = canvas; this.figures = null; }
+  constructor(scope, canvas) { this.scope = scope; this.canvas = canvas; this.statistics = null; }
 
   show() {
     const { canvas, scope } = this;
@@ -81,8 +81,8 @@ export class Cycles {
 
   // A mean cycle, component by component in the order of the schedule.
   #components(g, top, w) {
-    if (!this.figures) return;
-    const all = Object.entries(this.figures.components);
+    if (!this.statistics) return;
+    const all = Object.entries(this.statistics.components);
     const sum = all.reduce((total, [, each]) => total + each.mean, 0);
     if (!(sum > 0)) return;
     let left = AREA.left;
@@ -96,6 +96,6 @@ export class Cycles {
       left += wide;
     });
     g.fillStyle = ink("soft");
-    g.fillText(`mean of update(), component by component: ${scaled(sum / 1e6, "s")} of a cycle's ${scaled(this.figures.duration.mean / 1e6, "s")}`, AREA.left, top + STACK + 4);
+    g.fillText(`mean of update(), component by component: ${scaled(sum / 1e6, "s")} of a cycle's ${scaled(this.statistics.duration.mean / 1e6, "s")}`, AREA.left, top + STACK + 4);
   }
 }

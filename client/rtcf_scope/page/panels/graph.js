@@ -12,9 +12,9 @@ export class Graph {
   constructor(box, values) { // values(component): a promise of the values of its ports
     this.box = box;
     this.values = values;
-    this.told = { components: [], connections: [] };
-    this.figures = null;
-    this.columns = 0; // of the picture; 0 = there is none
+    this.graph = { components: [], connections: [] };
+    this.statistics = null;
+    this.columns = 0; // of the drawing; 0 = there is none
     this.nodes = new Map();
     this.says = document.createElement("p");
     this.says.className = "says";
@@ -22,7 +22,7 @@ export class Graph {
   }
 
   show({ components, connections }) {
-    this.told = { components, connections };
+    this.graph = { components, connections };
     this.#draw();
   }
 
@@ -36,7 +36,7 @@ export class Graph {
   #draw() {
     this.columns = this.#room();
     if (!this.columns) return;
-    const components = [...this.told.components].sort((a, b) => a.position - b.position);
+    const components = [...this.graph.components].sort((a, b) => a.position - b.position);
     const links = this.#links(components);
     const cells = place(components.map((each) => each.name), links, this.columns);
     const ends = [...cells.values()];
@@ -50,13 +50,13 @@ export class Graph {
     const breaks = links.some((each) => each.broken) ? " Dashed, 1/z: a loop break, the value of the cycle before." : "";
     this.says.textContent = components.length ? `Point at a component or a connection.${breaks}` : "The graph is empty.";
     this.box.replaceChildren(this.says, ...(components.length ? [svg] : []));
-    if (this.figures) this.tell(this.figures);
+    if (this.statistics) this.showStatistics(this.statistics);
   }
 
   #links(components) {
     const known = new Set(components.map((each) => each.name));
     // An input that nothing feeds has no line.
-    return this.told.connections.filter((each) => each.writer || each.subscribed).flatMap((connection) => connection.readers
+    return this.graph.connections.filter((each) => each.writer || each.subscribed).flatMap((connection) => connection.readers
       .filter(([reader]) => known.has(reader))
       .map(([reader, port, broken]) => ({
         net: connection.name, writer: known.has(connection.writer?.[0]) ? connection.writer[0] : null, reader, broken, port, connection,
@@ -64,10 +64,10 @@ export class Graph {
   }
 
   // Colours each component by its share of a cycle.
-  tell(figures) {
-    this.figures = figures;
-    const most = Math.max(...Object.values(figures.components).map((each) => each.mean), 1e-9);
-    for (const [name, { mean, overruns }] of Object.entries(figures.components)) {
+  showStatistics(statistics) {
+    this.statistics = statistics;
+    const most = Math.max(...Object.values(statistics.components).map((each) => each.mean), 1e-9);
+    for (const [name, { mean, overruns }] of Object.entries(statistics.components)) {
       const node = this.nodes.get(name);
       if (!node) continue;
       node.rect.style.fillOpacity = 0.08 + 0.5 * mean / most;

@@ -1,4 +1,4 @@
-// Figures of each trace, between the cursors or of all that is in sight.
+// Measurements of each trace, between the cursors or of the visible part.
 import { figure, scaled } from "../drawing/axes.js";
 import { measured } from "../data/measure.js";
 import { colour } from "../drawing/palette.js";

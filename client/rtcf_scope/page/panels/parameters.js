@@ -4,9 +4,9 @@ import { ask, query } from "../server.js";
 const UNDONE = 100; // changes that can be undone
 
 export class Parameters {
-  constructor(box, told) { // told: right, runner(), trouble(text)
+  constructor(box, page) { // page: right, runner(), setError(text)
     this.box = box;
-    this.told = told;
+    this.page = page;
     this.fields = new Map(); // "component.parameter" -> function(value)
     this.values = new Map(); // "component.parameter" -> the value from rtcfd
     this.done = []; // {component, name, before}, of this page, newest last
@@ -22,10 +22,10 @@ export class Parameters {
     try {
       await this.#set(component, name, before);
       this.fields.get(`${component}.${name}`)?.(before);
-      this.told.trouble("");
+      this.page.setError("");
     } catch (error) {
       this.done.push(change);
-      this.told.trouble(error.message);
+      this.page.setError(error.message);
     }
     this.#offer();
   }
@@ -37,7 +37,7 @@ export class Parameters {
   }
 
   async #set(component, name, value) {
-    await ask(`/api/parameter?${query({ runner: this.told.runner() })}`, {
+    await ask(`/api/parameter?${query({ runner: this.page.runner() })}`, {
       method: "POST", headers: { "Content-Type": "application/json" },
       body: JSON.stringify({ component, parameter: name, value }),
     });
@@ -51,7 +51,7 @@ export class Parameters {
     this.box.replaceChildren(this.undoing);
     this.#offer();
     for (const component of with_) for (const { name, value } of component.parameters) this.values.set(`${component.name}.${name}`, value);
-    if (this.told.right === "observe" && with_.length) {
+    if (this.page.right === "observe" && with_.length) {
       const hint = document.createElement("p");
       hint.className = "hint";
       hint.textContent = "Only to look at: rtcfctl scope --right tune lets you set them.";
@@ -70,7 +70,7 @@ export class Parameters {
   }
 
   // Shows changed values, without rebuilding the fields.
-  tell(components) {
+  update(components) {
     for (const component of components)
       for (const { name, value } of component.parameters) {
         this.values.set(`${component.name}.${name}`, value);
@@ -79,7 +79,7 @@ export class Parameters {
   }
 
   async who() {
-    const changes = await ask(`/api/history?${query({ runner: this.told.runner() })}`);
+    const changes = await ask(`/api/history?${query({ runner: this.page.runner() })}`);
     const seen = new Set();
     for (const { component, parameter, who, how, time_ns } of changes) {
       const key = `${component}.${parameter}`;
@@ -99,7 +99,7 @@ export class Parameters {
     const field = this.#field(parameter);
     const key = `${component}.${parameter.name}`;
     field.dataset.key = key;
-    field.disabled = this.told.right === "observe";
+    field.disabled = this.page.right === "observe";
     const unit = document.createElement("small");
     unit.textContent = parameter.unit;
     const who = document.createElement("em");
@@ -124,44 +124,44 @@ export class Parameters {
       row.append(ends);
     }
     row.append(who);
-    this.#mind(component, parameter, field, slider);
+    this.#bind(component, parameter, field, slider);
     return row;
   }
 
-  #mind(component, parameter, field, slider) {
+  #bind(component, parameter, field, slider) {
     const read = (input) => parameter.type === "bool" ? input.checked
       : parameter.type === "int" || parameter.type === "double" ? Number(input.value) : input.value;
-    // One at a time, so that the last one said is the last one set.
-    let saying = false, next;
-    const say = async (value) => {
+    // One at a time, so that the newest value is set last.
+    let isSetting = false, next;
+    const setNext = async (value) => {
       next = { value };
-      if (saying) return;
-      saying = true;
+      if (isSetting) return;
+      isSetting = true;
       while (next) {
         const { value } = next;
         next = undefined;
         await set(value);
       }
-      saying = false;
+      isSetting = false;
     };
     const set = async (value) => {
       const before = this.values.get(`${component}.${parameter.name}`);
       try {
         await this.#set(component, parameter.name, value);
         field.classList.remove("wrong");
-        this.told.trouble("");
+        this.page.setError("");
         if (before !== value) this.done = [...this.done.slice(1 - UNDONE), { component, name: parameter.name, before }];
         this.#offer();
       } catch (error) {
         field.classList.add("wrong");
-        this.told.trouble(error.message);
+        this.page.setError(error.message);
       }
     };
-    field.onchange = () => { if (slider) slider.value = field.value; say(read(field)); };
+    field.onchange = () => { if (slider) slider.value = field.value; setNext(read(field)); };
     if (slider) {
       // Dragging shows the value; releasing it sets it.
       slider.oninput = () => { field.value = slider.value; };
-      slider.onchange = () => say(read(slider));
+      slider.onchange = () => setNext(read(slider));
     }
     this.fields.set(`${component}.${parameter.name}`, (value) => {
       if (document.activeElement === field || document.activeElement === slider) return;

@@ -4,10 +4,10 @@ import { sources } from "../data/derived.js";
 import { Store } from "../data/store.js";
 
 export class Recordings {
-  constructor(scope, box, trouble) {
+  constructor(scope, box, setError) {
     this.scope = scope;
     this.box = box;
-    this.trouble = trouble;
+    this.setError = setError;
     this.open = []; // {name, signals, beginNs, shift}
     this.shift = null; // the field for it, where there are two
     scope.onShift = (seconds) => {
@@ -54,8 +54,8 @@ export class Recordings {
     button("Clock", "the same clock: as they were recorded", () => scope.shiftSecond(Number(second.beginNs - first.beginNs) / 1e9));
     button("A → B", "moves what is at cursor A to cursor B", () => {
       const { a, b } = scope.cursors;
-      if (a === null || b === null) { this.trouble("set cursor A (click) on the second recording and cursor B (Shift and click) on the first"); return; }
-      this.trouble("");
+      if (a === null || b === null) { this.setError("set cursor A (click) on the second recording and cursor B (Shift and click) on the first"); return; }
+      this.setError("");
       scope.shiftSecond(scope.recordings[1].shift + b - a);
     });
     const hint = element("p", "hint");
@@ -78,7 +78,7 @@ export class Recordings {
       for (const each of this.open) each.shift = 0;
       await this.load();
       await this.show();
-    } catch (error) { this.trouble(error.message); }
+    } catch (error) { this.setError(error.message); }
   }
 
   // Reads the traces of the panes.
@@ -90,10 +90,10 @@ export class Recordings {
   }
 
   // Reads each cycle in sight where all of a recording is too much; called a few times a second.
-  async look() {
+  async loadVisible() {
     try {
-      for (const each of this.scope.recordings) if (await each.look()) this.scope.changed();
-    } catch (error) { this.trouble(error.message); }
+      for (const each of this.scope.recordings) if (await each.loadVisible()) this.scope.changed();
+    } catch (error) { this.setError(error.message); }
   }
 
   // The signals of the open recordings, by name.
@@ -127,7 +127,7 @@ class Opened {
     return begin <= view.begin - shift && end >= view.end - shift;
   }
 
-  async look() {
+  async loadVisible() {
     const { view, all, close, shift } = this;
     const fine = all.each === 1 || view.span > all.store.lastTime - all.store.firstTime;
     if (fine || this.asks || (close && this.#covers() && (close.each === 1 || view.span > (close.end - close.begin) / 8))) return false;

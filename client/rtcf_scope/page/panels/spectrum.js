@@ -4,7 +4,7 @@ import { blank } from "../drawing/canvas.js";
 import { highest, peak, spectrum } from "../data/fft.js";
 import { values } from "../data/measure.js";
 import { colour, ink } from "../drawing/palette.js";
-import { Seldom } from "./seldom.js";
+import { Throttle } from "./throttle.js";
 
 const AREA = { left: 64, top: 8, right: 12, bottom: 22 };
 const DECADES = 5;
@@ -16,7 +16,7 @@ export class Spectrum {
     this.pointer = null;
     this.isLog = true;
     this.found = [];
-    this.seldom = new Seldom();
+    this.throttle = new Throttle();
     canvas.onpointermove = (event) => { this.pointer = event.offsetX; this.#draw(); };
     canvas.onpointerleave = () => { this.pointer = null; this.#draw(); };
     this.button = document.createElement("button");
@@ -26,7 +26,7 @@ export class Spectrum {
   }
 
   show() {
-    this.seldom.run(() => { this.found = this.#spectra(); });
+    this.throttle.run(() => { this.found = this.#spectra(); });
     this.#draw();
   }
 

@@ -5,7 +5,7 @@ import { figure } from "../drawing/axes.js";
 const SLOPES = { edge: ["rising", "falling", "either"], level: ["above", "below"], window: ["leaves", "enters"], nan: [], condition: [] };
 
 export class TriggerPanel {
-  constructor(scope, box, arm) { // arm(told or null)
+  constructor(scope, box, arm) { // arm(settings or null)
     this.scope = scope;
     this.box = box;
     this.arm = arm;
@@ -18,36 +18,36 @@ export class TriggerPanel {
 
   // Fills in the available signals and the settings.
   show() {
-    const { told } = this.scope.trigger;
-    if (!(told.kind in SLOPES)) told.kind = "edge";
+    const { settings } = this.scope.trigger;
+    if (!(settings.kind in SLOPES)) settings.kind = "edge";
     this.#signals();
     for (const name of ["kind", "low", "high", "single", "window", "position", "holdoff", "condition"]) {
       const input = this.part(name);
       // Leave the field in which the user types.
-      if (told[name] === undefined || input === document.activeElement) continue;
-      if (input.type === "checkbox") input.checked = told[name]; else input.value = told[name];
+      if (settings[name] === undefined || input === document.activeElement) continue;
+      if (input.type === "checkbox") input.checked = settings[name]; else input.value = settings[name];
     }
-    const slopes = SLOPES[told.kind];
-    if (!slopes.includes(told.slope)) told.slope = slopes[0] ?? "";
-    this.part("slope").replaceChildren(...slopes.map((each) => new Option(each, each, false, each === told.slope)));
+    const slopes = SLOPES[settings.kind];
+    if (!slopes.includes(settings.slope)) settings.slope = slopes[0] ?? "";
+    this.part("slope").replaceChildren(...slopes.map((each) => new Option(each, each, false, each === settings.slope)));
     this.part("slope").hidden = !slopes.length;
-    this.part("signal").parentElement.hidden = told.kind === "condition";
-    this.part("condition").hidden = told.kind !== "condition";
-    this.part("low").parentElement.hidden = told.kind === "nan" || told.kind === "condition";
-    this.part("high").parentElement.hidden = told.kind !== "window";
-    this.tell();
+    this.part("signal").parentElement.hidden = settings.kind === "condition";
+    this.part("condition").hidden = settings.kind !== "condition";
+    this.part("low").parentElement.hidden = settings.kind === "nan" || settings.kind === "condition";
+    this.part("high").parentElement.hidden = settings.kind !== "window";
+    this.showState();
   }
 
   // Those that are shown, those there are, and the one that is set, whether it is there or not.
   #signals() {
-    const { told } = this.scope.trigger;
+    const { settings } = this.scope.trigger;
     const there = this.scope.catalog.map((each) => each.name);
     // The server, which looks at the cycles, derives nothing.
     const shown = this.scope.traces().map((each) => each.name).filter((name) => !isDerived(name));
-    if (!told.signal) told.signal = shown[0] ?? there.find((name) => !name.startsWith("~")) ?? there[0] ?? "";
+    if (!settings.signal) settings.signal = shown[0] ?? there.find((name) => !name.startsWith("~")) ?? there[0] ?? "";
     const known = new Set(there);
     const are = there.some((name) => !name.startsWith("~")); // the graph is known
-    const names = [...new Set([told.signal, ...shown, ...there])].filter(Boolean);
+    const names = [...new Set([settings.signal, ...shown, ...there])].filter(Boolean);
     const options = names.map((name) => [name, are && !known.has(name) ? `${name} (not there)` : name]);
     const select = this.part("signal");
     // A list that is open stays.
@@ -55,10 +55,10 @@ export class TriggerPanel {
       this.listed = JSON.stringify(options);
       select.replaceChildren(...options.map(([name, text]) => new Option(text, name)));
     }
-    select.value = told.signal;
+    select.value = settings.signal;
   }
 
-  tell() {
+  showState() {
     const { trigger, shot, shots, shotNumber } = this.scope;
     const state = this.part("state");
     const armed = trigger.state === "armed";
@@ -73,11 +73,11 @@ export class TriggerPanel {
 
   start() {
     this.#read();
-    const { told } = this.scope.trigger;
+    const { settings } = this.scope.trigger;
     const rate = this.scope.rate || 1000;
-    const all = Math.max(2, Math.round(told.window / 1000 * rate));
-    const before = Math.round(all * told.position / 100);
-    this.arm({ ...told, before, after: Math.max(1, all - before), holdoff: Math.round(told.holdoff / 1000 * rate) });
+    const all = Math.max(2, Math.round(settings.window / 1000 * rate));
+    const before = Math.round(all * settings.position / 100);
+    this.arm({ ...settings, before, after: Math.max(1, all - before), holdoff: Math.round(settings.holdoff / 1000 * rate) });
   }
 
   disarm() { this.arm(null); }
@@ -89,12 +89,12 @@ export class TriggerPanel {
   }
 
   #read() {
-    const { told } = this.scope.trigger;
-    for (const name of ["signal", "kind", "slope", "condition"]) told[name] = this.part(name).value;
+    const { settings } = this.scope.trigger;
+    for (const name of ["signal", "kind", "slope", "condition"]) settings[name] = this.part(name).value;
     for (const name of ["low", "high", "window", "position", "holdoff"]) {
       const number = Number(this.part(name).value);
-      if (isFinite(number)) told[name] = number;
+      if (isFinite(number)) settings[name] = number;
     }
-    told.single = this.part("single").checked;
+    settings.single = this.part("single").checked;
   }
 }

@@ -2,7 +2,7 @@
 import { tickTexts, ticks } from "../drawing/axes.js";
 import { blank } from "../drawing/canvas.js";
 import { colour, ink } from "../drawing/palette.js";
-import { Seldom } from "./seldom.js";
+import { Throttle } from "./throttle.js";
 
 const AREA = { left: 64, top: 8, right: 12, bottom: 22 };
 const MOST = 40_000; // points of a curve
@@ -13,7 +13,7 @@ export class XY {
     this.scope = scope;
     this.chosen = { x: "", y: "" };
     this.isEqual = false; // one scale for both axes
-    this.seldom = new Seldom();
+    this.throttle = new Throttle();
     this.canvas = box.querySelector("canvas");
     this.says = box.querySelector("output");
     this.selects = Object.fromEntries(["x", "y"].map((axis) => {
@@ -33,12 +33,12 @@ export class XY {
   }
 
   #again() {
-    this.seldom = new Seldom();
+    this.throttle = new Throttle();
     this.show();
     this.scope.onLayout();
   }
 
-  show() { this.seldom.run(() => this.#show()); }
+  show() { this.throttle.run(() => this.#show()); }
 
   #show() {
     const { scope, chosen, says } = this, traces = scope.traces(), names = traces.map((each) => each.name);

@@ -39,21 +39,21 @@ export function drawColumns(raster, sight, base, from, to, sources, traces) {
 // The state of the columns of a sight, while cycles arrive and the oldest ones leave. Columns from
 // `final` on may still change, from `drawn` on they are empty; before `gone` they are empty again, and
 // between `gone` and `held` cycles are leaving.
-export function newsOf(sight, sources, traces) {
+export function changesOf(sight, sources, traces) {
   const near = reachOf(sight, traces) + 1;
-  const news = { stamp: 0, final: Infinity, drawn: -Infinity, held: -Infinity, gone: -Infinity };
+  const changes = { stamp: 0, final: Infinity, drawn: -Infinity, held: -Infinity, gone: -Infinity };
   for (const store of sources) {
-    news.stamp += store.end;
-    if (store.end - store.begin < 2) { news.final = -Infinity; news.drawn = Infinity; continue; }
+    changes.stamp += store.end;
+    if (store.end - store.begin < 2) { changes.final = -Infinity; changes.drawn = Infinity; continue; }
     // The shape of the line to the last cycle depends on the next one.
-    news.final = Math.min(news.final, Math.floor(sight.column(store.time(store.end - 2))) - near);
-    news.drawn = Math.max(news.drawn, Math.ceil(sight.column(store.lastTime)) + near);
+    changes.final = Math.min(changes.final, Math.floor(sight.column(store.time(store.end - 2))) - near);
+    changes.drawn = Math.max(changes.drawn, Math.ceil(sight.column(store.lastTime)) + near);
     if (store.begin === 0) continue;
     const oldest = sight.column(store.firstTime);
-    news.held = Math.max(news.held, Math.ceil(oldest) + near);
-    news.gone = Math.max(news.gone, Math.floor(oldest) - near);
+    changes.held = Math.max(changes.held, Math.ceil(oldest) + near);
+    changes.gone = Math.max(changes.gone, Math.floor(oldest) - near);
   }
-  return news;
+  return changes;
 }
 
 function reachOf({ ratio }, traces) { return reach(ratio, traces.some(({ number }) => symbol(number))); }

@@ -1,7 +1,7 @@
 // Runs an expensive function less often the longer it takes: at most a tenth of the time.
 const SHARE = 0.1;
 
-export class Seldom {
+export class Throttle {
   constructor() { this.next = 0; }
 
   run(does) {
