@@ -33,6 +33,13 @@ MOTOR: dict[str, Any] = {"inertia": 0.05, "viscous": 0.5, "step": 5e-4}
 ELASTIC: dict[str, Any] = {**MOTOR, "load_inertia": 0.1, "stiffness": 200.0, "damping": 0.5}
 DRY: dict[str, Any] = {"coulomb": 0.5, "static_friction": 0.9, "stribeck_velocity": 0.5}
 WINDING: dict[str, Any] = {"drive": "voltage", "torque_constant": 0.5, "resistance": 0.4}
+# A command that pauses twice.
+COMMAND = _MASKED.array(SIGNAL, mask=(CYCLE % 900 > 250) & (CYCLE % 900 < 400))
+PAUSES: dict[str, Any] = {"timeout": 0.05, "safe_value": 0.2, "stop_rate": 20.0, "resume_rate": 9.0}
+ANGLE = 1.2 * np.sin(0.01 * CYCLE)
+ANGLE[[200, 1300]] = np.nan, np.inf
+JOINT: dict[str, Any] = {"lower": -1.0, "upper": 1.1, "max_velocity": 6.0, "deceleration": 30.0}
+SOFT: dict[str, Any] = {**JOINT, "soft_lower": -0.8, "soft_upper": 0.9}
 EXCITED: dict[str, Any] = {"lower": -9.0, "upper": 9.0, "duration": 0.3}
 
 # By pair: the parameters of both, and of the one in C++ if they differ.
@@ -72,6 +79,13 @@ PAIRS: list[tuple[str, str, Mapping[str, Any], Mapping[str, Any] | None]] = [
        {**EXCITED, "shape": shape, "frequency": 30.0})
       for shape in ("prbs", "linear_chirp", "log_chirp")),
     ("Excitation", "Excitation", {}, None),
+    ("CommandTimeout", "CommandTimeout", PAUSES, None),
+    ("CommandTimeout", "CommandTimeout", {**PAUSES, "latching": False}, None),
+    ("JointLimiter", "JointLimiter", {}, None),
+    ("JointLimiter", "JointLimiter", {**SOFT, "command": "velocity"}, None),
+    ("JointLimiter", "JointLimiter", {**JOINT, "command": "effort", "max_effort": 1.0}, None),
+    ("JointLimiter", "JointLimiter", {**SOFT, "command": "effort", "k_velocity": 0.3}, None),
+    ("JointLimiter", "JointLimiter", SOFT, None),
 ]  # fmt: skip
 # By component in C++: its ports and those in Python, and the values of inputs.
 INPUTS: dict[str, dict[str, tuple[str, Any]]] = {
@@ -84,6 +98,12 @@ INPUTS: dict[str, dict[str, tuple[str, Any]]] = {
         "run": ("run", RUN),
         "stop": ("stop_now", CYCLE % 900 > 890),
     },
+    "CommandTimeout": {"in": ("u", COMMAND), "reset": ("reset", RESET)},
+    "JointLimiter": {
+        "in": ("u", SIGNAL),
+        "position": ("position", ANGLE),
+        "velocity": ("velocity", 12.0 * np.cos(0.01 * CYCLE)),
+    },
 }
 OUTPUTS = {
     "Saturation": {"out": "y", "saturated": "saturated"},
@@ -92,6 +112,8 @@ OUTPUTS = {
     "Motor": {
         name: name for name in ("position", "velocity", "load_position", "load_velocity", "torque")
     },
+    "CommandTimeout": {"stopped": "stopped", "state": "state", "age": "age", "out": "y"},
+    "JointLimiter": {"out": "y", "limited": "limited"},
     "Excitation": {"signal": "signal", "state": "state", "running": "running", "out": "y"},
 }
 
