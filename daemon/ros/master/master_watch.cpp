@@ -183,7 +183,7 @@ void MasterWatch::serve(const executor::BridgeSettings& looked) {
     link_.tell();
     setConnected();
     if (result == Reconciled::Again) wake();
-    for (const std::string& refusal : subjects_.refusals()) say(refusal);
+    for (const std::string& rejection : subjects_.newRejections()) say(rejection);
 }
 
 // Closes all topics and withdraws all registrations. The node stays, because roscpp cannot be

@@ -56,7 +56,7 @@ void Subjects::show(executor::BridgeStatus& status) const {
 
 Reconciled Subjects::reconcile(MasterLink& link, const executor::BridgeSettings& settings) {
     open_ = true;
-    if (refusals_ == nullptr) refusals_ = std::make_unique<Refusals>();
+    if (rejected_ == nullptr) rejected_ = std::make_unique<RejectedConnections>();
     if (link.takeNew()) reconfiguring_.forget();
     ros::NodeHandle& handle = link.node().handle();
     if (introspection_)

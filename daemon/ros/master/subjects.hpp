@@ -20,7 +20,7 @@
 #include "ros/runner/introspection.hpp"
 #include "ros/topics/publishing.hpp"
 #include "ros/topics/subscribing.hpp"
-#include "ros/transport/refusals.hpp"
+#include "ros/transport/rejected_connections.hpp"
 
 namespace rtcf::ros1 {
 
@@ -61,15 +61,15 @@ class Subjects {
     void drop() { publishing_.setTaps({}); }
 
     /// Rejected connections that have not been reported yet.
-    std::vector<std::string> refusals() {
-        return refusals_ ? refusals_->take() : std::vector<std::string>();
+    std::vector<std::string> newRejections() {
+        return rejected_ ? rejected_->take() : std::vector<std::string>();
     }
     /// A warning although everything is open: an unknown version of roscpp, a namespace of another
     /// node, or a rejected connection. Empty = none.
     std::string notice() const {
         if (!broken_.empty()) return broken_.front();
         if (!claim_.problem().empty()) return claim_.problem();
-        return refusals_ ? refusals_->recent() : std::string();
+        return rejected_ ? rejected_->recent() : std::string();
     }
 
    private:
@@ -82,7 +82,7 @@ class Subjects {
     std::unique_ptr<Introspection> introspection_;  // null without a runner
     const std::vector<std::string> broken_ = broken(dependences());
     Claim claim_;
-    std::unique_ptr<Refusals> refusals_;  // since the start of the node
+    std::unique_ptr<RejectedConnections> rejected_;  // since the start of the node
     bool open_ = false;
 };
 

@@ -231,10 +231,10 @@ void ParameterMirror::ask(const std::string& component, executor::ParameterBatch
         pending_->asked.insert(component);
     }
     request_(component, std::move(batch),
-             [pending = pending_, name = component](const std::string& refusal) {
+             [pending = pending_, name = component](const std::string& error) {
                  const std::lock_guard lock(pending->mutex);
                  pending->asked.erase(name);
-                 if (!refusal.empty()) pending->refused.insert(name);
+                 if (!error.empty()) pending->refused.insert(name);
              });
 }
 

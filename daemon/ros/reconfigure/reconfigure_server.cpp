@@ -113,7 +113,7 @@ bool ReconfigureServer::change(const dynamic_reconfigure::ReconfigureRequest& as
         const auto done = std::make_shared<std::promise<bool>>();
         std::future<bool> outcome = done->get_future();
         request_(before->full_name, std::move(batch),
-                 [done](const std::string& refusal) { done->set_value(!refusal.empty()); });
+                 [done](const std::string& error) { done->set_value(!error.empty()); });
         const auto deadline = std::chrono::steady_clock::now() + kPatience;
         while (outcome.wait_for(kSlice) != std::future_status::ready) {
             // A hook hangs: the result is unknown.

@@ -56,7 +56,7 @@ const std::vector<Dependence>& dependences() {
     constexpr const char* kRoscpp = "libroscpp.so";
     constexpr const char* kRosconsole = "librosconsole";
     constexpr const char* kLevels = "levels of loggers, ROS_* messages in the log";
-    constexpr const char* kRefusals = "reports of rejected connections";
+    constexpr const char* kRejections = "reports of rejected connections";
     constexpr const char* kNetworkMemory = "limits on network memory";
     constexpr auto kFunction = Dependence::Kind::Function;
     static const std::vector<Dependence> list{
@@ -106,10 +106,10 @@ const std::vector<Dependence>& dependences() {
          "cEEENS0_6levels5LevelE",
          kRosconsole, kLevels},
         {kFunction, "_ZN3ros7console4impl17register_appenderEPNS0_11LogAppenderE", kRosconsole,
-         kRefusals},
+         kRejections},
         {kFunction, "_ZN3ros7console4impl19deregister_appenderEPNS0_11LogAppenderE", kRosconsole,
-         kRefusals},
-        // Refusals::log() searches for this text, the only sign of a rejection.
+         kRejections},
+        // RejectedConnections::log() searches for this text, the only sign of a rejection.
         {Dependence::Kind::Text, "error message in header", kRoscpp,
          "reports of subscriptions rejected by a peer"},
         // Also for " wants topic ", which compilers embed in code, so it cannot be found here.

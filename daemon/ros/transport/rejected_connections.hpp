@@ -14,12 +14,12 @@
 namespace rtcf::ros1 {
 
 /// Collects rejections during its life. Owned by Subjects; called in roscpp's threads.
-class Refusals final : private ros::console::LogAppender {
+class RejectedConnections final : private ros::console::LogAppender {
    public:
-    Refusals();
-    ~Refusals() override;
-    Refusals(const Refusals&) = delete;
-    Refusals& operator=(const Refusals&) = delete;
+    RejectedConnections();
+    ~RejectedConnections() override;
+    RejectedConnections(const RejectedConnections&) = delete;
+    RejectedConnections& operator=(const RejectedConnections&) = delete;
 
     /// Rejections since the last call, each text once.
     std::vector<std::string> take();

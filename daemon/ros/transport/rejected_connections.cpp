@@ -1,27 +1,27 @@
-#include "ros/transport/refusals.hpp"
+#include "ros/transport/rejected_connections.hpp"
 
 #include <string_view>
 #include <utility>
 
 namespace rtcf::ros1 {
 
-Refusals::Refusals() { ros::console::register_appender(this); }
+RejectedConnections::RejectedConnections() { ros::console::register_appender(this); }
 
-Refusals::~Refusals() { ros::console::deregister_appender(this); }
+RejectedConnections::~RejectedConnections() { ros::console::deregister_appender(this); }
 
-std::vector<std::string> Refusals::take() {
+std::vector<std::string> RejectedConnections::take() {
     const std::lock_guard lock(mutex_);
     return std::exchange(fresh_, {});
 }
 
-std::string Refusals::recent() const {
+std::string RejectedConnections::recent() const {
     const std::lock_guard lock(mutex_);
     const bool recent = std::chrono::steady_clock::now() - last_time_ < std::chrono::minutes(1);
     return recent ? last_ : std::string();
 }
 
-void Refusals::log(ros::console::Level level, const char* text, const char* /*file*/,
-                   const char* /*function*/, int /*line*/) {
+void RejectedConnections::log(ros::console::Level level, const char* text, const char* /*file*/,
+                              const char* /*function*/, int /*line*/) {
     if (level < ros::console::levels::Error || text == nullptr) return;
     // This node is the publisher (first text) or the subscriber (second text) of a mismatched pair.
     const std::string_view view(text);
