@@ -114,14 +114,14 @@ def jitter(cycles: Cycles, period_ns: float) -> list[float]:
 
 
 def summary(values_ns: Sequence[float]) -> dict[str, float]:
-    """Return the figures of a distribution, in µs."""
+    """Return mean, quantiles and extremes of the values, in µs."""
     ordered = sorted(values_ns)
-    figures = {"min": ordered[0], "mean": sum(ordered) / len(ordered)}
+    result = {"min": ordered[0], "mean": sum(ordered) / len(ordered)}
     for name, quantile in _QUANTILES.items():
         # The smallest value that so many are not above.
-        figures[name] = ordered[min(len(ordered) - 1, int(quantile * len(ordered)))]
-    figures["max"] = ordered[-1]
-    return {name: round(value * _US, 3) for name, value in figures.items()}
+        result[name] = ordered[min(len(ordered) - 1, int(quantile * len(ordered)))]
+    result["max"] = ordered[-1]
+    return {name: round(value * _US, 3) for name, value in result.items()}
 
 
 def evaluate(cycles: Cycles, frequency: float) -> dict[str, Any]:

@@ -133,11 +133,11 @@ class Client(Closing):
 
         Raises nothing.  Returns the result of each loop, sorted by runner.
         """
-        trouble: RtcfError | None = None
+        direct: RtcfError | None = None
         try:
             stopped = {each.runner: each for each in direct_stop.stop_all(self.socket)}
         except RtcfError as error:
-            stopped, trouble = {}, error
+            stopped, direct = {}, error
         try:
             runners = [
                 each.runner for each in self.get_status(timeout_s=direct_stop.PATIENCE_S).runners
@@ -145,9 +145,7 @@ class Client(Closing):
         except RtcfError as error:
             if not stopped:
                 # Without access to the executors either, rtcfd's error names the remedy.
-                both = (
-                    error if trouble is None else DaemonUnreachableError(str(trouble), str(error))
-                )
+                both = error if direct is None else DaemonUnreachableError(str(direct), str(error))
                 stopped[""] = direct_stop.Stopped("", both)
             runners = []
         # Include runners without an executor: one may be starting.

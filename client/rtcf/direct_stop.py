@@ -99,7 +99,7 @@ def stop_with_fallback(
         try:
             return asked.result()
         except RtcfError as error:
-            if not _is_rtcfds_trouble(error):
+            if not _concerns_rtcfd_only(error):
                 raise
             problem = str(error)
     try:
@@ -129,7 +129,7 @@ def _after_a_death(asked: "Future[control_pb2.ChangeResult]") -> control_pb2.Cha
     return control_pb2.ChangeResult(notes=[f"the loop has ended with its executor, {why}"])
 
 
-def _is_rtcfds_trouble(error: RtcfError) -> bool:
+def _concerns_rtcfd_only(error: RtcfError) -> bool:
     """Return whether an error concerns rtcfd only, so that a direct stop is worth trying."""
     if isinstance(error, RefusedError):
         return error.code in ("RESOURCE_EXHAUSTED", "UNAVAILABLE")

@@ -4,7 +4,7 @@ from rtcf.v1 import runner_pb2
 
 
 def lines(statistics: runner_pb2.RunnerStatistics, warmup_cycles: int) -> list[str]:
-    """Return the figures of a loop since its start; none of a loop that has run no cycle."""
+    """Return the lines for a loop since its start; none if it has run no cycle."""
     if not statistics.duration.count:
         return []
     return [
@@ -16,6 +16,8 @@ def lines(statistics: runner_pb2.RunnerStatistics, warmup_cycles: int) -> list[s
     ]
 
 
-def _shown(figures: runner_pb2.Distribution) -> str:
-    mean, most, least = (ns / 1000 for ns in (figures.mean_ns, figures.max_ns, figures.min_ns))
+def _shown(distribution: runner_pb2.Distribution) -> str:
+    mean, most, least = (
+        ns / 1000 for ns in (distribution.mean_ns, distribution.max_ns, distribution.min_ns)
+    )
     return f"Mean {mean:.1f} us, Max {most:.1f} us, Min {least:.1f} us"

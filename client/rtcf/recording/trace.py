@@ -153,7 +153,7 @@ class Trace:
             when = self._when(each.time_ns, each.iteration)
             self._mark(track, f"{level}: {each.message}", when, facts)
 
-    def add_figures(self, found: runner_pb2.RunnerStatistics) -> None:
+    def add_statistics(self, found: runner_pb2.RunnerStatistics) -> None:
         """Add the mean duration of each component since the last call, as a curve."""
         for each in found.components:
             count, total = each.duration.count, each.duration.count * each.duration.mean_ns

@@ -62,10 +62,10 @@ def require_cycles(found: runner_pb2.RunnerStatistics) -> None:
 
 def lines(found: runner_pb2.RunnerStatistics, width: int) -> Iterator[str]:
     """Yield histograms for a terminal; lengths of bars are logarithmic."""
-    for title, buckets, figures in _panels(found):
+    for title, buckets, distribution in _panels(found):
         if buckets:
-            yield f"{title} (µs), {_grouped(figures.count)} cycles, logarithmic bars"
-            yield from _bars(bins(buckets, _MOST_BINS, _MOST_LINES), figures, width)
+            yield f"{title} (µs), {_grouped(distribution.count)} cycles, logarithmic bars"
+            yield from _bars(bins(buckets, _MOST_BINS, _MOST_LINES), distribution, width)
             yield ""
 
 
@@ -76,11 +76,13 @@ def draw(found: runner_pb2.RunnerStatistics, file: Path) -> None:
     pyplot = image_file.pyplot_module()
     figure, axes = pyplot.subplots(1, 2, figsize=(11, 4.5), layout="constrained")
     figure.suptitle(f"{found.runner}, {_grouped(found.iterations)} cycles")
-    for axis, letter, (title, buckets, figures) in zip(axes, "ab", _panels(found), strict=True):
+    for axis, letter, (title, buckets, distribution) in zip(
+        axes, "ab", _panels(found), strict=True
+    ):
         axis.set_xlabel(f"({letter}) {title} [µs]")
         axis.set_ylabel("cycles")
         if buckets:
-            _draw(axis, title, bins(buckets, _MOST_BINS, _MOST_BINS), figures)
+            _draw(axis, title, bins(buckets, _MOST_BINS, _MOST_BINS), distribution)
     image_file.write(figure, file)
 
 
@@ -94,7 +96,9 @@ def _panels(found: runner_pb2.RunnerStatistics) -> tuple[_Panel, _Panel]:
     )
 
 
-def _draw(axis: Any, title: str, found: Sequence[Bin], figures: runner_pb2.Distribution) -> None:
+def _draw(
+    axis: Any, title: str, found: Sequence[Bin], distribution: runner_pb2.Distribution
+) -> None:
     from matplotlib import ticker
 
     axis.set_xscale("log")
@@ -109,10 +113,10 @@ def _draw(axis: Any, title: str, found: Sequence[Bin], figures: runner_pb2.Distr
         if each.count:
             rectangle.set_gid(f"{title.split()[0]} bar {each.count}")
     for (name, field), dashes in zip(_MARKS, _DASHES, strict=True):
-        value_us = max(getattr(figures, field), _LEAST_NS) / 1e3
+        value_us = max(getattr(distribution, field), _LEAST_NS) / 1e3
         line = axis.axvline(
             value_us, color="black", linewidth=1, linestyle=dashes,
-            label=f"{name}: {_edge(getattr(figures, field))} µs",
+            label=f"{name}: {_edge(getattr(distribution, field))} µs",
         )  # fmt: skip
         line.set_gid(f"{title.split()[0]} mark {name}")
     low, high = found[0].low_ns / 1e3, found[-1].high_ns / 1e3
@@ -135,10 +139,10 @@ def _draw(axis: Any, title: str, found: Sequence[Bin], figures: runner_pb2.Distr
     axis.legend(loc="upper right")
 
 
-def _bars(found: Sequence[Bin], figures: runner_pb2.Distribution, width: int) -> Iterator[str]:
+def _bars(found: Sequence[Bin], distribution: runner_pb2.Distribution, width: int) -> Iterator[str]:
     most = max(each.count for each in found)
     digits = len(_grouped(most))
-    marks = _marks(found, figures)
+    marks = _marks(found, distribution)
     edges = max(len(_edge(each.high_ns)) for each in found)
     edges = max(edges, len(_edge(found[0].low_ns)))
     room = width - (2 * edges + 5) - digits - 2 - max(map(len, marks)) - 2
@@ -158,12 +162,12 @@ def _bars(found: Sequence[Bin], figures: runner_pb2.Distribution, width: int) ->
             ).rstrip()
 
 
-def _marks(found: Sequence[Bin], figures: runner_pb2.Distribution) -> list[str]:
+def _marks(found: Sequence[Bin], distribution: runner_pb2.Distribution) -> list[str]:
     """Return the marks beside each bin; percentiles are accurate to the width of a bucket."""
     names: list[list[str]] = [[] for _ in found]
     filled = [number for number, each in enumerate(found) if each.count]
     for name, field in _MARKS:
-        value_ns = getattr(figures, field)
+        value_ns = getattr(distribution, field)
         at = next((each for each in filled if found[each].high_ns >= value_ns), filled[-1])
         names[at].append(name)
     return [", ".join(each) for each in names]

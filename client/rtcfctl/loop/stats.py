@@ -11,7 +11,7 @@ from rtcf.v1 import runner_pb2
 from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.words import amount, counted, microseconds
 
-_FIGURES = ("min_ns", "mean_ns", "p50_ns", "p99_ns", "p999_ns", "max_ns")
+_FIELDS = ("min_ns", "mean_ns", "p50_ns", "p99_ns", "p999_ns", "max_ns")
 _SHORTEST_WATCH_S, _LONGEST_WATCH_S = 0.1, 86400.0
 _HERE = Path()  # --plot without a file: draw in the terminal
 _WIDTH = 80  # columns if standard output is not a terminal
@@ -140,6 +140,6 @@ def _print(found: runner_pb2.RunnerStatistics, output: Output) -> None:
         )
 
 
-def _row(name: str, figures: runner_pb2.Distribution) -> tuple[Any, ...]:
-    values = (microseconds(getattr(figures, figure)) for figure in _FIGURES)
-    return (name, figures.count, *(values if figures.count else ("-" for _ in _FIGURES)))
+def _row(name: str, distribution: runner_pb2.Distribution) -> tuple[Any, ...]:
+    values = (microseconds(getattr(distribution, field)) for field in _FIELDS)
+    return (name, distribution.count, *(values if distribution.count else ("-" for _ in _FIELDS)))

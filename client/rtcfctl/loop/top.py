@@ -164,7 +164,7 @@ class _Layout:
 
 
 class _Means:
-    """The mean of a distribution between successive updates."""
+    """The mean of a times between successive updates."""
 
     def __init__(self) -> None:
         self.kept: deque[float] = deque(maxlen=_KEPT)
@@ -186,7 +186,7 @@ class _Top:
         self._client = client
         self._runner = runner
         self._sort = sort
-        self._trouble = ""
+        self._error = ""
         self._above = 0  # components above the visible ones
         self._room = 1  # components that fit the screen
         self.status = runner_pb2.RunnerStatus()
@@ -201,11 +201,11 @@ class _Top:
         except rtcf.RtcfError as error:
             if not self.status.runner:
                 raise
-            self._trouble = str(error)
+            self._error = str(error)
             if self.status.state == runner_pb2.RUNNER_STATE_DOWN:
                 self.found = runner_pb2.RunnerStatistics()
             return
-        self._trouble = ""
+        self._error = ""
         self._mean("~duration").take(self.found.duration)
         self._mean("~latency").take(self.found.latency)
         for each in self.found.components:
@@ -231,7 +231,7 @@ class _Top:
             elif key == "tab":
                 self._next_runner()
         except rtcf.RtcfError as error:
-            self._trouble = str(error)
+            self._error = str(error)
 
     def lines(self, width: int, height: int) -> list[str]:
         """Return the lines of the screen: head, visible components, their position, and keys."""
@@ -286,26 +286,26 @@ class _Top:
         text = _fit(f"{_short(self._runner, max(room - len(rest), 1))}{rest}", room)
         in_style = _styled(state, STYLES.get(status.state, ""))
         first = f"{text:<{room}} {clock}".replace(f"  {state} ", f"  {in_style} ", 1)
-        troubles = [
-            *([f"!! {self._trouble}"] if self._trouble else []),
+        warnings = [
+            *([f"!! {self._error}"] if self._error else []),
             *(f"!! NOT REAL TIME: {each}" for each in status.degraded),
             *([f"!! LATE: {status.late}"] if status.late else []),
             *([status.status] if status.status else []),
         ]
-        return [first, *(line for each in troubles for line in _folded(each, width, "bold red"))]
+        return [first, *(line for each in warnings for line in _folded(each, width, "bold red"))]
 
     def _cycles(self, width: int) -> list[str]:
         lines = []
-        for title, figures, name in (
+        for title, times, name in (
             ("calculation", self.found.duration, "~duration"),
             ("wake-up", self.found.latency, "~latency"),
         ):
-            if not figures.count:
+            if not times.count:
                 lines.append(f"{title:<12} no cycles yet")
                 continue
             text = (
-                f"{title:<12} mean {microseconds(figures.mean_ns):>8}  "
-                f"p99 {microseconds(figures.p99_ns):>8}  max {microseconds(figures.max_ns):>9} µs  "
+                f"{title:<12} mean {microseconds(times.mean_ns):>8}  "
+                f"p99 {microseconds(times.p99_ns):>8}  max {microseconds(times.max_ns):>9} µs  "
             )
             lately = spark(self._mean(name).kept, max(width - len(text), 0))
             lines.append(_fit((text + lately).rstrip(), width))
@@ -347,13 +347,13 @@ class _Top:
         return [_fit(self._row(each, layout, period_ns), width) for each in rows]
 
     def _row(self, each: runner_pb2.ComponentStatistics, layout: _Layout, period_ns: float) -> str:
-        figures = each.duration
-        share = figures.mean_ns * figures.count / max(self.found.iterations, 1) / period_ns
+        times = each.duration
+        share = times.mean_ns * times.count / max(self.found.iterations, 1) / period_ns
         text = f"{_short(each.component, layout.name):<{layout.name}}"
         for column in layout.columns:
-            said = column.text(each, share) if figures.count else "-"
+            said = column.text(each, share) if times.count else "-"
             text += f" {said:>{column.width}}"
-        if layout.spark and figures.count:
+        if layout.spark and times.count:
             text += " " + spark(self._mean(each.component).kept, layout.spark)
         return text
 

@@ -54,7 +54,7 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> int:
     if args.seconds and status is not None:
         latency = _measure(client, host, found, loop.cpu, args.seconds, output)
     findings.append(_judge(latency))
-    return report(findings, latency.figures, output)
+    return report(findings, latency.distribution, output)
 
 
 @dataclass(frozen=True)
@@ -64,14 +64,14 @@ class _Answer:
     runner: runner_pb2.RunnerStatus | None = None  # the selected runner
     every: Sequence[runner_pb2.RunnerStatus] = ()
     notes: Sequence[str] = ()  # notes on rtcfd itself
-    trouble: rtcf.RtcfError | None = None
+    error: rtcf.RtcfError | None = None
 
     @property
     def keeps_silent(self) -> bool:
         """Whether rtcfd may work but does not answer us, e.g. because of missing rights."""
-        if isinstance(self.trouble, rtcf.DaemonUnreachableError):
-            return self.trouble.denied
-        return self.trouble is not None
+        if isinstance(self.error, rtcf.DaemonUnreachableError):
+            return self.error.denied
+        return self.error is not None
 
 
 def _ask(client: rtcf.Client, name: str) -> _Answer:
@@ -81,7 +81,7 @@ def _ask(client: rtcf.Client, name: str) -> _Answer:
     except rtcf.RtcfError as error:
         if isinstance(error, rtcf.RefusedError) and error.code == "NOT_FOUND":
             raise  # there is no such runner
-        return _Answer(trouble=error)
+        return _Answer(error=error)
     return _Answer(runner, list(response.runners), list(response.notes))
 
 
@@ -99,8 +99,8 @@ def _loop(host: Host, found: _Answer) -> Loop:
 
 def _of_rtcfd(found: _Answer) -> list[Finding]:
     """Return the findings that rtcfd itself reports."""
-    if found.trouble is not None:
-        text = str(found.trouble)
+    if found.error is not None:
+        text = str(found.error)
         if found.keeps_silent:  # the message names the missing rights
             return [Finding("rtcfd", Grade.UNKNOWN, text, "the right to observe")]
         return [Finding("rtcfd", Grade.BAD, text, "it answers", "systemctl start rtcfd")]
@@ -122,7 +122,7 @@ def _of_rtcfd(found: _Answer) -> list[Finding]:
 class _Latency:
     """The measured wake-up latency, or the reason for no measurement."""
 
-    figures: runner_pb2.Distribution | None = None
+    distribution: runner_pb2.Distribution | None = None
     of: str = ""  # description of the measured loop
     why_not: str = ""
 
@@ -217,12 +217,12 @@ def _cpu_of(
 
 
 def _judge(latency: _Latency) -> Finding:
-    topic, figures = "wake-up latency", latency.figures
-    if figures is None:
+    topic, distribution = "wake-up latency", latency.distribution
+    if distribution is None:
         return Finding(topic, Grade.UNKNOWN, f"not measured: {latency.why_not}")
-    worst_us = figures.max_ns / 1000
+    worst_us = distribution.max_ns / 1000
     found = (
-        f"{figures.p50_ns / 1000:.1f} µs median, {figures.p999_ns / 1000:.1f} µs p99.9, "
+        f"{distribution.p50_ns / 1000:.1f} µs median, {distribution.p999_ns / 1000:.1f} µs p99.9, "
         f"{worst_us:.1f} µs worst, {latency.of}"
     )
     if worst_us <= _GOOD_US:

@@ -62,15 +62,15 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         raise rtcf.RtcfError(
             "prometheus_client not found: sudo apt install python3-prometheus-client"
         ) from None
-    figures = prometheus_client.CollectorRegistry()
-    figures.register(_Figures(lambda: rtcf.Client(args.socket)))  # type: ignore[arg-type]
+    registry = prometheus_client.CollectorRegistry()
+    registry.register(_Collector(lambda: rtcf.Client(args.socket)))  # type: ignore[arg-type]
     if args.listen is None:
         client.get_status()  # raises an error of rtcfd; collect() hides it
-        print(prometheus_client.generate_latest(figures).decode(), end="")
+        print(prometheus_client.generate_latest(registry).decode(), end="")
         return
     address, port = _place(args.listen)
     try:
-        prometheus_client.start_http_server(port, address, figures)
+        prometheus_client.start_http_server(port, address, registry)
     except OSError as error:
         raise rtcf.RtcfError(f"{address}:{port}: {error.strerror or error}") from None
     shown = f"[{address}]" if ":" in address else address
@@ -89,7 +89,7 @@ def _place(text: str) -> tuple[str, int]:
     return address or LOOPBACK, int(port)
 
 
-class _Figures:
+class _Collector:
     """A collector for prometheus_client, called by its threads; each call uses a new client."""
 
     def __init__(self, connect: Callable[[], rtcf.Client]) -> None:
@@ -203,14 +203,14 @@ def _of_components(statistics: list[runner_pb2.RunnerStatistics]) -> "Iterator[M
     for found in statistics:
         for each in found.components:
             named = (found.runner, each.component)
-            figures = each.duration
+            distribution = each.duration
             for quantile, field in _QUANTILES:
                 durations.add_sample(
                     durations.name,
                     {**dict(zip(labels, named, strict=True)), "quantile": quantile},
-                    getattr(figures, field) / 1e9,
+                    getattr(distribution, field) / 1e9,
                 )
-            durations.add_metric(named, figures.count, _sum_s(figures))
+            durations.add_metric(named, distribution.count, _sum_s(distribution))
             overruns.add_metric(named, each.overruns)
             faults.add_metric(named, each.faults)
     yield durations

@@ -57,7 +57,7 @@ class _Plot:
         self.names: list[str] = []
         self.left_out = 0
         self.over = False
-        self.trouble = ""
+        self.error = ""
 
     def take(self, batch: PortBatch) -> None:
         """Add windows.  Any thread."""
@@ -90,7 +90,7 @@ class _Plot:
         with self._lock:
             windows, names = list(self._windows), list(self.names)
         if not windows:
-            return [self.trouble or "no cycles yet"]
+            return [self.error or "no cycles yet"]
         end_ns = windows[-1].stamp_ns
         windows = [each for each in windows if end_ns - each.stamp_ns <= self._span_s * 1e9]
         values = [value for each in windows for ends in each.ends.values() for value in ends]
@@ -127,7 +127,7 @@ class _Plot:
             text = "".join(_coloured(part, owner) for part, owner in runs)
             lines.append(f"{label:>{_LABEL - 1}} {text}")
         below = f"{'':{_LABEL}}{f'-{self._span_s:g} s':<{width - _LABEL - 4}}now"
-        return [*head, *lines, self.trouble[:width] or below]
+        return [*head, *lines, self.error[:width] or below]
 
 
 def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
@@ -166,9 +166,9 @@ def _read(stream: PortStream, plot: _Plot) -> None:
     try:
         for batch in stream:
             plot.take(batch)
-        plot.trouble = "the stream has ended"
+        plot.error = "the stream has ended"
     except rtcf.RtcfError as error:
-        plot.trouble = str(error)
+        plot.error = str(error)
     finally:
         plot.over = True
 

@@ -118,7 +118,7 @@ class _Beside:
         with client.watch_events([runner]) as events, client.watch_logs(runner) as records:
             self._events: Place = events.place
             self._records: Place = records.place
-        trace.add_figures(client.get_statistics(runner))
+        trace.add_statistics(client.get_statistics(runner))
 
     def ask(self) -> None:
         """Add the events, records and statistics since the last call."""
@@ -128,7 +128,7 @@ class _Beside:
         with client.watch_logs(runner, after=self._records, until_now=True) as records:
             self._trace.add_records(records)
         self._events, self._records = events.place, records.place
-        self._trace.add_figures(client.get_statistics(runner))
+        self._trace.add_statistics(client.get_statistics(runner))
         (status,) = client.get_status(runner).runners
         self._trace.set_frequency(status.settings.frequency_hz)
 

@@ -1,4 +1,4 @@
-"""Image files: their formats, and figures of Matplotlib."""
+"""Image files: their formats, and writing plots of Matplotlib."""
 
 import io
 from collections.abc import Sequence
