@@ -189,6 +189,7 @@ class TrajectoryGenerator final : public rtcf::Component {
     rtcf::Input<sensor_msgs::JointState> target{this, "target"};
     rtcf::Queue<trajectory_msgs::JointTrajectory, 8> trajectory{this, "trajectory"};
     rtcf::Input<bool> halt{this, "halt"};
+    rtcf::Input<bool> idle{this, "idle"};
     rtcf::Output<sensor_msgs::JointState> command{this, "command", "", rtcf::Finite()};
     rtcf::Output<trajectory_msgs::JointTrajectoryPoint> point{this, "point", "", rtcf::Finite()};
     rtcf::Output<double> progress{this, "progress", "", rtcf::Finite()};
@@ -225,7 +226,7 @@ class TrajectoryGenerator final : public rtcf::Component {
     rtcf::Derived<Setup> setup_{this};
 
     rtcf::State<bool> begun_{this, "begun", false, rtcf::Doc("the start position is known")};
-    rtcf::State<bool> halted_{this, "halted", false, rtcf::Doc("stopped by the input halt")};
+    rtcf::State<bool> halted_{this, "halted", false, rtcf::Doc("stopped by halt or idle")};
     rtcf::State<std::int64_t> time_{this, "time", 0, rtcf::Unit("ns"),
                                     rtcf::Doc("time since the start")};
     rtcf::State<Task> task_{this, "task", {}, rtcf::Doc("motion to a target, or stop")};
@@ -364,6 +365,9 @@ class TrajectoryGenerator final : public rtcf::Component {
     }
 
     void update() override {
+        // Others move the joints: in each cycle, begins again where they are.
+        const bool idles = idle.read() != rtcf::DataStatus::None && idle.value();
+        if (idles && measured.read() != rtcf::DataStatus::None) begun_ = false;
         const std::int64_t last = begun_ ? time_.value() : 0;  // of the present motion
         if (!begun_) {
             if (!begin()) return;
@@ -372,7 +376,7 @@ class TrajectoryGenerator final : public rtcf::Component {
         }
         restore(last);
         adoptLimits(last);
-        const bool stop = halt.read() != rtcf::DataStatus::None && halt.value();
+        const bool stop = (halt.read() != rtcf::DataStatus::None && halt.value()) || idles;
         if (stop && !halted_) stopFrom(last);
         halted_ = stop;
         if (target.read() == rtcf::DataStatus::New && !(halted_ && reject("target", "halted")))

@@ -302,6 +302,45 @@ TEST(TrajectoryGenerator, HaltsOnTheFastestWay) {
     EXPECT_EQ(generator.now().position[0], 10.0);
 }
 
+TEST(TrajectoryGenerator, StandsWhereOthersMoveTheJointsUntilANewTarget) {
+    Generator generator({0.0, 0.5});
+    generator.target({1.0, 1.0});
+    for (int i = 0; i < 300; ++i) generator.next();
+    generator.bench.write("idle", true);
+    for (const double moved : {0.31, 0.32, 0.3}) {
+        generator.bench.write("measured", jointState({moved, 0.7}));
+        const Sample stands = generator.next();
+        EXPECT_EQ(stands.position, (Vector{moved, 0.7}));
+        EXPECT_EQ(stands.velocity, (Vector{0.0, 0.0}));
+    }
+    generator.target({2.0, 2.0});
+    EXPECT_EQ(generator.next().position, (Vector{0.3, 0.7}));
+    EXPECT_EQ(generator.rejected(), 1U);
+    generator.bench.write("idle", false);
+    // It stands there, although the drives may sag, and goes on from there.
+    generator.bench.write("measured", jointState({0.2, 0.7}));
+    for (int i = 0; i < 100; ++i) EXPECT_EQ(generator.next().position, (Vector{0.3, 0.7}));
+    generator.target({0.0, 0.0});
+    const Sample first = generator.next();
+    EXPECT_LT(first.position[0], 0.3);
+    EXPECT_GT(first.position[0], 0.3 - 1e-6);
+    generator.finish();
+    EXPECT_NEAR(generator.now().position[0], 0.0, kRounding);
+}
+
+TEST(TrajectoryGenerator, HaltsWhileIdleWithoutAMeasurement) {
+    Bench bench("TrajectoryGenerator",
+                Generator::withDefaults(1, {{"initial", std::string("0.5")}}));
+    bench.write("target", jointState({1.0}));
+    for (int i = 0; i < 100; ++i) bench.cycle();
+    const double before = bench.read<sensor_msgs::JointState>("command")->position[0];
+    bench.write("idle", true);
+    for (int i = 0; i < 5000; ++i) bench.cycle();
+    EXPECT_GT(bench.read<sensor_msgs::JointState>("command")->position[0], before);
+    EXPECT_TRUE(*bench.read<bool>("done"));
+    EXPECT_LT(bench.read<sensor_msgs::JointState>("command")->position[0], 1.0);
+}
+
 TEST(TrajectoryGenerator, FollowsLinearCubicAndQuinticSegments) {
     struct Case {
         Vector velocities, accelerations;
