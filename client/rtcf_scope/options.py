@@ -29,6 +29,7 @@ class Options:
     layouts: Path  # folder
     files: tuple[Path, ...]  # recordings
     recordings: Path | None  # folder
+    robot: Path | None  # URDF
 
 
 def add_options(parser: argparse.ArgumentParser, port: int) -> None:
@@ -59,6 +60,10 @@ def add_options(parser: argparse.ArgumentParser, port: int) -> None:
         "--recordings", type=Path, metavar="FOLDER", help="let pages open *.mcap in this folder"
     )
     parser.add_argument(
+        "--robot", type=Path, metavar="FILE",
+        help="show the robot of this URDF (default: the one that a component's parameter names)",
+    )  # fmt: skip
+    parser.add_argument(
         "--token-file", type=Path, metavar="FILE",
         help="read the token from this file, or create it (default: a new token each start)",
     )  # fmt: skip
@@ -74,6 +79,8 @@ def options(args: argparse.Namespace, files: Sequence[Path] = ()) -> Options:
     for file in files:
         if not file.is_file():
             raise ValueError(f"{file}: no such file")
+    if args.robot is not None and not args.robot.is_file():
+        raise ValueError(f"--robot {args.robot}: no such file")
     state = os.environ.get("STATE_DIRECTORY") or os.path.join(
         os.environ.get("XDG_STATE_HOME") or os.path.expanduser("~/.local/state"), "rtcf-scope"
     )
@@ -83,6 +90,7 @@ def options(args: argparse.Namespace, files: Sequence[Path] = ()) -> Options:
     return Options(
         args.socket, args.address, args.port, names, args.right, _token(args.token_file),
         args.token_file, args.layouts or Path(state) / "layouts", tuple(files), args.recordings,
+        args.robot.absolute() if args.robot is not None else None,
     )  # fmt: skip
 
 

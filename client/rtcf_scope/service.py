@@ -18,6 +18,7 @@ from rtcf_scope.connection import logger
 from rtcf_scope.layouts import Layouts
 from rtcf_scope.options import Options, add_options, options
 from rtcf_scope.recordings import Recordings
+from rtcf_scope.robot import Robots
 from rtcf_scope.site import Site
 
 PORT = 8642
@@ -39,7 +40,8 @@ async def serve(given: Options, ready: Callable[[str, Authentication], None]) ->
     authentication = Authentication(given.token, given.names, MOST_CONNECTIONS, given.token_file)
     recordings = Recordings(given.files, given.recordings)
     with rtcf.Client(given.socket) as client:
-        site = Site(client, authentication, given.right, Layouts(given.layouts), recordings)
+        layouts, robots = Layouts(given.layouts), Robots(given.robot)
+        site = Site(client, authentication, given.right, layouts, recordings, robots)
         running = web.AppRunner(site.app)
         await running.setup()
         assert running.server is not None

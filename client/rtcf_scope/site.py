@@ -21,12 +21,14 @@ from rtcf_scope.hub import Hub
 from rtcf_scope.layouts import MOST_BYTES, LayoutError, Layouts
 from rtcf_scope.printable import printable
 from rtcf_scope.recordings import Recordings
+from rtcf_scope.robot import Robots
 from rtcf_scope.status_feed import StatusFeed
 from rtcf_scope.tab import PROTOCOL, Tab
 
 MOST_TABS = 32
 _LONGEST = 500  # characters of an error message
 _PAGE = Path(__file__).with_name("page")
+_THREE = Path("/usr/share/javascript/three/three.module.js")  # of libjs-three
 _TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css",
           ".svg": "image/svg+xml"}  # fmt: skip
 Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
@@ -42,11 +44,13 @@ class Site:
         right: str,
         layouts: Layouts,
         recordings: Recordings,
+        robots: Robots,
     ) -> None:
         self._client = client
         self._right = right
         self._layouts = layouts
         self._recordings = recordings
+        self._robots = robots
         self._hubs: dict[str, Hub] = {}
         self._feeds: dict[str, StatusFeed] = {}
         self._tabs: set[web.WebSocketResponse | Tab] = set()
@@ -59,6 +63,8 @@ class Site:
             for file in _PAGE.rglob("*")
             if file.suffix in _TYPES
         }
+        if _THREE.is_file():
+            self._files["/page/three/three.module.js"] = (_THREE.read_bytes(), _TYPES[".js"])
         route = self.app.router
         route.add_get("/", self._file)
         route.add_get("/page/{name:.*}", self._file)
@@ -76,6 +82,8 @@ class Site:
         route.add_get("/api/recordings", self._json(self._list_recordings))
         route.add_get("/api/recordings/{name}", self._json(self._describe_recording))
         route.add_get("/api/recordings/{name}/columns", self._recorded)
+        route.add_get("/api/robot", self._json(self._robot))
+        route.add_get("/api/robot/mesh", self._mesh)
         route.add_get("/api/mcap", self._mcap)
         route.add_get("/stream", self._stream)
 
@@ -184,6 +192,16 @@ class Site:
         except RtcfError as error:
             return error_response(error)
         return web.Response(body=data, content_type="application/octet-stream")
+
+    async def _robot(self, request: web.Request) -> Any:
+        return await self._call(self._robots.describe, self._client, runner_of(request))
+
+    async def _mesh(self, request: web.Request) -> web.StreamResponse:
+        try:
+            data = await self._call(self._robots.mesh, request.query.get("name", ""))
+        except RtcfError as error:
+            return error_response(error)
+        return web.Response(body=data, content_type="model/stl")
 
     async def _mcap(self, request: web.Request) -> web.StreamResponse:
         """Answer with a recording of the requested cycles still in memory, with all columns."""

@@ -19,12 +19,18 @@ _POLL_S = 0.05
 class Browser(Closing):
     """A browser with its own profile; ends with its `with` block."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, webgl: bool = False) -> None:
         self._folder = folder / "chromium"
+        # Without a graphics card: by software.
+        graphics = (
+            ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-gpu-compositing"]
+            if webgl
+            else ["--disable-gpu"]
+        )
         # Chromium's sandbox does not work where it may not create namespaces, as in containers.
         sandbox = ["--no-sandbox"] if os.geteuid() == 0 else []
         self._process = subprocess.Popen(
-            ["chromium", "--headless=new", *sandbox, "--disable-gpu", "--disable-dev-shm-usage",
+            ["chromium", "--headless=new", *sandbox, *graphics, "--disable-dev-shm-usage",
              "--no-first-run", "--disable-background-networking", "--disable-component-update",
              "--disable-extensions", "--remote-debugging-port=0", "--hide-scrollbars",
              f"--user-data-dir={self._folder}", "about:blank"],

@@ -2,7 +2,7 @@
 export const KEYS = [
   ["Space", "freeze, or go on"], ["+ −", "a shorter or a longer time"], ["← →", "back and forth in time"],
   ["End", "the newest again"], ["A", "fit the scales to the values"], ["C", "take the cursors away"],
-  ["N", "a new pane"], ["Delete", "take the active pane away"], ["1 … 9", "make a pane the active one"],
+  ["N", "a new pane"], ["O", "the robot in 3-D, or not"], ["Delete", "take the active pane away"], ["1 … 9", "make a pane the active one"],
   ["X", "seconds, time of day or cycle numbers below the panes"], ["V", "values under the pointer, or not"],
   ["/", "search the signals"], ["T", "roll or triggered"], ["D", "dark or light"], ["?", "this list"],
   ["Wheel", "zoom time; with Shift, or at a scale, values"], ["Drag", "pan; a cursor: move it; with Alt: shift the second recording"],
@@ -16,7 +16,7 @@ export function bindKeys(scope, does) {
     ArrowLeft: () => { scope.freeze(); scope.view.pan(-scope.view.span / 10); },
     ArrowRight: () => { scope.freeze(); scope.view.pan(scope.view.span / 10); },
     End: () => scope.run(), a: () => scope.panes.forEach((pane) => pane.refit()),
-    c: () => scope.clearCursors(), n: () => scope.addPane(), Delete: () => scope.removePane(scope.active),
+    c: () => scope.clearCursors(), n: () => scope.addPane(), o: () => does.robot(), Delete: () => scope.removePane(scope.active),
     x: () => scope.nextRuler(), v: () => does.pointing(), "/": () => does.search(), t: () => does.mode(), d: () => does.theme(), "?": () => does.help(),
   };
   document.addEventListener("keydown", (event) => {

@@ -5,11 +5,11 @@ import { ask } from "./server.js";
 
 const AFTER_MS = 300;
 
-export function taken(scope, runner, drawer, xy) {
+export function taken(scope, runner, drawer, xy, robot) {
   const { trigger, panes, view, mode, ruler } = scope;
   return {
     runner, mode: mode === "recording" ? "roll" : mode, drawer, span: Number((mode === "roll" ? view.span : scope.rollSpan ?? 10).toPrecision(4)),
-    ruler, panes: panes.map(paneTaken), trigger: trigger.settings, xy: { ...xy.chosen, equal: xy.isEqual },
+    ruler, panes: panes.map(paneTaken), trigger: trigger.settings, xy: { ...xy.chosen, equal: xy.isEqual }, ...(robot.isOpen && { robot: true }),
   };
 }
 

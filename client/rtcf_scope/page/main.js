@@ -10,6 +10,7 @@ import { Graph } from "./panels/graph.js";
 import { Measurements } from "./panels/measurements.js";
 import { Parameters } from "./panels/parameters.js";
 import { Recordings } from "./panels/recordings.js";
+import { Robot } from "./panels/robot.js";
 import { Spectrum } from "./panels/spectrum.js";
 import { Tree } from "./panels/tree.js";
 import { TriggerPanel } from "./panels/trigger.js";
@@ -37,12 +38,17 @@ const xy = new XY(scope, drawerOf("xy"));
 const cycles = new Cycles(scope, $("cycles"));
 const events = new Events(scope, drawerOf("events"));
 const graph = new Graph(drawerOf("graph"), async (name) => (await ask(`/api/component?${query({ runner: page.runner(), name })}`)).values);
+const robot = new Robot(scope, $("robot"), page, {
+  onPick: (signals) => { for (const name of signals) if (scope.units.has(name)) scope.active.add(name); scope.onTraces(); scope.changed(); },
+  onSignals: () => watch(),
+});
 const counters = { frames: 0, perSecond: 0, since: performance.now(), state: {} };
 new Derive(scope, $("derive"));
 let stream = null, drawer = "measurements", generation = -1, liveCatalog = [];
 const errors = new Map();
 window.scope = scope; // for tests and the browser's tools
 window.counters = counters;
+window.robot = robot;
 
 function setError(source, text) {
   if (text) errors.set(source, text); else errors.delete(source);
@@ -62,7 +68,7 @@ function watch() {
   watching = true;
   queueMicrotask(() => {
     watching = false;
-    const names = scope.traces().map((each) => each.name);
+    const names = [...new Set([...scope.traces().map((each) => each.name), ...robot.signals])];
     stream?.want({ watch: sources(names) });
     scope.live.keep(names);
   });
@@ -166,7 +172,7 @@ async function renew(all) {
     if (runner !== page.runner()) return;
     liveCatalog = found.signals;
     scope.know(found.signals);
-    if (all) { catalog(); parameters.show(found.components); graph.show(found); watch(); }
+    if (all) { catalog(); parameters.show(found.components); graph.show(found); watch(); await robot.load(); }
     else parameters.update(found.components);
     await parameters.who();
     setError("graph", "");
@@ -199,6 +205,13 @@ function open(name) {
     else each.hidden = each.dataset.drawer !== name;
   }
   slow();
+  scope.changed();
+}
+
+function showRobot(is) {
+  $("robots").setAttribute("aria-pressed", String(is));
+  $("between").hidden = !is;
+  if (is) robot.open(); else robot.close();
   scope.changed();
 }
 
@@ -240,7 +253,7 @@ async function layouts() {
 async function chooseLayout(choice) {
   if (choice === "save") {
     const name = prompt("Save this layout as");
-    if (name) await layout.save(name, layout.taken(scope, page.runner(), drawer, xy));
+    if (name) await layout.save(name, layout.taken(scope, page.runner(), drawer, xy, robot));
   } else if (choice === "remove") {
     const name = prompt("Remove which layout?");
     if (name) await layout.remove(name);
@@ -257,6 +270,7 @@ function apply(found) {
   xy.take(found?.xy ?? {});
   setError("layout", layout.given(scope, found ?? {}));
   mode(found?.mode === "trigger" ? "trigger" : "roll");
+  if ((found?.robot === true) !== robot.isOpen) showRobot(found?.robot === true);
   if (["measurements", "spectrum", "xy", "cycles", "graph", "events"].includes(found?.drawer)) open(found.drawer);
 }
 
@@ -266,6 +280,7 @@ const systemsLight = matchMedia("(prefers-color-scheme: light)");
 function theme() {
   document.documentElement.dataset.theme = localStorage.getItem("theme") ?? (systemsLight.matches ? "light" : "dark");
   for (const pane of scope.panes) pane.describe();
+  robot.themed();
   tree.show();
   scope.changed();
 }
@@ -284,6 +299,8 @@ function buttons() {
   $("shorter").onclick = () => { scope.view.step(-1); scope.changed(); };
   $("longer").onclick = () => { scope.view.step(1); scope.changed(); };
   $("pane").onclick = () => scope.addPane();
+  const robots = () => showRobot(!robot.isOpen);
+  $("robots").onclick = robots;
   $("theme").onclick = other;
   $("help").onclick = () => $("keys").showModal();
   $("runner").onchange = () => connect(page.runner());
@@ -307,13 +324,15 @@ function buttons() {
     scope.pointAt(null);
   };
   sizesPart($("beside"), "--list", { axis: "x", sign: 1, size: () => $("list").offsetWidth, least: 140, most: () => innerWidth * 0.6 });
+  sizesPart($("between"), "--robot", { axis: "x", sign: -1, size: () => $("robot").offsetWidth, least: 200, most: () => innerWidth * 0.8 });
   sizesPart($("above"), "--drawer", { axis: "y", sign: -1, size: () => drawerOf(drawer).offsetHeight, least: 60, most: () => innerHeight * 0.65 });
-  bindKeys(scope, { freeze, pointing, theme: other, search: () => $("search").focus(), help: () => $("keys").showModal(),
+  bindKeys(scope, { freeze, pointing, robot: robots, theme: other, search: () => $("search").focus(), help: () => $("keys").showModal(),
     mode: () => mode(scope.mode === "trigger" ? "roll" : "trigger") });
 }
 
 function frame(now) {
-  if (scope.frame(now)) counters.frames++;
+  const isDrawn = scope.frame(now);
+  if (robot.frame() || isDrawn) counters.frames++;
   requestAnimationFrame(frame);
 }
 
@@ -327,8 +346,9 @@ async function begin() {
   page.right = about.right;
   connect(page.runner());
   if (asked) apply(asked);
+  else if ((await ask(`/api/robot?${query({ runner: page.runner() })}`).catch(() => null))?.links.length) showRobot(true);
   // Not earlier: until then the address has the requested layout.
-  scope.onLayout = () => layout.toAddress(() => layout.taken(scope, page.runner(), drawer, xy));
+  scope.onLayout = () => layout.toAddress(() => layout.taken(scope, page.runner(), drawer, xy, robot));
   await Promise.all([layouts(), recordings.show()]);
   new ResizeObserver(() => scope.changed()).observe($("panes"));
   setInterval(slow, SLOW_MS);

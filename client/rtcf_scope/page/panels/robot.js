@@ -1,0 +1,335 @@
+// The robot of the runner in 3-D: it moves with the signals of its joints, its target is a ghost, and a
+// joint that is picked shows its signals. Drawn by three.js, which is loaded when the panel is opened.
+import { meshOf } from "../data/stl.js";
+import { ink } from "../drawing/palette.js";
+import { ask, query, request } from "../server.js";
+
+const GHOST = 0.2; // opacity
+const NEAR = 1e-4; // rad or m; a nearer target is not drawn
+const CLICK = 4; // CSS pixels; a longer way is a drag
+const SIDES = 48; // of a round shape
+
+// Whether WebGL has no graphics card here. Smooth edges then cost more time than all the rest.
+function drawsBySoftware() {
+  const gl = document.createElement("canvas").getContext("webgl"), names = gl?.getExtension("WEBGL_debug_renderer_info");
+  const name = names ? gl.getParameter(names.UNMASKED_RENDERER_WEBGL) : "";
+  gl?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software/i.test(name);
+}
+
+export class Robot {
+  // `page.runner()`: the name of the runner; `onPick(signals)`: a joint was picked;
+  // `onSignals()`: others are watched.
+  constructor(scope, box, page, { onPick, onSignals }) {
+    Object.assign(this, { scope, box, page, onPick, onSignals });
+    this.canvas = box.querySelector("canvas");
+    this.list = box.querySelector("[role=list]");
+    this.says = box.querySelector("output");
+    this.ghost = box.querySelector("[name=ghost]");
+    this.ghost.onchange = () => { this.drawn = ""; };
+    box.querySelector("[name=home]").onclick = () => { if (this.links.size) this.#look(); };
+    this.isOpen = false;
+    this.links = new Map(); // by name: {group, ghost, moves}
+    this.joints = [];
+    this.signals = [];
+    this.picked = "";
+    this.drawn = ""; // the values of the picture
+    this.description = ""; // of the robot and its signals, as it was received
+    this.form = ""; // the part of it that is drawn
+    this.frames = 0; // drawn so far
+    this.loads = 0; // finished so far, for tests
+  }
+
+  async open() {
+    this.isOpen = true;
+    this.box.hidden = false;
+    await this.load();
+  }
+
+  close() {
+    this.isOpen = false;
+    this.box.hidden = true;
+    this.signals = [];
+    this.description = "";
+    this.onSignals();
+  }
+
+  // Requests the robot again: the graph has changed.
+  async load() {
+    if (!this.isOpen) return;
+    try {
+      const found = await ask(`/api/robot?${query({ runner: this.page.runner() })}`);
+      this.says.textContent = found.links.length ? "" : "no robot: give a component the path of a URDF, or start the scope with --robot FILE";
+      await this.#engine();
+      await this.#build(found);
+    } catch (error) {
+      this.says.textContent = error.message;
+    }
+    this.loads++;
+  }
+
+  async #engine() {
+    if (this.three) return;
+    try {
+      this.three = await import("/page/three/three.module.js");
+    } catch {
+      throw new Error("three.js is missing: install libjs-three");
+    }
+    const { WebGLRenderer, Scene, PerspectiveCamera, HemisphereLight, DirectionalLight, Raycaster } = this.three;
+    try {
+      this.renderer = new WebGLRenderer({ canvas: this.canvas, antialias: !drawsBySoftware(), alpha: true });
+    } catch {
+      this.three = null;
+      throw new Error("this browser has no WebGL");
+    }
+    this.scene = new Scene();
+    this.camera = new PerspectiveCamera(40, 1, 0.01, 100);
+    this.camera.up.set(0, 0, 1);
+    this.scene.add(new HemisphereLight(0xffffff, 0x707078, 0.75));
+    const sun = new DirectionalLight(0xffffff, 0.55);
+    sun.position.set(2, -3, 4);
+    this.scene.add(sun);
+    this.ray = new Raycaster();
+    this.#bindPointer();
+    new ResizeObserver(() => { this.drawn = ""; }).observe(this.canvas.parentElement);
+  }
+
+  // Makes the links of a description; meshes of the same file are kept.
+  async #build(found) {
+    const description = JSON.stringify(found), form = JSON.stringify(found.links);
+    if (description === this.description) return;
+    this.#follow(found);
+    this.description = description;
+    if (form === this.form) return;
+    const { Group } = this.three;
+    for (const { group, ghost } of this.links.values()) { group.parent?.remove(group); ghost.parent?.remove(ghost); }
+    this.links.clear();
+    const meshes = new Map();
+    await Promise.all(found.links.flatMap((link) => link.visuals).filter(({ shape }) => shape === "mesh").map(async ({ mesh }) => {
+      meshes.set(mesh, meshes.get(mesh) ?? request(`/api/robot/mesh?${query({ name: mesh })}`).then((response) => response.arrayBuffer()).then(meshOf));
+      await meshes.get(mesh);
+    }));
+    for (const link of found.links) {
+      const made = { ...link, group: new Group(), ghost: new Group(), solids: [] };
+      for (const visual of link.visuals) {
+        const geometry = this.#geometry(visual, await meshes.get(visual.mesh));
+        made.solids.push(this.#solid(made.group, geometry, visual, false));
+        if (link.parent) this.#solid(made.ghost, geometry, visual, true);
+      }
+      for (const solid of made.solids) solid.userData.link = link.name;
+      this.links.set(link.name, made);
+    }
+    for (const link of this.links.values()) {
+      const parent = this.links.get(link.parent);
+      (parent?.group ?? this.scene).add(link.group);
+      (parent?.ghost ?? this.scene).add(link.ghost);
+    }
+    this.form = form;
+    this.#pose((joint) => this.#value(joint, "position"), "group");
+    this.#look();
+    this.drawn = "";
+  }
+
+  // Takes the signals of the joints, and lists them.
+  #follow(found) {
+    this.joints = found.links.filter((link) => link.moves && found.signals[link.joint]).map((link) => ({ ...link, ...found.signals[link.joint] }));
+    this.signals = this.joints.flatMap(({ position, target }) => (target ? [position, target] : [position]));
+    this.list.replaceChildren(...this.joints.map((joint) => {
+      const row = document.createElement("button"), bar = document.createElement("meter"), says = document.createElement("span");
+      row.type = "button";
+      row.title = `show the signals of ${joint.joint}`;
+      const hasRange = joint.lower < joint.upper;
+      Object.assign(bar, hasRange ? { min: joint.lower, max: joint.upper } : { min: -Math.PI, max: Math.PI });
+      row.append(Object.assign(document.createElement("b"), { textContent: joint.joint }), bar, says);
+      row.onclick = () => this.#pick(joint.joint);
+      joint.show = (value) => {
+        bar.value = value;
+        says.textContent = Number.isFinite(value) ? joint.type === "prismatic" ? `${(value * 1e3).toFixed(1)} mm` : `${(value * 180 / Math.PI).toFixed(1)}°` : "–";
+      };
+      joint.row = row;
+      return row;
+    }));
+    this.ghost.parentElement.hidden = !this.joints.some(({ target }) => target);
+    this.onSignals();
+    this.#mark();
+  }
+
+  #geometry(visual, mesh) {
+    const { BufferGeometry, BufferAttribute, BoxBufferGeometry, CylinderBufferGeometry, SphereBufferGeometry } = this.three;
+    if (visual.shape === "box") return new BoxBufferGeometry(...visual.size);
+    if (visual.shape === "sphere") return new SphereBufferGeometry(visual.radius, SIDES, SIDES / 2);
+    if (visual.shape === "cylinder") return new CylinderBufferGeometry(visual.radius, visual.radius, visual.length, SIDES).rotateX(Math.PI / 2);
+    const geometry = new BufferGeometry();
+    geometry.setAttribute("position", new BufferAttribute(mesh.positions, 3));
+    geometry.setAttribute("normal", new BufferAttribute(mesh.normals, 3));
+    geometry.setIndex(new BufferAttribute(mesh.index, 1));
+    return visual.scale.every((each) => each === 1) ? geometry : geometry.scale(...visual.scale);
+  }
+
+  #solid(group, geometry, visual, isGhost) {
+    const { Mesh, MeshPhongMaterial, MeshLambertMaterial, Color } = this.three, [r, g, b, a] = visual.rgba;
+    const behind = { polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2 }; // where both are at one place
+    const material = isGhost ? new MeshLambertMaterial({ color: ink("accent"), transparent: true, opacity: GHOST, ...behind })
+      : new MeshPhongMaterial({ color: new Color(r, g, b), shininess: 28, specular: 0x222222, transparent: a < 1, opacity: a });
+    const solid = new Mesh(geometry, material);
+    solid.userData.colour = material.color.clone();
+    this.#place(solid, visual);
+    group.add(solid);
+    return solid;
+  }
+
+  // Puts an object at a URDF's origin: roll, pitch and yaw about fixed axes.
+  #place(object, { xyz, rpy }) {
+    object.position.set(...xyz);
+    object.rotation.set(...rpy, "ZYX");
+  }
+
+  #value(joint, which) {
+    const name = joint[which], store = this.scope.store, column = name && store.column(name);
+    return column && !store.empty ? column.get(this.#at(store)) : NaN;
+  }
+
+  // The newest cycle, or the last one in sight where time stands still.
+  #at(store) {
+    const { scope } = this;
+    if (scope.mode === "roll" && scope.view.follows) return store.end - 1;
+    if (scope.mode === "trigger") return scope.readAt;
+    return Math.max(store.begin, Math.min(store.find(scope.cursors.a ?? scope.view.end), store.end - 1));
+  }
+
+  // Turns the joints of the robot ("group") or of its ghost by `value(joint)`.
+  #pose(value, which) {
+    const { Quaternion, Vector3 } = this.three, values = new Map(this.joints.map((joint) => [joint.joint, value(joint)]));
+    for (const link of this.links.values()) {
+      const object = link[which];
+      if (!link.parent) continue;
+      this.#place(object, link);
+      if (!link.moves) continue;
+      const { mimic } = link;
+      let moved = mimic ? (values.get(mimic.joint) ?? NaN) * mimic.multiplier + mimic.offset : values.get(link.joint) ?? NaN;
+      if (values.has(link.joint) && mimic && Number.isFinite(values.get(link.joint))) moved = values.get(link.joint);
+      if (!Number.isFinite(moved)) moved = 0;
+      const axis = new Vector3(...link.axis).normalize();
+      if (link.type === "prismatic") object.translateOnAxis(axis, moved);
+      else object.quaternion.multiply(new Quaternion().setFromAxisAngle(axis, moved));
+    }
+  }
+
+  // Takes the colours of the theme.
+  themed() {
+    if (!this.size) return;
+    const { GridHelper } = this.three;
+    if (this.grid) this.scene.remove(this.grid);
+    this.grid = new GridHelper(4 * this.size, 20, ink("axis"), ink("grid"));
+    this.grid.rotateX(Math.PI / 2);
+    this.grid.position.z = this.floor;
+    this.scene.add(this.grid);
+    this.drawn = "";
+  }
+
+  // Looks at the whole robot, from the front and above.
+  #look() {
+    const { Box3, Vector3 } = this.three, box = new Box3();
+    this.scene.updateMatrixWorld(true);
+    for (const { solids } of this.links.values()) for (const solid of solids) box.expandByObject(solid);
+    if (box.isEmpty()) box.set(new Vector3(-0.5, -0.5, 0), new Vector3(0.5, 0.5, 1));
+    this.size = Math.max(box.getSize(new Vector3()).length(), 0.05);
+    this.floor = Math.min(box.min.z, 0);
+    this.centre = box.getCenter(new Vector3());
+    this.orbit = { distance: 1.5 * this.size, turn: -0.9, tilt: 0.38 };
+    this.themed();
+  }
+
+  // The mouse turns, moves and scales the view; a click picks.
+  #bindPointer() {
+    const { canvas } = this;
+    let down = null;
+    canvas.onpointerdown = (event) => {
+      canvas.setPointerCapture(event.pointerId);
+      down = { x: event.clientX, y: event.clientY, way: 0, pans: event.button !== 0 || event.shiftKey };
+    };
+    canvas.onpointermove = (event) => {
+      if (!down) return;
+      const x = event.clientX - down.x, y = event.clientY - down.y;
+      Object.assign(down, { x: event.clientX, y: event.clientY, way: down.way + Math.abs(x) + Math.abs(y) });
+      if (down.pans) this.#pan(x, y);
+      else {
+        this.orbit.turn -= x * 0.008;
+        this.orbit.tilt = Math.max(-1.5, Math.min(1.5, this.orbit.tilt + y * 0.008));
+      }
+      this.drawn = "";
+    };
+    canvas.onpointerup = (event) => {
+      if (down && down.way < CLICK) this.#pick(this.#jointAt(event.offsetX, event.offsetY));
+      down = null;
+    };
+    canvas.oncontextmenu = (event) => event.preventDefault();
+    canvas.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      this.orbit.distance *= Math.exp(Math.max(-1, Math.min(1, event.deltaY * 0.001)));
+      this.drawn = "";
+    }, { passive: false });
+  }
+
+  #pan(x, y) {
+    const { Vector3 } = this.three, unit = this.orbit.distance * 0.73 / this.canvas.clientHeight;
+    const right = new Vector3().setFromMatrixColumn(this.camera.matrix, 0), up = new Vector3().setFromMatrixColumn(this.camera.matrix, 1);
+    this.centre.addScaledVector(right, -x * unit).addScaledVector(up, y * unit);
+  }
+
+  // The joint that moves the link at a place of the canvas.
+  #jointAt(x, y) {
+    const { Vector2 } = this.three, { clientWidth, clientHeight } = this.canvas;
+    this.ray.setFromCamera(new Vector2(2 * x / clientWidth - 1, 1 - 2 * y / clientHeight), this.camera);
+    const [hit] = this.ray.intersectObjects([...this.links.values()].flatMap(({ solids }) => solids));
+    let link = hit && this.links.get(hit.object.userData.link);
+    while (link && !this.joints.some(({ joint }) => joint === link.joint)) link = this.links.get(link.parent);
+    return link?.joint ?? "";
+  }
+
+  #pick(name) {
+    this.picked = name;
+    this.#mark();
+    const joint = this.joints.find((each) => each.joint === name);
+    if (joint) this.onPick([...joint.all, ...(joint.target && !joint.all.includes(joint.target) ? [joint.target] : [])]);
+  }
+
+  #mark() {
+    for (const joint of this.joints) joint.row.setAttribute("aria-pressed", String(joint.joint === this.picked));
+    for (const link of this.links.values())
+      for (const { material, userData } of link.solids) {
+        material.color.copy(userData.colour);
+        if (link.joint && link.joint === this.picked) material.color.lerp(new this.three.Color(ink("accent")), 0.65);
+      }
+    this.drawn = "";
+  }
+
+  // Draws, if something has changed. Returns whether it did.
+  frame() {
+    if (!this.isOpen || !this.renderer || !this.links.size) return false;
+    const values = this.joints.map((joint) => this.#value(joint, "position")), targets = this.joints.map((joint) => this.#value(joint, "target"));
+    const drawn = `${values.map((each) => each.toFixed(5))} ${this.ghost.checked && targets.map((each) => each.toFixed(5))}`;
+    if (drawn === this.drawn) return false;
+    this.drawn = drawn;
+    const { clientWidth: width, clientHeight: height } = this.canvas.parentElement;
+    if (width < 2 || height < 2) return false;
+    const ratio = Math.min(devicePixelRatio, 2);
+    if (this.canvas.width !== Math.floor(width * ratio) || this.canvas.height !== Math.floor(height * ratio)) {
+      this.renderer.setPixelRatio(ratio);
+      this.renderer.setSize(width, height);
+      this.camera.aspect = width / height;
+      this.camera.updateProjectionMatrix();
+    }
+    const { centre, orbit: { distance, turn, tilt } } = this;
+    this.camera.position.set(centre.x + distance * Math.cos(tilt) * Math.cos(turn), centre.y + distance * Math.cos(tilt) * Math.sin(turn), centre.z + distance * Math.sin(tilt));
+    this.camera.lookAt(centre);
+    this.#pose((joint) => values[this.joints.indexOf(joint)], "group");
+    const isApart = this.ghost.checked && values.some((each, i) => Math.abs(each - targets[i]) > NEAR);
+    for (const link of this.links.values()) if (!link.parent) link.ghost.visible = isApart;
+    if (isApart) this.#pose((joint) => { const i = this.joints.indexOf(joint); return Number.isFinite(targets[i]) ? targets[i] : values[i]; }, "ghost");
+    this.joints.forEach((joint, i) => joint.show(values[i]));
+    this.renderer.render(this.scene, this.camera);
+    this.frames++;
+    return true;
+  }
+}
