@@ -46,6 +46,7 @@ Holds a real-time loop for the life of a launch; rt_launcher loads components in
 
 private parameters:
   frequency                cycles per second, 0.1 to 50000 (default: 1000)
+  graph                    graph file: its components and settings (default: none)
   mode                     wait_for_components, no_wait or wait_for_trigger
   num_components_expected  for wait_for_components: start when so many are loaded
   ros_mapping_whitelist    regular expression: connections that become ROS topics
@@ -248,6 +249,8 @@ class RunnerNode:
             self._screen.info("rtcfd is back, the runner is kept")
             return
         assert self._client is not None
+        if self._parameters.graph:
+            self._apply()  # before launchers load, since it unloads all other components
         self._announce(runner_entry.own_entry(self._runner, self._client.socket, self._token))
         self._taken_once = True
         threading.Thread(target=self._watch_node, args=(self._client,), daemon=True).start()
@@ -262,6 +265,16 @@ class RunnerNode:
             self._screen.warn("no ~frequency is set; RTCF 2021 took 1 Hz then")
         if self._parameters.mode == "no_wait":
             self._start()
+
+    def _apply(self) -> None:
+        """Load the components of ~graph."""
+        assert self._client is not None
+        try:
+            result = self._client.apply(self._parameters.graph, self._runner)
+        except rtcf.RefusedError as error:
+            raise Ending(Code.REFUSED, f"~graph is rejected: {error}") from None
+        for note in result.notes:
+            self._screen.warn(note)
 
     def _come_back(self) -> None:
         """After a restart of the master: launchers and tools look for us there."""

@@ -5,7 +5,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from rtcf.v1 import runner_pb2
+import rtcf
+from rtcf.v1 import graph_pb2, runner_pb2
+from rtcf_shared import whole_files
 from rtcf_shared.enums import choices
 from rtcf_shared.quantities import ROS, RUNNER, Quantity
 
@@ -28,7 +30,7 @@ _PEERS = choices(runner_pb2.Right.DESCRIPTOR)
 _LARGEST = 2**31 - 1  # XML-RPC has no larger integers
 
 _NAMES = (
-    *("frequency", "mode", "num_components_expected", "ros_mapping_whitelist"),
+    *("frequency", "graph", "mode", "num_components_expected", "ros_mapping_whitelist"),
     *("ros_mapping_blacklist", "ros_queue", "wait_policy", "overrun", "max_overruns"),
     *("lock_memory", "safe_heap_size_kB", "safe_stack_size_kB", "cpu_affinity_mask", "cpu"),
     *("priority", "spin", "realtime", "stall_timeout", "warmup_cycles", "on_crash"),
@@ -44,6 +46,7 @@ class RunnerParameters:
     settings: runner_pb2.RunnerSettings
     mode: str
     components: int  # expected, in the mode wait_for_components
+    graph: list[graph_pb2.ComponentSpec]  # of the file ~graph
     daemon: str
     exit_on_fault: bool
 
@@ -87,7 +90,10 @@ def read(values: dict[str, Any]) -> tuple[RunnerParameters, list[str]]:
     put("sim_time", _value(_SIM_TIME, given.word("sim_time", _SIM_TIME)))
     put("max_clock_jump_s", given.number("max_clock_jump", *_range("max_clock_jump_s")))
 
+    graph = _graph(given, settings)
     components = given.integer("num_components_expected", 1, _LARGEST)
+    if components is None and graph:
+        components = len(graph)
     mode = given.word("mode", MODES) or ("no_wait" if components is None else MODES[0])
     if mode == MODES[0] and components is None:
         raise Ending(
@@ -98,6 +104,7 @@ def read(values: dict[str, Any]) -> tuple[RunnerParameters, list[str]]:
         settings=settings,
         mode=mode,
         components=components or 0,
+        graph=graph,
         daemon=given.word("daemon", DAEMONS) or DAEMONS[0],
         exit_on_fault=(given.word("on_fault", ("exit", "stay")) or "exit") == "exit",
     )
@@ -106,6 +113,28 @@ def read(values: dict[str, Any]) -> tuple[RunnerParameters, list[str]]:
     return result, [
         f"parameter ~{name} is not known to rt_runner{close_to(name, _NAMES)}" for name in unknown
     ]
+
+
+def _graph(given: Parameters, settings: runner_pb2.RunnerSettings) -> list[graph_pb2.ComponentSpec]:
+    """Return the components of the file ~graph; parameters have priority over its settings."""
+    file = given.text("graph")
+    if file is None:
+        return []
+    try:
+        graphs = rtcf.read_graphs(whole_files.read(file).decode(), file)
+    except OSError as error:
+        raise Ending(Code.USAGE, f"~graph {file}: {error.strerror or error}") from None
+    except UnicodeDecodeError:
+        raise Ending(Code.USAGE, f"~graph {file}: no text") from None
+    except rtcf.RtcfError as error:
+        raise Ending(Code.USAGE, f"~graph {error}") from None
+    if len(graphs) != 1:
+        raise Ending(Code.USAGE, f"~graph {file} has {len(graphs)} runners: one is needed")
+    merged = runner_pb2.RunnerSettings()
+    merged.CopyFrom(graphs[0].settings)
+    merged.MergeFrom(settings)
+    settings.CopyFrom(merged)
+    return list(graphs[0].components)
 
 
 def _range(field: str) -> tuple[float, float]:

@@ -1,6 +1,7 @@
 """Private parameters and arguments of rt_runner and rt_launcher."""
 
 import os
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -83,6 +84,46 @@ def test_each_parameter_of_a_runner_is_a_setting() -> None:
             largest_message_kb=512, peers=runner_pb2.RIGHT_TUNE,
         ),
     )  # fmt: skip
+
+
+GRAPH = """\
+settings: {frequency_hz: 500, priority: 70, ros: {whitelist: /a}}
+components:
+  - {package: rtcf_examples, type: Wave}
+  - {package: rtcf_examples, type: Mimo}
+"""
+
+
+def test_a_graph_file_has_components_and_settings_that_parameters_override(tmp_path: Path) -> None:
+    file = tmp_path / "graph.yaml"
+    file.write_text(GRAPH)
+    found, lines = runner_parameters.read({"graph": str(file), "priority": 75})
+    assert lines == []
+    assert [each.type for each in found.graph] == ["Wave", "Mimo"]
+    assert (found.mode, found.components) == ("wait_for_components", 2)
+    settings = found.settings
+    assert (settings.frequency_hz, settings.priority, settings.ros.whitelist) == (500, 75, "/a")
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (None, "~graph {file}: No such file or directory"),
+        (b"components: ]", "~graph {file}:1: "),
+        (b"\xff\xfe", "~graph {file}: no text"),
+        (b"runners: {a: {components: []}, b: {components: []}}", "~graph {file} has 2 runners"),
+    ],
+)
+def test_an_unsuitable_graph_file_is_one_clear_line(
+    tmp_path: Path, text: bytes | None, said: str
+) -> None:
+    file = tmp_path / "graph.yaml"
+    if text is not None:
+        file.write_bytes(text)
+    with pytest.raises(Ending) as error:
+        runner_parameters.read({"graph": str(file)})
+    assert str(error.value).startswith(said.format(file=file))
+    assert "\n" not in str(error.value)
 
 
 def test_missing_parameters_are_left_to_the_daemon() -> None:
