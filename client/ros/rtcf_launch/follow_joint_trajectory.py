@@ -1,0 +1,321 @@
+"""`rosrun rtcf follow_joint_trajectory`: the action for a TrajectoryGenerator.
+
+MoveIt and other clients send trajectories by this action. The node passes each to the input
+`trajectory` of the generator, whose output and state tell how it goes; the loop itself runs without
+the node. A goal replaces the tail of the goal before, which ends as preempted.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import rtcf
+from rtcf.v1 import runner_pb2
+
+from rtcf_launch import control_messages, runner_entry
+from rtcf_launch.codes import Code
+
+DESCRIPTION = """\
+usage: rosrun rtcf follow_joint_trajectory [__name:=NAME] [_PARAMETER:=VALUE]...
+
+Serves the action ~follow_joint_trajectory (control_msgs/FollowJointTrajectory) for a component
+TrajectoryGenerator of rtcf_control, on the machine of its loop.
+
+private parameters:
+  generator         name of the component (default: trajectory)
+  runner            name of the node rt_runner (default: rt_runner); if there is none, the runner
+                    of the system daemon, or that of RTCF_SOCKET, with this name
+  joint_states      topic of the measured positions (default: joint_states)
+  goal_time         s after the end of a trajectory in which the joints must be within the
+                    tolerances of the goal, if the goal does not say it (default: 1)
+"""
+_FEEDBACK_S = 0.05
+_SIGNALS = (
+    "done", "halted", "last_trajectory_number", "rejections", "position", "commanded_velocity"
+)  # fmt: skip
+_ACCEPT_CYCLES = 2000  # after which a trajectory that is neither accepted nor rejected is lost
+
+
+@dataclass(frozen=True)
+class _Sample:
+    """The generator in one cycle."""
+
+    done: bool
+    halted: bool
+    accepted: int  # number of accepted trajectories
+    rejected: int  # number of rejected ones, and of stops at a limit
+    position: list[float]
+    velocity: list[float]
+
+
+class _FailedError(Exception):
+    """The goal ends without success: an error code and a line of text."""
+
+    def __init__(self, code: int, text: str) -> None:
+        super().__init__(text)
+        self.code = code
+
+
+class _PreemptedError(Exception):
+    """The goal was cancelled, or another one has come."""
+
+
+class Server:
+    """The action server of one generator."""
+
+    def __init__(
+        self, client: rtcf.Client, runner: str, generator: str, goal_time_s: float
+    ) -> None:
+        """Raises RefusedError if the runner has no such generator."""
+        self._client = client
+        self._runner = runner
+        self._generator = client.get_component(generator, runner).full_name
+        self._joints = self._parameter("joints").replace(",", " ").split()
+        self._goal_time_s = goal_time_s
+        self._messages = control_messages.classes()
+        self._measured: dict[str, float] = {}
+        self._server: Any = None
+
+    def serve(self, joint_states: str) -> None:
+        """Serve the action until rospy ends; rospy's node has been initialised."""
+        import actionlib
+        import rospy
+        from sensor_msgs.msg import JointState
+
+        rospy.Subscriber(joint_states, JointState, self._measure)
+        self._server = actionlib.SimpleActionServer(
+            "~follow_joint_trajectory", self._messages["FollowJointTrajectoryAction"],
+            execute_cb=self._execute, auto_start=False,
+        )  # fmt: skip
+        self._server.start()
+        rospy.loginfo(
+            "follows trajectories of %s with %s", ", ".join(self._joints), self._generator
+        )
+        rospy.spin()
+
+    def _parameter(self, name: str) -> str:
+        info = self._client.get_component(self._generator, self._runner)
+        found = next((each for each in info.parameters if each.name == name), None)
+        if found is None:
+            raise rtcf.RtcfError(f"{self._generator} is no TrajectoryGenerator: it has no {name}")
+        return str(found.value.string_value)
+
+    def _measure(self, message: Any) -> None:
+        self._measured = dict(zip(message.name, message.position, strict=False))
+
+    def _execute(self, goal: Any) -> None:
+        result = self._messages["FollowJointTrajectoryResult"]()
+        try:
+            self._follow(goal)
+        except _PreemptedError:
+            self._server.set_preempted(result, "another goal, or a cancel")
+            return
+        except _FailedError as error:
+            result.error_code, result.error_string = error.code, str(error)
+        except (rtcf.RtcfError, ValueError) as error:
+            result.error_code, result.error_string = result.INVALID_GOAL, str(error)
+        if result.error_code == result.SUCCESSFUL:
+            self._server.set_succeeded(result)
+        else:
+            self._server.set_aborted(result, result.error_string)
+
+    def _follow(self, goal: Any) -> None:
+        """Send a trajectory, and return when the joints have followed it.
+
+        Raises _FailedError, _PreemptedError and RtcfError.
+        """
+        codes = self._messages["FollowJointTrajectoryResult"]
+        names = list(goal.trajectory.joint_names)
+        if sorted(names) != sorted(self._joints):
+            raise _FailedError(
+                codes.INVALID_JOINTS,
+                f"the joints of the goal, {', '.join(names)}, are not those of {self._generator}: "
+                f"{', '.join(self._joints)}",
+            )
+        for each in (*goal.path_tolerance, *goal.goal_tolerance):
+            if each.name not in self._joints:
+                raise _FailedError(
+                    codes.INVALID_GOAL, f"tolerance for an unknown joint {each.name}"
+                )
+        (status,) = self._client.get_status(self._runner).runners
+        if status.state != runner_pb2.RUNNER_STATE_RUNNING:
+            raise _FailedError(codes.INVALID_GOAL, f"the loop {self._runner} does not run")
+        with self._client.watch_ports(
+            [f"{self._generator}.{each}" for each in _SIGNALS], self._runner
+        ) as stream:
+            samples = self._samples(stream)
+            before = next(samples)
+            self._client.write(
+                f"{self._generator}.trajectory", _as_dict(goal.trajectory), self._runner
+            )
+            self._await_acceptance(samples, before)
+            self._await_end(samples, before, goal)
+            self._await_goal(samples, goal)
+
+    def _samples(self, stream: Any) -> Iterator[_Sample]:
+        """Yield the values of each cycle; raises _FailedError at the end of the loop."""
+        count = len(self._joints)
+        for batch in stream:
+            columns = {name: batch[f"{self._generator}.{name}"] for name in _SIGNALS}
+            for row in range(len(batch)):
+                yield _Sample(
+                    bool(columns["done"][row]), bool(columns["halted"][row]),
+                    int(columns["last_trajectory_number"][row]), int(columns["rejections"][row]),
+                    [float(each) for each in columns["position"][row][:count]],
+                    [float(each) for each in columns["commanded_velocity"][row][:count]],
+                )  # fmt: skip
+            if batch.last_of_loop:
+                break
+        raise _FailedError(self._code("INVALID_GOAL"), "the loop has ended")
+
+    def _code(self, name: str) -> int:
+        return int(getattr(self._messages["FollowJointTrajectoryResult"], name))
+
+    def _await_acceptance(self, samples: Iterator[_Sample], before: _Sample) -> None:
+        for sample, _ in zip(samples, range(_ACCEPT_CYCLES), strict=False):
+            if sample.accepted > before.accepted:
+                return
+            if sample.rejected > before.rejected:
+                raise _FailedError(
+                    self._code("INVALID_GOAL"),
+                    f"{self._generator} rejects the trajectory: see its log, `rtcfctl logs`",
+                )
+        raise _FailedError(self._code("INVALID_GOAL"), f"{self._generator} does not read it")
+
+    def _await_end(self, samples: Iterator[_Sample], before: _Sample, goal: Any) -> None:
+        import rospy
+
+        told = rospy.Time(0)
+        for sample in samples:
+            if self._server.is_preempt_requested():
+                if not self._server.is_new_goal_available():
+                    # A trajectory without points stops the joints as fast as possible.
+                    stop = {"joint_names": self._joints, "points": []}
+                    self._client.write(f"{self._generator}.trajectory", stop, self._runner)
+                raise _PreemptedError
+            if sample.accepted > before.accepted + 1:
+                raise _FailedError(self._code("INVALID_GOAL"), "another trajectory has replaced it")
+            if sample.halted:
+                raise _FailedError(self._code("INVALID_GOAL"), f"{self._generator} is halted")
+            if sample.rejected > before.rejected:
+                raise _FailedError(
+                    self._code("PATH_TOLERANCE_VIOLATED"),
+                    f"{self._generator} has stopped at a limit: see its log, `rtcfctl logs`",
+                )
+            self._check(sample, goal.path_tolerance, "PATH_TOLERANCE_VIOLATED")
+            if rospy.Time.now() - told > rospy.Duration(_FEEDBACK_S):
+                told = rospy.Time.now()
+                self._send_feedback(sample)
+            if sample.done:
+                return
+
+    def _await_goal(self, samples: Iterator[_Sample], goal: Any) -> None:
+        """Wait until the joints are within the goal's tolerances, for at most its time."""
+        import rospy
+
+        given = goal.goal_time_tolerance.to_sec()
+        end = rospy.Time.now() + rospy.Duration(given if given > 0.0 else self._goal_time_s)
+        for sample in samples:
+            try:
+                self._check(sample, goal.goal_tolerance, "GOAL_TOLERANCE_VIOLATED")
+                return
+            except _FailedError:
+                if given < 0.0 or rospy.Time.now() > end:
+                    raise
+            if self._server.is_preempt_requested():
+                raise _PreemptedError
+
+    def _check(self, sample: _Sample, tolerances: Sequence[Any], code: str) -> None:
+        """Raise _FailedError if a joint is not within its tolerance; 0 or less is none."""
+        for each in tolerances:
+            if each.position <= 0.0:
+                continue
+            measured = self._measured.get(each.name)
+            if measured is None:
+                text = f"joint {each.name} has no measured position"
+                raise _FailedError(self._code(code), text)
+            away = abs(measured - sample.position[self._joints.index(each.name)])
+            if away > each.position:
+                text = f"joint {each.name} is {away:.4g} away, more than {each.position:.4g}"
+                raise _FailedError(self._code(code), text)
+
+    def _send_feedback(self, sample: _Sample) -> None:
+        import rospy
+        from trajectory_msgs.msg import JointTrajectoryPoint
+
+        feedback = self._messages["FollowJointTrajectoryFeedback"]()
+        feedback.header.stamp = rospy.Time.now()
+        feedback.joint_names = self._joints
+        nan = float("nan")
+        actual = [self._measured.get(joint, nan) for joint in self._joints]
+        feedback.desired = JointTrajectoryPoint(
+            positions=sample.position, velocities=sample.velocity
+        )
+        feedback.actual = JointTrajectoryPoint(positions=actual)
+        feedback.error = JointTrajectoryPoint(
+            positions=[a - b for a, b in zip(sample.position, actual, strict=True)]
+        )
+        self._server.publish_feedback(feedback)
+
+
+def _as_dict(trajectory: Any) -> dict[str, Any]:
+    def time(value: Any) -> dict[str, int]:
+        return {"secs": value.secs, "nsecs": value.nsecs}
+
+    return {
+        "header": {"stamp": time(trajectory.header.stamp)},
+        "joint_names": list(trajectory.joint_names),
+        "points": [
+            {
+                "positions": list(each.positions),
+                "velocities": list(each.velocities),
+                "accelerations": list(each.accelerations),
+                "time_from_start": time(each.time_from_start),
+            }
+            for each in trajectory.points
+        ],
+    }
+
+
+def main(build_tree: Path | None = None) -> int:
+    """Run the node; return its exit status."""
+    if any(word in ("-h", "--help") for word in sys.argv[1:]):
+        print(DESCRIPTION, end="")
+        return Code.DONE
+    try:
+        import rosgraph
+        import rospy
+
+        if isinstance(sys.stdout, io.TextIOWrapper):  # loginfo does not flush it
+            sys.stdout.reconfigure(line_buffering=True)
+        rospy.init_node("follow_joint_trajectory")
+        name = rospy.resolve_name(rospy.get_param("~runner", "rt_runner"))
+        entry = runner_entry.find(_master(rosgraph.get_master_uri()), name)
+        socket = entry.socket if entry is not None else os.environ.get("RTCF_SOCKET")
+        runner = entry.runner if entry is not None else name.strip("/").replace("/", "_")
+        with rtcf.Client(socket or None) as client:
+            server = Server(
+                client, runner, rospy.get_param("~generator", "trajectory"),
+                float(rospy.get_param("~goal_time", 1.0)),
+            )  # fmt: skip
+            server.serve(rospy.get_param("~joint_states", "joint_states"))
+    except ImportError as error:
+        print(f"follow_joint_trajectory: {error}: sudo apt install python3-actionlib "
+              "python3-trajectory-msgs python3-sensor-msgs", file=sys.stderr)  # fmt: skip
+        return Code.REFUSED
+    except (rtcf.RtcfError, ValueError) as error:
+        print(f"follow_joint_trajectory: {error}", file=sys.stderr)
+        return Code.REFUSED
+    return Code.DONE
+
+
+def _master(uri: str) -> Any:
+    from rtcf_launch.master import Master
+
+    return Master(uri, "/follow_joint_trajectory")

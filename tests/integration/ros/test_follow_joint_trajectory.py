@@ -1,0 +1,171 @@
+"""The action FollowJointTrajectory: the arm follows an actionlib client's trajectories."""
+
+import json
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import rtcf
+from actionlib_msgs.msg import GoalStatus
+from daemon_process import wait_for
+from launch_processes import Launching
+from pages import SUPPORT
+from ros_processes import Master
+from rtcf_launch import control_messages
+
+JOINTS = [f"joint{i}" for i in range(1, 7)]
+READY = [0.0, 0.3, 1.6, 0.0, 1.24, 0.0]
+STANDS = [0.0] * 6
+# As in the package control_msgs.
+MD5 = {
+    "FollowJointTrajectoryAction": "bc4f9b743838566551c0390c65f1a248",
+    "FollowJointTrajectoryGoal": "69636787b6ecbde4d61d711979bc7ecb",
+    "FollowJointTrajectoryResult": "493383b18409bfb604b4e26c676401d2",
+    "FollowJointTrajectoryFeedback": "10817c60c2486ef6b33e97dcd87f4474",
+    "FollowJointTrajectoryActionGoal": "cff5c1d533bf2f82dd0138d57f4304bb",
+    "FollowJointTrajectoryActionResult": "c4fb3b000dc9da4fd99699380efcc5d9",
+    "FollowJointTrajectoryActionFeedback": "d8920dc4eae9fc107e00999cce4be641",
+}
+
+
+class Peer:
+    """The action's client."""
+
+    def __init__(self, environment: dict[str, str]) -> None:
+        self._process = subprocess.Popen(
+            ["/usr/bin/python3", SUPPORT / "action_peer.py",
+             "/follow_joint_trajectory/follow_joint_trajectory"],
+            env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        assert self._process.stdout is not None
+        assert self._process.stdout.readline() == "ready\n"
+
+    def send(self, points: Any, joints: Any = JOINTS, **more: Any) -> Any:
+        """Send a goal; return its result, or None if it is to be replaced."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        told = {"joints": joints, "points": points, **more}
+        self._process.stdin.write(json.dumps(told) + "\n")
+        self._process.stdin.flush()
+        return None if "replace" in more else json.loads(self._process.stdout.readline())
+
+    def end(self) -> None:
+        self._process.kill()
+        self._process.communicate()
+
+
+@pytest.fixture(scope="module")
+def launching(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Launching]:
+    """Yield the launched arm with the node."""
+    folder = tmp_path_factory.mktemp("launch")
+    master = Master(folder)
+    master.start()
+    launching = Launching(master, folder)
+    try:
+        launch = launching.roslaunch("rtcf_arm", "arm.launch", "daemon:=private")
+        launch.wait_for_output("the loop runs with 32 components")
+        node = launching.node("follow_joint_trajectory")
+        node.wait_for_output("follows trajectories of joint1, ")
+        yield launching
+    finally:
+        launching.end()
+        master.end()
+
+
+@pytest.fixture
+def peer(launching: Launching) -> Iterator[Peer]:
+    peer = Peer(launching.environment)
+    yield peer
+    peer.end()
+
+
+def position(launching: Launching, joint: str = "joint1") -> float:
+    """Return the measured position of a joint."""
+    with launching.client() as (client, runner):
+        return _position(client, runner, joint)
+
+
+def _position(client: rtcf.Client, runner: str, joint: str) -> float:
+    ports = client.get_component("/robot", runner).ports
+    (value,) = (each.value for each in ports if each.name == f"{joint}_position")
+    return float(value.removeprefix("data: "))
+
+
+def test_the_messages_are_those_of_control_msgs() -> None:
+    found = control_messages._made()
+    assert {name: found[name]._md5sum for name in MD5} == MD5
+
+
+def test_the_arm_follows_a_trajectory_with_joints_in_any_order(
+    launching: Launching, peer: Peer
+) -> None:
+    goal = [0.4, 0.3, 1.6, 0.0, 1.0, 0.2]
+    points = [[0.5, [0.2, *goal[1:]][::-1], STANDS], [1.2, goal[::-1], STANDS]]
+    result = peer.send(points, JOINTS[::-1], goal=dict.fromkeys(JOINTS, 0.01))
+    assert (result["state"], result["code"]) == (GoalStatus.SUCCEEDED, 0), result
+    assert result["feedback"] >= 3
+    for joint, wanted in zip(JOINTS, goal, strict=True):
+        assert position(launching, joint) == pytest.approx(wanted, abs=0.02)
+
+
+def test_a_cancelled_goal_stops_the_arm(launching: Launching, peer: Peer) -> None:
+    peer.send([[1.5, READY, STANDS]])
+    result = peer.send([[5.0, [2.0, *READY[1:]], STANDS]], cancel=1.5)
+    assert result["state"] == GoalStatus.PREEMPTED
+    wait_for(lambda: _stands(launching), "the arm to stand")
+    assert 0.0 < position(launching) < 1.5
+
+
+def _stands(launching: Launching) -> bool:
+    with launching.client() as (client, runner):
+        ports = client.get_component("/robot", runner).ports
+        (value,) = (each.value for each in ports if each.name == "joint1_velocity")
+        return abs(float(value.removeprefix("data: "))) < 1e-3
+
+
+def test_a_new_goal_replaces_the_present_one(launching: Launching, peer: Peer) -> None:
+    peer.send([[1.5, READY, STANDS]])
+    peer.send([[4.0, [1.5, *READY[1:]], STANDS]], replace=1.0)
+    result = peer.send([[1.5, [-0.3, *READY[1:]], STANDS]], goal={"joint1": 0.01})
+    assert (result["state"], result["code"]) == (GoalStatus.SUCCEEDED, 0), result
+    assert position(launching) == pytest.approx(-0.3, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("points", "more", "code", "said"),
+    [
+        ([[1.0, READY, STANDS]], {"joints": [*JOINTS[:5], "elbow"]}, -2,
+         "are not those of /trajectory: joint1, joint2"),
+        ([[1.0, [9.0, *READY[1:]], STANDS]], {}, -1, "/trajectory rejects the trajectory"),
+        ([[1.0, READY, STANDS]], {"goal": {"elbow": 0.1}}, -1,
+         "tolerance for an unknown joint elbow"),
+        ([[2.0, [0.5, *READY[1:]], STANDS]], {"path": {"joint1": 1e-9}}, -4, "joint joint1 is "),
+        ([[2.0, [0.1, *READY[1:]], STANDS]], {"goal": {"joint1": 1e-12}}, -5, "joint joint1 is "),
+    ],
+)  # fmt: skip
+def test_a_goal_that_is_not_reached_says_why(
+    peer: Peer, points: Any, more: Any, code: int, said: str
+) -> None:
+    result = peer.send(points, **more)
+    assert result["state"] == GoalStatus.ABORTED
+    assert result["code"] == code
+    assert said in result["text"]
+    assert "\n" not in result["text"]
+
+
+def test_a_component_that_is_no_generator_is_rejected(launching: Launching) -> None:
+    node = launching.node("follow_joint_trajectory", "__name:=other", "_generator:=robot")
+    assert node.wait(60.0) == 1
+    assert "/robot is no TrajectoryGenerator: it has no joints" in node.output()
+    missing = launching.node("follow_joint_trajectory", "__name:=third", "_generator:=nobody")
+    assert missing.wait(60.0) == 1
+    assert "nobody" in missing.output()
+
+
+def test_help_names_the_parameters(launching: Launching) -> None:
+    node = launching.node("follow_joint_trajectory", "--help")
+    assert node.wait(60.0) == 0
+    assert "goal_time" in node.output()
+    assert Path(node.command.split()[0]).name == "follow_joint_trajectory"
