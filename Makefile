@@ -8,7 +8,7 @@ export CMAKE_BUILD_PARALLEL_LEVEL ?= $(shell nproc)
 # Progress: share of the steps done, seconds since the start.
 export NINJA_STATUS ?= [%p, %e s] 
 
-tasks := all build demo checker test test-long bench bench-rt deb lint
+tasks := all build demo robot checker test test-long bench bench-rt deb lint
 elsewhere := $(filter-out $(shell tools/release codename),$(RELEASE))
 
 .PHONY: $(tasks) dependencies clean help
@@ -33,6 +33,12 @@ demo: dependencies ## run Fig. 1 of the paper at 2 kHz for 10 s, with ROS nodes 
 	@echo "building what the demo needs: some minutes the first time"
 	@cmake --build $(BUILD) --target rtcf_demo
 	@components/rtcf_examples/demo/demo
+
+robot: dependencies ## run a simulated arm until Ctrl-C, and show it in the browser
+	@cmake -S . -B $(BUILD) -G Ninja
+	@echo "building what the arm needs: some minutes the first time"
+	@cmake --build $(BUILD) --target rtcf_robot
+	@components/rtcf_arm/show
 
 checker: dependencies ## build the executor that `build/bin/rtcfctl check` runs components in
 	@cmake -S . -B $(BUILD)-rtsan -G Ninja -DRTCF_SANITIZE=realtime \

@@ -3,7 +3,7 @@
 from machine import Machine, wait_for
 from rtcf_service import Service
 
-PACKAGES = ("librtcf-dev", "python3-rtcf", "ros-rtcf", "rtcf-check", "rtcf-components",
+PACKAGES = ("librtcf-dev", "python3-rtcf", "ros-rtcf", "rtcf-arm", "rtcf-check", "rtcf-components",
             "rtcf-control", "rtcf-doc", "rtcf-mujoco", "rtcf-python", "rtcf-scope",
             "rtcfctl", "rtcfd")  # fmt: skip
 

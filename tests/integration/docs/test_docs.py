@@ -89,6 +89,7 @@ BY_THEMSELVES = {
     "components.md",
     "control/motor.md",
     "python-components.md",
+    "robot.md",
 }
 
 
@@ -101,6 +102,21 @@ def test_the_commands_of_a_page_succeed(page: str, daemon: Daemon, client: rtcf.
     PREPARE[page](daemon, client)
     for line in typed(page):
         _type(line, daemon.folder, daemon.environment())
+
+
+def test_the_tour_of_the_robot_succeeds(daemon: Daemon, client: rtcf.Client) -> None:
+    file = BUILD_TREE / "devel" / "share" / "rtcf_arm" / "arm.yaml"
+    assert daemon.ctl("apply", str(file)).returncode == 0
+    (daemon.folder / "velocity_pi.py").write_text(_block("robot.md", "python", "VelocityPi"))
+    client.start()
+    lines = list(typed("robot.md"))
+    assert any("1e9" in line for line in lines)
+    for line in lines:
+        _type(line, daemon.folder, daemon.environment())
+        if "1e9" in line:
+            wait_for(client.list_incidents, "the incident of the fault")
+    (newest, *_) = reversed(client.list_incidents())
+    assert "/robot" in newest.reason
 
 
 def _type(line: str, folder: Path, environment: dict[str, str]) -> None:

@@ -372,3 +372,52 @@ def test_a_required_component_that_fails_ends_the_launch(launching: Launching) -
     output = launch.output()
     assert "threw: the encoder jumped" in output
     assert "exit code 3" in output
+
+
+def test_the_arm_is_launched_from_its_graph_file(launching: Launching, master: Master) -> None:
+    launch = launching.roslaunch("rtcf_arm", "arm.launch", "daemon:=private")
+    launch.wait_for_output("the loop runs with 32 components")
+    with launching.client() as (client, runner):
+        assert client.get_status(runner).runners[0].settings.frequency_hz == 1000
+        client.set_parameters("operator", [rtcf.parse_parameter("mode:=tour")], runner)
+        wait_for(lambda: "/joint_states" in topics(master), "the topics")
+        assert topics(master)["/command"] == "sensor_msgs/JointState"
+    press_ctrl_c(launch)
+
+
+def test_launchers_join_the_components_of_a_graph_file(
+    launching: Launching, tmp_path: Path
+) -> None:
+    file = tmp_path / "graph.yaml"
+    file.write_text("components: [{package: rtcf_examples, type: Wave, name: wave}]\n")
+    launch = launching.launch_text(
+        f"""<launch>
+          <node name="rt_runner" pkg="rtcf" type="rt_runner" output="screen">
+            <param name="graph" value="{file}"/>
+            <param name="num_components_expected" value="2"/>
+            <param name="daemon" value="private"/>
+          </node>
+          <node name="mimo" pkg="rtcf" type="rt_launcher" args="rtcf_examples Mimo"/>
+        </launch>"""
+    )
+    launch.wait_for_output("the loop runs with 2 components")
+    with launching.client() as (client, runner):
+        names = {each.full_name for each in client.list_components(runner)}
+        assert names == {"/wave", "/mimo"}
+    press_ctrl_c(launch)
+
+
+def test_a_rejected_graph_file_ends_the_launch(launching: Launching, tmp_path: Path) -> None:
+    file = tmp_path / "graph.yaml"
+    file.write_text("components: [{package: rtcf_examples, type: Wav}]\n")
+    launch = launching.launch_text(
+        f"""<launch>
+          <node name="rt_runner" pkg="rtcf" type="rt_runner" output="screen" required="true">
+            <param name="graph" value="{file}"/>
+            <param name="daemon" value="private"/>
+          </node>
+        </launch>"""
+    )
+    launch.wait_for_output("~graph is rejected: ")
+    assert "Wav" in launch.output().partition("~graph is rejected: ")[2]
+    launch.wait(60.0)

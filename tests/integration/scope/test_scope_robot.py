@@ -1,0 +1,173 @@
+"""The robot in 3-D on the scope's page, moved by a real loop."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import rtcf
+from browser import Browser, Page
+from daemon_process import BUILD_TREE, NO_ROS, Daemon, wait_for
+from rtcf_shared.graph_reader import read_graphs
+from scope_process import ScopeProcess
+
+ARM = BUILD_TREE / "devel" / "share" / "rtcf_arm"
+JOINTS = [f"joint{i}" for i in range(1, 7)]
+
+
+@pytest.fixture(scope="module")
+def webgl(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """Yield a browser with WebGL."""
+    with Browser(tmp_path_factory.mktemp("browser"), webgl=True) as browser:
+        yield browser
+
+
+@pytest.fixture
+def arm(daemon: Daemon, client: rtcf.Client) -> Daemon:
+    """Return `daemon` with the stopped arm."""
+    (graph,) = read_graphs((ARM / "arm.yaml").read_text(), "arm.yaml")
+    client.apply(graph.components, settings=graph.settings)
+    return daemon
+
+
+@pytest.fixture
+def settings() -> str:
+    return NO_ROS
+
+
+def opened(browser: Browser, scope: ScopeProcess) -> Page:
+    """Return a page that shows the robot."""
+    page = browser.page(scope.address)
+    page.wait("document.getElementById('state').textContent")
+    page.ask("document.getElementById('robots').click()")
+    return page
+
+
+def angle(page: Page, joint: str) -> float:
+    """Return the shown angle of a joint, degrees."""
+    text: str = page.ask(
+        f"[...robot.list.children].find((each) => each.textContent.includes('{joint}'))"
+        ".querySelector('span').textContent"
+    )
+    return float(text.removesuffix("°"))
+
+
+def hand(page: Page) -> list[float]:
+    """Return the place of the hand in the scene, m."""
+    found: list[float] = page.ask(
+        "(() => { robot.scene.updateMatrixWorld(true);"
+        " return new robot.three.Vector3().setFromMatrixPosition("
+        "robot.links.get('hand').group.matrixWorld).toArray(); })()"
+    )
+    return found
+
+
+def test_the_robot_moves_with_the_loop_and_shows_its_target(
+    webgl: Browser, arm: Daemon, client: rtcf.Client
+) -> None:
+    with ScopeProcess(arm) as scope:
+        page = opened(webgl, scope)
+        client.start()
+        page.wait("robot.joints.length === 8 && robot.frames > 0")
+        assert page.ask("robot.links.get('upper_arm').parent") == "shoulder"
+        # The keyframe "ready": the hand is in front, above the table.
+        page.wait("Math.abs(robot.links.get('hand').group.rotation.x) < 1")
+        x, y, z = hand(page)
+        assert (x, y, z) == pytest.approx((0.39, 0.0, 0.47), abs=0.05)
+        client.set_parameters("operator", [rtcf.parse_parameter("mode:=sliders")])
+        client.set_parameters("operator", [rtcf.parse_parameter("joint1:=1.2")])
+        page.wait(
+            "robot.links.get('base') && [...robot.links.values()].some(({ghost}) => ghost.visible)"
+        )
+        wait_for(lambda: abs(angle(page, "joint1") - 68.8) < 1.0, "the joint at its target")
+        x, y, _ = hand(page)
+        assert y > 2.0 * x > 0.0, "the arm has turned to the left"
+        assert page.errors == []
+        page.close()
+
+
+def test_a_picked_joint_shows_its_signals(webgl: Browser, arm: Daemon, client: rtcf.Client) -> None:
+    with ScopeProcess(arm) as scope:
+        page = opened(webgl, scope)
+        client.start()
+        page.wait("robot.joints.length === 8 && robot.frames > 0")
+        # On the canvas: a place at which the upper arm is drawn.
+        place = page.ask(
+            """(() => {
+              const { Vector3 } = robot.three, link = robot.links.get('upper_arm').group;
+              const at = new Vector3(0, 0, 0.18).applyMatrix4(link.matrixWorld);
+              at.project(robot.camera);
+              const { x, y, width, height } = robot.canvas.getBoundingClientRect();
+              return [x + (at.x + 1) / 2 * width, y + (1 - at.y) / 2 * height];
+            })()"""
+        )
+        for kind in ("mousePressed", "mouseReleased"):
+            page.call("Input.dispatchMouseEvent", type=kind, x=place[0], y=place[1], button="left",
+                      clickCount=1)  # fmt: skip
+        names = ["/robot.joint2_effort", "/robot.joint2_position", "/robot.joint2_velocity",
+                 "/setpoints.position2"]  # fmt: skip
+        page.wait("scope.traces().length === 4")
+        assert page.ask("scope.traces().map(({name}) => name)") == names
+        assert page.ask("robot.picked") == "joint2"
+        page.close()
+
+
+def test_a_frozen_page_keeps_the_robot_still(
+    webgl: Browser, arm: Daemon, client: rtcf.Client
+) -> None:
+    with ScopeProcess(arm) as scope:
+        page = opened(webgl, scope)
+        client.start()
+        client.set_parameters("operator", [rtcf.parse_parameter("mode:=tour")])
+        page.wait("robot.frames > 20")
+        page.ask("document.getElementById('freeze').click()")
+        frozen = page.ask(
+            "new Promise((done) => requestAnimationFrame(() =>"
+            " requestAnimationFrame(() => done(robot.drawn))))"
+        )
+        count = page.ask("scope.live.end")
+        page.wait(f"scope.live.end > {count} + 2000")
+        assert page.ask("robot.drawn") == frozen
+        page.ask("document.getElementById('freeze').click()")
+        page.wait(f"robot.drawn !== {frozen!r}")
+        page.close()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "no robot: give a component the path of a URDF, or start the scope with --robot FILE"),
+        ("<robot", "unclosed token"),
+        ("<robot><link name='a'/></robot>", ""),
+    ],
+)
+def test_a_robot_that_cannot_be_shown_is_explained(
+    webgl: Browser, running: Daemon, tmp_path: Path, text: str, said: str
+) -> None:
+    file = tmp_path / "robot.urdf"
+    file.write_text(text)
+    options = ("--robot", str(file)) if text else ()
+    with ScopeProcess(running, *options) as scope:
+        page = opened(webgl, scope)
+        page.wait("robot.loads > 0")
+        shown: str = page.ask("robot.says.textContent")
+        assert said in shown
+        assert bool(said) == bool(shown)
+        page.close()
+
+
+def test_a_file_that_is_missing_is_rejected_at_the_start(running: Daemon) -> None:
+    done = running.ctl("scope", "--robot", "/nowhere/arm.urdf", "--no-browser")
+    assert done.returncode != 0
+    assert "--robot /nowhere/arm.urdf: no such file" in done.stderr
+
+
+def test_meshes_need_the_token_and_a_known_name(arm: Daemon) -> None:
+    with ScopeProcess(arm) as scope:
+        assert scope.ask("/api/robot", token="")[0] == 403
+        status, body = scope.ask("/api/robot/mesh?name=0")
+        assert (status, body) == (400, b'{"refused": "no such mesh: load the robot again"}')
+        status, _ = scope.ask("/api/robot")
+        assert status == 200
+        status, mesh = scope.ask("/api/robot/mesh?name=0")
+        assert status == 200
+        assert len(mesh) > 1000
