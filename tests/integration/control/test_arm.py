@@ -78,13 +78,13 @@ def bench() -> Iterator[Bench]:
 
 def test_the_arm_follows_its_tour_and_repeats_it_bit_by_bit(bench: Bench) -> None:
     operate(bench.client, mode="tour")
-    first = bench.run(steps=20 * CYCLES)
+    first = bench.run(steps=12 * CYCLES)
     for i, joint in enumerate(JOINTS, 1):
         measured: Any = first[f"/robot.{joint}_position"]
         wanted: Any = first[f"/setpoints.position{i}"]
         assert np.nanmax(np.abs(measured - wanted)) < TRACKING, joint
         assert np.ptp(wanted[~np.isnan(wanted)]) > 0.3, f"{joint} moves"
-    second = bench.run(steps=20 * CYCLES)
+    second = bench.run(steps=12 * CYCLES)
     for joint in JOINTS:
         name = f"/robot.{joint}_position"
         assert second[name].tobytes() == first[name].tobytes()
