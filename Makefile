@@ -36,7 +36,7 @@ demo: dependencies ## run Fig. 1 of the paper at 2 kHz for 10 s, with ROS nodes 
 
 robot: dependencies ## run a simulated arm until Ctrl-C, and show it in the browser
 	@cmake -S . -B $(BUILD) -G Ninja
-	@echo "building what the arm needs: some minutes the first time"
+	@echo "building the arm and its controllers: some minutes the first time"
 	@cmake --build $(BUILD) --target rtcf_robot
 	@components/rtcf_arm/show
 

@@ -28,7 +28,7 @@ constexpr std::array<Positions, 6> kTour{{
     {0.0, -0.8, 2.1, 0.0, 0.6, 0.0},
 }};
 
-// What an operator does at a panel: chooses where targets come from, sets them, stops, resets.
+// Panel of an operator: source of the targets, targets, emergency stop and its reset.
 class Operator final : public rtcf::Component {
     enum class Mode { Stand, Tour, Sliders, Joystick, Goal };
 
@@ -84,7 +84,7 @@ class Operator final : public rtcf::Component {
                                 rtcf::Doc("time since the last motion")};
     rtcf::State<bool> jogs_{this, "jogs", false, rtcf::Doc("the joystick moves the arm")};
     rtcf::State<Positions> aim_{
-        this, "aim", {}, rtcf::Unit("rad"), rtcf::Doc("target of sliders and joystick")};
+        this, "aim", {}, rtcf::Unit("rad"), rtcf::Doc("target of the joystick")};
 
     // Deflections of axes below it are none.
     static constexpr double kDeadBand = 0.1;

@@ -1,8 +1,8 @@
 """`rosrun rtcf follow_joint_trajectory`: the action for a TrajectoryGenerator.
 
 MoveIt and other clients send trajectories by this action. The node passes each to the input
-`trajectory` of the generator, whose output and state tell how it goes; the loop itself runs without
-the node. A goal replaces the tail of the goal before, which ends as preempted.
+`trajectory` of the generator, whose outputs and state show the progress. The loop itself runs
+without the node. A goal replaces the tail of the goal before, which ends as preempted.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from rtcf.v1 import runner_pb2
 
 from rtcf_launch import control_messages, runner_entry
 from rtcf_launch.codes import Code
+from rtcf_launch.master import Master
 
 DESCRIPTION = """\
 usage: rosrun rtcf follow_joint_trajectory [__name:=NAME] [_PARAMETER:=VALUE]...
@@ -33,7 +34,7 @@ private parameters:
                     of the system daemon, or that of RTCF_SOCKET, with this name
   joint_states      topic of the measured positions (default: joint_states)
   goal_time         s after the end of a trajectory in which the joints must be within the
-                    tolerances of the goal, if the goal does not say it (default: 1)
+                    tolerances of the goal, if the goal has no time (default: 1)
 """
 _FEEDBACK_S = 0.05
 _SIGNALS = (
@@ -55,9 +56,9 @@ class _Sample:
 
 
 class _FailedError(Exception):
-    """The goal ends without success: an error code and a line of text."""
+    """The goal ends without success: the name of an error code, and a line of text."""
 
-    def __init__(self, code: int, text: str) -> None:
+    def __init__(self, code: str, text: str) -> None:
         super().__init__(text)
         self.code = code
 
@@ -117,7 +118,7 @@ class Server:
             self._server.set_preempted(result, "another goal, or a cancel")
             return
         except _FailedError as error:
-            result.error_code, result.error_string = error.code, str(error)
+            result.error_code, result.error_string = getattr(result, error.code), str(error)
         except (rtcf.RtcfError, ValueError) as error:
             result.error_code, result.error_string = result.INVALID_GOAL, str(error)
         if result.error_code == result.SUCCESSFUL:
@@ -130,22 +131,19 @@ class Server:
 
         Raises _FailedError, _PreemptedError and RtcfError.
         """
-        codes = self._messages["FollowJointTrajectoryResult"]
         names = list(goal.trajectory.joint_names)
         if sorted(names) != sorted(self._joints):
             raise _FailedError(
-                codes.INVALID_JOINTS,
+                "INVALID_JOINTS",
                 f"the joints of the goal, {', '.join(names)}, are not those of {self._generator}: "
                 f"{', '.join(self._joints)}",
             )
         for each in (*goal.path_tolerance, *goal.goal_tolerance):
             if each.name not in self._joints:
-                raise _FailedError(
-                    codes.INVALID_GOAL, f"tolerance for an unknown joint {each.name}"
-                )
+                raise _FailedError("INVALID_GOAL", f"tolerance for an unknown joint {each.name}")
         (status,) = self._client.get_status(self._runner).runners
         if status.state != runner_pb2.RUNNER_STATE_RUNNING:
-            raise _FailedError(codes.INVALID_GOAL, f"the loop {self._runner} does not run")
+            raise _FailedError("INVALID_GOAL", f"the loop {self._runner} does not run")
         with self._client.watch_ports(
             [f"{self._generator}.{each}" for each in _SIGNALS], self._runner
         ) as stream:
@@ -172,10 +170,7 @@ class Server:
                 )  # fmt: skip
             if batch.last_of_loop:
                 break
-        raise _FailedError(self._code("INVALID_GOAL"), "the loop has ended")
-
-    def _code(self, name: str) -> int:
-        return int(getattr(self._messages["FollowJointTrajectoryResult"], name))
+        raise _FailedError("INVALID_GOAL", "the loop has ended")
 
     def _await_acceptance(self, samples: Iterator[_Sample], before: _Sample) -> None:
         for sample, _ in zip(samples, range(_ACCEPT_CYCLES), strict=False):
@@ -183,15 +178,15 @@ class Server:
                 return
             if sample.rejected > before.rejected:
                 raise _FailedError(
-                    self._code("INVALID_GOAL"),
+                    "INVALID_GOAL",
                     f"{self._generator} rejects the trajectory: see its log, `rtcfctl logs`",
                 )
-        raise _FailedError(self._code("INVALID_GOAL"), f"{self._generator} does not read it")
+        raise _FailedError("INVALID_GOAL", f"{self._generator} does not read it")
 
     def _await_end(self, samples: Iterator[_Sample], before: _Sample, goal: Any) -> None:
         import rospy
 
-        told = rospy.Time(0)
+        sent = rospy.Time(0)
         for sample in samples:
             if self._server.is_preempt_requested():
                 if not self._server.is_new_goal_available():
@@ -200,17 +195,17 @@ class Server:
                     self._client.write(f"{self._generator}.trajectory", stop, self._runner)
                 raise _PreemptedError
             if sample.accepted > before.accepted + 1:
-                raise _FailedError(self._code("INVALID_GOAL"), "another trajectory has replaced it")
+                raise _FailedError("INVALID_GOAL", "another trajectory has replaced it")
             if sample.halted:
-                raise _FailedError(self._code("INVALID_GOAL"), f"{self._generator} is halted")
+                raise _FailedError("INVALID_GOAL", f"{self._generator} is halted")
             if sample.rejected > before.rejected:
                 raise _FailedError(
-                    self._code("PATH_TOLERANCE_VIOLATED"),
+                    "PATH_TOLERANCE_VIOLATED",
                     f"{self._generator} has stopped at a limit: see its log, `rtcfctl logs`",
                 )
             self._check(sample, goal.path_tolerance, "PATH_TOLERANCE_VIOLATED")
-            if rospy.Time.now() - told > rospy.Duration(_FEEDBACK_S):
-                told = rospy.Time.now()
+            if rospy.Time.now() - sent > rospy.Duration(_FEEDBACK_S):
+                sent = rospy.Time.now()
                 self._send_feedback(sample)
             if sample.done:
                 return
@@ -239,11 +234,11 @@ class Server:
             measured = self._measured.get(each.name)
             if measured is None:
                 text = f"joint {each.name} has no measured position"
-                raise _FailedError(self._code(code), text)
+                raise _FailedError(code, text)
             away = abs(measured - sample.position[self._joints.index(each.name)])
             if away > each.position:
                 text = f"joint {each.name} is {away:.4g} away, more than {each.position:.4g}"
-                raise _FailedError(self._code(code), text)
+                raise _FailedError(code, text)
 
     def _send_feedback(self, sample: _Sample) -> None:
         import rospy
@@ -296,7 +291,7 @@ def main(build_tree: Path | None = None) -> int:
             sys.stdout.reconfigure(line_buffering=True)
         rospy.init_node("follow_joint_trajectory")
         name = rospy.resolve_name(rospy.get_param("~runner", "rt_runner"))
-        entry = runner_entry.find(_master(rosgraph.get_master_uri()), name)
+        entry = runner_entry.find(Master(rosgraph.get_master_uri(), rospy.get_name()), name)
         socket = entry.socket if entry is not None else os.environ.get("RTCF_SOCKET")
         runner = entry.runner if entry is not None else name.strip("/").replace("/", "_")
         with rtcf.Client(socket or None) as client:
@@ -313,9 +308,3 @@ def main(build_tree: Path | None = None) -> int:
         print(f"follow_joint_trajectory: {error}", file=sys.stderr)
         return Code.REFUSED
     return Code.DONE
-
-
-def _master(uri: str) -> Any:
-    from rtcf_launch.master import Master
-
-    return Master(uri, "/follow_joint_trajectory")

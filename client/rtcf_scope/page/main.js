@@ -208,10 +208,10 @@ function open(name) {
   scope.changed();
 }
 
-function showRobot(is) {
+function showRobot(is, found) {
   $("robots").setAttribute("aria-pressed", String(is));
   $("between").hidden = !is;
-  if (is) robot.open(); else robot.close();
+  if (is) robot.open(found); else robot.close();
   scope.changed();
 }
 
@@ -346,7 +346,10 @@ async function begin() {
   page.right = about.right;
   connect(page.runner());
   if (asked) apply(asked);
-  else if ((await ask(`/api/robot?${query({ runner: page.runner() })}`).catch(() => null))?.links.length) showRobot(true);
+  else {
+    const found = await robot.request().catch(() => null);
+    if (found?.links.length) showRobot(true, found);
+  }
   // Not earlier: until then the address has the requested layout.
   scope.onLayout = () => layout.toAddress(() => layout.taken(scope, page.runner(), drawer, xy, robot));
   await Promise.all([layouts(), recordings.show()]);

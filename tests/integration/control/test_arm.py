@@ -129,6 +129,11 @@ def test_sliders_and_a_goal_move_the_arm(arm: rtcf.Client) -> None:
     operate(arm, mode="sliders", joint1=0.8, joint5=0.5)
     arm.step(3 * CYCLES)
     assert positions(arm) == pytest.approx([0.8, 0.3, 1.6, 0.0, 0.5, 0.0], abs=STILL)
+    operate(arm, mode="goal")
+    goal = [-0.4, 0.1, 1.4, 0.3, 0.8, 0.2]
+    arm.write("operator.goal", {"position": goal})
+    arm.step(3 * CYCLES)
+    assert positions(arm) == pytest.approx(goal, abs=STILL)
 
 
 def test_without_a_target_the_arm_stands_in_its_first_pose(arm: rtcf.Client) -> None:

@@ -40,10 +40,11 @@ export class Robot {
     this.loads = 0; // finished so far, for tests
   }
 
-  async open() {
+  // `found`: the robot, if it is known.
+  async open(found) {
     this.isOpen = true;
     this.box.hidden = false;
-    await this.load();
+    await this.load(found);
   }
 
   close() {
@@ -54,11 +55,13 @@ export class Robot {
     this.onSignals();
   }
 
-  // Requests the robot again: the graph has changed.
-  async load() {
+  request() { return ask(`/api/robot?${query({ runner: this.page.runner() })}`); }
+
+  // Takes the robot, which is requested if it is not known: the graph has changed.
+  async load(known) {
     if (!this.isOpen) return;
     try {
-      const found = await ask(`/api/robot?${query({ runner: this.page.runner() })}`);
+      const found = known ?? await this.request();
       this.says.textContent = found.links.length ? "" : "no robot: give a component the path of a URDF, or start the scope with --robot FILE";
       await this.#engine();
       await this.#build(found);
@@ -94,7 +97,7 @@ export class Robot {
     new ResizeObserver(() => { this.drawn = ""; }).observe(this.canvas.parentElement);
   }
 
-  // Makes the links of a description; meshes of the same file are kept.
+  // Makes the links and signals of a description; those that are the same as before are kept.
   async #build(found) {
     const description = JSON.stringify(found), form = JSON.stringify(found.links);
     if (description === this.description) return;
@@ -125,7 +128,7 @@ export class Robot {
       (parent?.ghost ?? this.scene).add(link.ghost);
     }
     this.form = form;
-    this.#pose((joint) => this.#value(joint, "position"), "group");
+    this.#pose(this.#values("position"), "group");
     this.#look();
     this.drawn = "";
   }
@@ -184,9 +187,13 @@ export class Robot {
     object.rotation.set(...rpy, "ZYX");
   }
 
-  #value(joint, which) {
-    const name = joint[which], store = this.scope.store, column = name && store.column(name);
-    return column && !store.empty ? column.get(this.#at(store)) : NaN;
+  // The position or target of each joint; NaN where there is none.
+  #values(which) {
+    const { store } = this.scope, at = store.empty ? NaN : this.#at(store);
+    return this.joints.map((joint) => {
+      const name = joint[which], column = name && store.column(name);
+      return column && !store.empty ? column.get(at) : NaN;
+    });
   }
 
   // The newest cycle, or the last one in sight where time stands still.
@@ -197,18 +204,17 @@ export class Robot {
     return Math.max(store.begin, Math.min(store.find(scope.cursors.a ?? scope.view.end), store.end - 1));
   }
 
-  // Turns the joints of the robot ("group") or of its ghost by `value(joint)`.
-  #pose(value, which) {
-    const { Quaternion, Vector3 } = this.three, values = new Map(this.joints.map((joint) => [joint.joint, value(joint)]));
+  // Turns the joints of the robot ("group") or of its ghost by the values of `joints`.
+  #pose(values, which) {
+    const { Quaternion, Vector3 } = this.three, by = new Map(this.joints.map(({ joint }, i) => [joint, values[i]]));
     for (const link of this.links.values()) {
       const object = link[which];
       if (!link.parent) continue;
       this.#place(object, link);
       if (!link.moves) continue;
       const { mimic } = link;
-      let moved = mimic ? (values.get(mimic.joint) ?? NaN) * mimic.multiplier + mimic.offset : values.get(link.joint) ?? NaN;
-      if (values.has(link.joint) && mimic && Number.isFinite(values.get(link.joint))) moved = values.get(link.joint);
-      if (!Number.isFinite(moved)) moved = 0;
+      const mimicked = mimic ? by.get(mimic.joint) * mimic.multiplier + mimic.offset : NaN;
+      const moved = [by.get(link.joint), mimicked, 0].find(Number.isFinite);
       const axis = new Vector3(...link.axis).normalize();
       if (link.type === "prismatic") object.translateOnAxis(axis, moved);
       else object.quaternion.multiply(new Quaternion().setFromAxisAngle(axis, moved));
@@ -307,7 +313,7 @@ export class Robot {
   // Draws, if something has changed. Returns whether it did.
   frame() {
     if (!this.isOpen || !this.renderer || !this.links.size) return false;
-    const values = this.joints.map((joint) => this.#value(joint, "position")), targets = this.joints.map((joint) => this.#value(joint, "target"));
+    const values = this.#values("position"), targets = this.#values("target");
     const drawn = `${values.map((each) => each.toFixed(5))} ${this.ghost.checked && targets.map((each) => each.toFixed(5))}`;
     if (drawn === this.drawn) return false;
     this.drawn = drawn;
@@ -323,10 +329,10 @@ export class Robot {
     const { centre, orbit: { distance, turn, tilt } } = this;
     this.camera.position.set(centre.x + distance * Math.cos(tilt) * Math.cos(turn), centre.y + distance * Math.cos(tilt) * Math.sin(turn), centre.z + distance * Math.sin(tilt));
     this.camera.lookAt(centre);
-    this.#pose((joint) => values[this.joints.indexOf(joint)], "group");
+    this.#pose(values, "group");
     const isApart = this.ghost.checked && values.some((each, i) => Math.abs(each - targets[i]) > NEAR);
     for (const link of this.links.values()) if (!link.parent) link.ghost.visible = isApart;
-    if (isApart) this.#pose((joint) => { const i = this.joints.indexOf(joint); return Number.isFinite(targets[i]) ? targets[i] : values[i]; }, "ghost");
+    if (isApart) this.#pose(targets.map((each, i) => (Number.isFinite(each) ? each : values[i])), "ghost");
     this.joints.forEach((joint, i) => joint.show(values[i]));
     this.renderer.render(this.scene, this.camera);
     this.frames++;
