@@ -19,7 +19,7 @@ from rtcf_scope.chunk import Chunk, History
 
 _MOST_BATCHES = 32  # batches between reader thread and event loop
 _REOPEN_S = 1.0  # delay before a failed stream is opened again
-_HISTORY_BYTES = 64 * 1024 * 1024  # bytes
+_HISTORY_BYTES = 64 * 1024 * 1024
 _MOST_COLUMNS = 16384  # outputs and states that rtcfd accepts in one selection
 _NO_COLUMN = "/."  # matches no output and no state: only the cycles are streamed
 _SWITCH_S = 2.0  # for the old reader to reach the first cycle of the new one
