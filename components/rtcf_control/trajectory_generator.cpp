@@ -368,22 +368,23 @@ class TrajectoryGenerator final : public rtcf::Component {
         // Others move the joints: in each cycle, begins again where they are.
         const bool idles = idle.read() != rtcf::DataStatus::None && idle.value();
         if (idles && measured.read() != rtcf::DataStatus::None) begun_ = false;
+        const bool stop = (halt.read() != rtcf::DataStatus::None && halt.value()) || idles;
+        if (stop) rejectMessages();
         const std::int64_t last = begun_ ? time_.value() : 0;  // of the present motion
-        if (!begun_) {
-            if (!begin()) return;
-        } else {
+        if (begun_) {
             time_ += elapsed();
+        } else if (!begin()) {
+            rejected.write(rejected_);
+            return;
         }
         restore(last);
         adoptLimits(last);
-        const bool stop = (halt.read() != rtcf::DataStatus::None && halt.value()) || idles;
         if (stop && !halted_) stopFrom(last);
         halted_ = stop;
-        if (target.read() == rtcf::DataStatus::New && !(halted_ && reject("target", "halted")))
-            follow(target.value(), last);
+        if (target.read() == rtcf::DataStatus::New) follow(target.value(), last);
         // At most one in each cycle: its number of points bounds the work.
         if (const auto* const message = trajectory.front()) {
-            if (!(halted_ && reject("trajectory", "halted"))) follow(*message, last);
+            follow(*message, last);
             trajectory.pop();
         }
         advance(last);
@@ -406,17 +407,20 @@ class TrajectoryGenerator final : public rtcf::Component {
         return !memory_->points.empty() && time >= memory_->points.begin();
     }
 
-    // Counts and logs a rejected message; returns true.
-    bool reject(const char* what, const char* why) {
+    // Counts and logs a rejected message.
+    void reject(const char* what, const char* why) {
         ++rejected_;
         RTCF_WARN_THROTTLE(this, 1.0, "{} rejected: {}", what, why);
-        return true;
     }
-    bool reject(const char* what, std::size_t joint, const char* why) {
+    void reject(const char* what, std::size_t joint, const char* why) {
         ++rejected_;
         RTCF_WARN_THROTTLE(this, 1.0, "{} rejected: joint {}: {}", what, setup_->joints[joint],
                            why);
-        return true;
+    }
+    // Leaves no target and no trajectory that would be followed after the stop.
+    void rejectMessages() {
+        if (target.read() == rtcf::DataStatus::New) reject("target", "halted");
+        for (; trajectory.front() != nullptr; trajectory.pop()) reject("trajectory", "halted");
     }
 
     // Finds the index of each joint in a message. Without names, joints have the order of the

@@ -328,6 +328,33 @@ TEST(TrajectoryGenerator, StandsWhereOthersMoveTheJointsUntilANewTarget) {
     EXPECT_NEAR(generator.now().position[0], 0.0, kRounding);
 }
 
+TEST(TrajectoryGenerator, RejectsWhatComesWhileItDoesNotKnowWhereTheJointsAre) {
+    constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+    for (const std::string port : {"idle", "halt"}) {
+        Bench bench("TrajectoryGenerator", Generator::withDefaults(1, {}));
+        bench.write("measured", jointState({port == "idle" ? 0.0 : kNaN}));
+        bench.cycle();
+        bench.write("measured", jointState({kNaN}));
+        bench.write(port, true);
+        bench.cycle();
+        trajectory_msgs::JointTrajectory message;
+        message.points = {pointAt(1.0, {0.5})};
+        for (int i = 0; i < 3; ++i) {
+            bench.write("target", jointState({1.0}));
+            bench.write("trajectory", message);
+            bench.cycle();
+        }
+        EXPECT_EQ(*bench.read<std::uint32_t>("rejected"), 6U) << port;
+        bench.write(port, false);
+        bench.write("measured", jointState({0.3}));
+        for (int i = 0; i < 5; ++i) {
+            bench.cycle();
+            EXPECT_EQ(bench.read<sensor_msgs::JointState>("command")->position, Vector{0.3});
+            EXPECT_TRUE(*bench.read<bool>("done"));
+        }
+    }
+}
+
 TEST(TrajectoryGenerator, HaltsWhileIdleWithoutAMeasurement) {
     Bench bench("TrajectoryGenerator",
                 Generator::withDefaults(1, {{"initial", std::string("0.5")}}));
