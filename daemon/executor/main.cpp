@@ -22,6 +22,7 @@
 #include "faults/flight_recorder.hpp"
 #include "logging/log.hpp"
 #include "names/names.hpp"
+#include "realtime/cycle_counter.hpp"
 #include "realtime/realtime.hpp"
 #include "ros/logging/rosout.hpp"
 #include "ros/ros_node.hpp"
@@ -218,8 +219,7 @@ int run(const Options& options) {
         if (event.message.empty()) return;
         LogEntry entry;
         entry.level = levelOf(event.kind);
-        entry.time_ns =
-            std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch()).count();
+        entry.time_ns = realtimeNow();
         entry.iteration = event.iteration;
         entry.component = event.component;
         entry.message = event.message;

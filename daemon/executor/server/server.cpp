@@ -21,6 +21,7 @@
 #include "messages/known_values.hpp"
 #include "messages/settings_messages.hpp"
 #include "messages/to_wire.hpp"
+#include "realtime/cycle_counter.hpp"
 #include "rtcf/version.hpp"
 #include "server/change.hpp"
 
@@ -64,8 +65,7 @@ bool trusted(int fd) {
 v1::Response lostRecords(std::uint64_t count) {
     LogEntry entry;
     entry.level = LogLevel::Warn;
-    entry.time_ns =
-        std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch()).count();
+    entry.time_ns = realtimeNow();
     entry.message = fmt::format("{} log records were dropped: no rtcfd read them in time", count);
     v1::Response response;
     *response.mutable_log() = logTo(entry);

@@ -1,7 +1,5 @@
 #include "snapshot/snapshot.hpp"
 
-#include <string_view>
-
 namespace rtcf::executor {
 
 SnapshotType snapshotTypeOf(const TypeInfo& type) {

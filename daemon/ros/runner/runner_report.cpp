@@ -170,7 +170,7 @@ diagnostic_msgs::DiagnosticArray DiagnosticReport::take() {
     diagnostic_msgs::DiagnosticArray array;
     array.status.push_back(loopStatus());
     const double ns_per_tick = runner_.loop().counter().nsPerTick();
-    std::map<StatisticsReport, Counts> counts;
+    std::map<Statistics, Counts> counts;
     const std::shared_ptr<const executor::GraphView> graph = runner_.graph();
     for (const auto& component : graph->components) {
         Counts& last = counts[component->statistics];

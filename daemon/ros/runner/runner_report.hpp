@@ -41,7 +41,7 @@ class DiagnosticReport {
     diagnostic_msgs::DiagnosticArray take();
 
    private:
-    using StatisticsReport = std::shared_ptr<const executor::ComponentStatistics>;
+    using Statistics = std::shared_ptr<const executor::ComponentStatistics>;
     struct Counts {  // counts at the last report
         executor::HistogramSnapshot duration;
         std::uint64_t overruns = 0;
@@ -66,7 +66,7 @@ class DiagnosticReport {
     std::int64_t time_ns_ = 0;
     bool ran_ = false;                   // at the last report
     std::vector<std::string> degraded_;  // as last reported
-    std::map<StatisticsReport, Counts> components_;
+    std::map<Statistics, Counts> components_;
 };
 
 }  // namespace rtcf::ros1
