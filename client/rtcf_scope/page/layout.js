@@ -20,7 +20,7 @@ function paneTaken(pane) {
   return { traces, ...(pane.scale && { scale: pane.scale }), ...(pane.right.set && { right: pane.right.set }), ...(weight !== 1 && { height: weight }) };
 }
 
-// What a layout may say of a trigger.
+// The trigger settings of a layout, and their types.
 const TRIGGER = { signal: "string", kind: "string", slope: "string", condition: "string", low: "number", high: "number",
   window: "number", position: "number", holdoff: "number", single: "boolean" };
 

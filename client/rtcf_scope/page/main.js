@@ -61,7 +61,7 @@ function arm(trigger) {
   stream?.want({ trigger });
 }
 
-// What the panes show is watched: one request for all changes at a time.
+// Watches the signals of the panes and the robot: one request for all changes at a time.
 let watching = false;
 function watch() {
   if (watching) return;
@@ -331,9 +331,9 @@ function buttons() {
 }
 
 function frame(now) {
+  requestAnimationFrame(frame); // first, so that an error does not end the drawing
   const isDrawn = scope.frame(now);
   if (robot.frame() || isDrawn) counters.frames++;
-  requestAnimationFrame(frame);
 }
 
 async function begin() {

@@ -6,16 +6,16 @@ from pathlib import Path
 import pytest
 import rtcf
 from browser import Browser, Page
-from daemon_process import BUILD_TREE, NO_ROS, Daemon, wait_for
+from daemon_process import BUILD_TREE, Daemon, wait_for
 from rtcf_shared.graph_reader import read_graphs
+from scope_pages import Opener
 from scope_process import ScopeProcess
 
 ARM = BUILD_TREE / "devel" / "share" / "rtcf_arm"
-JOINTS = [f"joint{i}" for i in range(1, 7)]
 
 
 @pytest.fixture(scope="module")
-def webgl(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     """Yield a browser with WebGL."""
     with Browser(tmp_path_factory.mktemp("browser"), webgl=True) as browser:
         yield browser
@@ -29,16 +29,12 @@ def arm(daemon: Daemon, client: rtcf.Client) -> Daemon:
     return daemon
 
 
-@pytest.fixture
-def settings() -> str:
-    return NO_ROS
-
-
-def opened(browser: Browser, scope: ScopeProcess) -> Page:
+def opened(visit: Opener, scope: ScopeProcess) -> Page:
     """Return a page that shows the robot."""
-    page = browser.page(scope.address)
+    page = visit(scope)
     page.wait("document.getElementById('state').textContent")
-    page.ask("document.getElementById('robots').click()")
+    # The page opens the robot itself where it finds one; a click would close it again.
+    page.ask("robot.isOpen || document.getElementById('robots').click()")
     return page
 
 
@@ -62,10 +58,10 @@ def hand(page: Page) -> list[float]:
 
 
 def test_the_robot_moves_with_the_loop_and_shows_its_target(
-    webgl: Browser, arm: Daemon, client: rtcf.Client
+    visit: Opener, arm: Daemon, client: rtcf.Client
 ) -> None:
     with ScopeProcess(arm) as scope:
-        page = opened(webgl, scope)
+        page = opened(visit, scope)
         client.start()
         page.wait("robot.joints.length === 8 && robot.frames > 0")
         assert page.ask("robot.links.get('upper_arm').parent") == "shoulder"
@@ -82,12 +78,24 @@ def test_the_robot_moves_with_the_loop_and_shows_its_target(
         x, y, _ = hand(page)
         assert y > 2.0 * x > 0.0, "the arm has turned to the left"
         assert page.errors == []
-        page.close()
 
 
-def test_a_picked_joint_shows_its_signals(webgl: Browser, arm: Daemon, client: rtcf.Client) -> None:
+def test_a_robot_without_values_is_drawn_and_moves_once_they_come(
+    visit: Opener, arm: Daemon, client: rtcf.Client
+) -> None:
     with ScopeProcess(arm) as scope:
-        page = opened(webgl, scope)
+        page = opened(visit, scope)
+        page.wait("robot.loads > 0 && robot.frames > 0")
+        texts = "[...robot.list.querySelectorAll('span')].map(({textContent}) => textContent)"
+        assert page.ask(texts) == ["\u2013"] * 8
+        client.start()
+        page.wait("robot.list.textContent.includes('71.0°')")
+        assert page.errors == []
+
+
+def test_a_picked_joint_shows_its_signals(visit: Opener, arm: Daemon, client: rtcf.Client) -> None:
+    with ScopeProcess(arm) as scope:
+        page = opened(visit, scope)
         client.start()
         page.wait("robot.joints.length === 8 && robot.frames > 0")
         # On the canvas: a place at which the upper arm is drawn.
@@ -108,14 +116,13 @@ def test_a_picked_joint_shows_its_signals(webgl: Browser, arm: Daemon, client: r
         page.wait("scope.traces().length === 4")
         assert page.ask("scope.traces().map(({name}) => name)") == names
         assert page.ask("robot.picked") == "joint2"
-        page.close()
 
 
 def test_a_frozen_page_keeps_the_robot_still(
-    webgl: Browser, arm: Daemon, client: rtcf.Client
+    visit: Opener, arm: Daemon, client: rtcf.Client
 ) -> None:
     with ScopeProcess(arm) as scope:
-        page = opened(webgl, scope)
+        page = opened(visit, scope)
         client.start()
         client.set_parameters("operator", [rtcf.parse_parameter("mode:=tour")])
         page.wait("robot.frames > 20")
@@ -129,7 +136,6 @@ def test_a_frozen_page_keeps_the_robot_still(
         assert page.ask("robot.drawn") == frozen
         page.ask("document.getElementById('freeze').click()")
         page.wait(f"robot.drawn !== {frozen!r}")
-        page.close()
 
 
 @pytest.mark.parametrize(
@@ -141,18 +147,17 @@ def test_a_frozen_page_keeps_the_robot_still(
     ],
 )
 def test_a_robot_that_cannot_be_shown_is_explained(
-    webgl: Browser, running: Daemon, tmp_path: Path, text: str, said: str
+    visit: Opener, running: Daemon, tmp_path: Path, text: str, said: str
 ) -> None:
     file = tmp_path / "robot.urdf"
     file.write_text(text)
     options = ("--robot", str(file)) if text else ()
     with ScopeProcess(running, *options) as scope:
-        page = opened(webgl, scope)
+        page = opened(visit, scope)
         page.wait("robot.loads > 0")
         shown: str = page.ask("robot.says.textContent")
         assert said in shown
         assert bool(said) == bool(shown)
-        page.close()
 
 
 def test_a_file_that_is_missing_is_rejected_at_the_start(running: Daemon) -> None:

@@ -38,6 +38,7 @@ export class Robot {
     this.form = ""; // the part of it that is drawn
     this.frames = 0; // drawn so far
     this.loads = 0; // finished so far, for tests
+    this.lastLoad = Promise.resolve();
   }
 
   // `found`: the robot, if it is known.
@@ -57,8 +58,13 @@ export class Robot {
 
   request() { return ask(`/api/robot?${query({ runner: this.page.runner() })}`); }
 
-  // Takes the robot, which is requested if it is not known: the graph has changed.
-  async load(known) {
+  // Takes the robot, which is requested if it is not known: the graph has changed. One load after the other.
+  load(known) {
+    this.lastLoad = this.lastLoad.then(() => this.#load(known));
+    return this.lastLoad;
+  }
+
+  async #load(known) {
     if (!this.isOpen) return;
     try {
       const found = known ?? await this.request();
@@ -66,6 +72,7 @@ export class Robot {
       await this.#engine();
       await this.#build(found);
     } catch (error) {
+      this.description = ""; // the next load tries again
       this.says.textContent = error.message;
     }
     this.loads++;
@@ -146,7 +153,7 @@ export class Robot {
       row.append(Object.assign(document.createElement("b"), { textContent: joint.joint }), bar, says);
       row.onclick = () => this.#pick(joint.joint);
       joint.show = (value) => {
-        bar.value = value;
+        bar.value = Number.isFinite(value) ? value : 0; // it throws at NaN
         says.textContent = Number.isFinite(value) ? joint.type === "prismatic" ? `${(value * 1e3).toFixed(1)} mm` : `${(value * 180 / Math.PI).toFixed(1)}°` : "–";
       };
       joint.row = row;

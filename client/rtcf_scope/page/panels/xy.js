@@ -26,7 +26,7 @@ export class XY {
     this.equal.onchange = () => { this.isEqual = this.equal.checked; this.#again(); };
   }
 
-  // What a layout says of it.
+  // Takes the settings of a layout.
   take({ x, y, equal } = {}) {
     this.chosen = { x: typeof x === "string" ? x : "", y: typeof y === "string" ? y : "" };
     this.isEqual = equal === true;
