@@ -20,7 +20,7 @@ namespace rtcf_control {
 constexpr std::array<const char*, 3> kQuantities{"position", "velocity", "effort"};
 
 /// Reason of a status.
-/// @tparam Kind enum of a component; its first value is that before the first status
+/// @tparam Kind enum of a component; its first value means that there is no status yet
 template <typename Kind>
 struct JointFinding {
     Kind kind{};

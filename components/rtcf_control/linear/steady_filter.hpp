@@ -15,12 +15,13 @@ struct SteadyFilter {
     Eigen::MatrixXd gain;  ///< estimate by innovation
 };
 
-/// Error that names a mode for which there is no steady state; empty if there is none. With the
-/// covariance `process_noise` of w.
+/// Names a mode for which the filter has no steady state; empty if all have one.
+/// @param process_noise covariance of w
 std::string steadyFilterError(const Eigen::MatrixXd& a, const Eigen::MatrixXd& c,
                               const Eigen::MatrixXd& process_noise);
 
-/// With the covariances of w and v.
+/// @param process_noise covariance of w
+/// @param measurement_noise covariance of v
 /// @return empty if the Riccati equation has no solution
 std::optional<SteadyFilter> steadyFilter(const Eigen::MatrixXd& a, const Eigen::MatrixXd& c,
                                          const Eigen::MatrixXd& process_noise,

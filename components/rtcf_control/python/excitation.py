@@ -169,9 +169,9 @@ class Excitation(Component):
 
     def begin(self, command):
         """Begin the excitation if limits, command and measured value allow it."""
+        self.progress = Progress.not_begun
         if not self.lower < self.upper:
             self.warn("not begun: set lower and upper, the limits of y")
-            self.progress = Progress.not_begun
         elif not (math.isfinite(command) and self.lower <= command <= self.upper):
             self.warn(
                 "not begun: u = {} is outside lower = {} to upper = {}",
@@ -179,7 +179,6 @@ class Excitation(Component):
                 self.lower,
                 self.upper,
             )
-            self.progress = Progress.not_begun
         elif not self.inside():
             self.warn(
                 "not begun: measured has no value, or is outside measured_lower = {} to "
@@ -187,7 +186,6 @@ class Excitation(Component):
                 self.measured_lower,
                 self.measured_upper,
             )
-            self.progress = Progress.not_begun
         else:
             self.progress = Progress.running
             self.base = command

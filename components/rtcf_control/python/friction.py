@@ -5,7 +5,7 @@ import math
 import numpy as np
 from rtcf.component import Component, Input, Output, Parameter, State
 
-FARTHEST = 1e30  # velocity, in stribeck_velocity, from which nothing of breakaway is left
+FARTHEST = 1e30  # velocity, in stribeck_velocity, above which breakaway has no effect
 
 
 def friction(law, v):
