@@ -26,7 +26,7 @@ class Unusable(Exception):
 
 @dataclass
 class Cycles:
-    """What was recorded, one entry a cycle, in ns; in the order of the cycles."""
+    """The recorded times, one entry a cycle, in ns; in the order of the cycles."""
 
     begins: list[int]  # when the cycle began
     durations: list[int]

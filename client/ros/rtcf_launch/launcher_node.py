@@ -109,7 +109,7 @@ class LauncherNode:
         self._values = values if isinstance(values, dict) else {}
         self._component = self._component.with_parameters(self._values)
         self._run_id = str(self._master.parameter("/run_id", "")) or f"{os.getpid()}"
-        # What is wrong whatever the component declares is said before anything is waited for.
+        # Report errors that do not depend on the component before any wait.
         component_parameters.read(self._values)
 
     def _enter_ros(self) -> None:

@@ -17,7 +17,7 @@ _SETTLE_S = 2.0
 
 
 class RunnerChoice:
-    """The choice of a runner, polled until there is one; `waiting` has the missing one."""
+    """The choice of a runner, polled until there is one; `waiting` describes the missing one."""
 
     def __init__(self, master: Master, ns: str, named: str | None) -> None:
         self._master = master

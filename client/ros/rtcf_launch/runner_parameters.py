@@ -108,7 +108,7 @@ def read(values: dict[str, Any]) -> tuple[RunnerParameters, list[str]]:
         daemon=given.word("daemon", DAEMONS) or DAEMONS[0],
         exit_on_fault=(given.word("on_fault", ("exit", "stay")) or "exit") == "exit",
     )
-    # What is no word of ours may be a slip of the pen, or somebody else's.
+    # An unknown name may be a typing error, or belong to another program.
     unknown = sorted(name for name in given.rest() if name != RUNNER_ENTRY)
     return result, [
         f"parameter ~{name} is not known to rt_runner{close_to(name, _NAMES)}" for name in unknown
@@ -116,7 +116,7 @@ def read(values: dict[str, Any]) -> tuple[RunnerParameters, list[str]]:
 
 
 def _graph(given: Parameters, settings: runner_pb2.RunnerSettings) -> list[graph_pb2.ComponentSpec]:
-    """Return the components of the file ~graph; parameters have priority over its settings."""
+    """Return the components of the file ~graph; add its settings, below the parameters."""
     file = given.text("graph")
     if file is None:
         return []
@@ -130,11 +130,10 @@ def _graph(given: Parameters, settings: runner_pb2.RunnerSettings) -> list[graph
         raise Ending(Code.USAGE, f"~graph {error}") from None
     if len(graphs) != 1:
         raise Ending(Code.USAGE, f"~graph {file} has {len(graphs)} runners: one is needed")
-    merged = runner_pb2.RunnerSettings()
-    merged.CopyFrom(graphs[0].settings)
-    merged.MergeFrom(settings)
-    settings.CopyFrom(merged)
-    return list(graphs[0].components)
+    (graph,) = graphs
+    graph.settings.MergeFrom(settings)
+    settings.CopyFrom(graph.settings)
+    return graph.components
 
 
 def _range(field: str) -> tuple[float, float]:

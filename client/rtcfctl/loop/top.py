@@ -164,7 +164,7 @@ class _Layout:
 
 
 class _Means:
-    """The mean of a times between successive updates."""
+    """The mean of a distribution between successive updates."""
 
     def __init__(self) -> None:
         self.kept: deque[float] = deque(maxlen=_KEPT)

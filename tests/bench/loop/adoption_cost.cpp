@@ -76,11 +76,10 @@ int main(int argc, char** argv) try {
             found["load"].push_back(adoptionOf(graph, [&] { graph.adopt(grown); }));
             found["unload"].push_back(adoptionOf(graph, [&] { graph.adopt(small); }));
         }
-        std::vector<std::string> statistics;
+        std::vector<std::string> medians;
         for (const auto& [change, values] : found)
-            statistics.push_back(fmt::format("\"{}_ns\": {:.0f}", change, median(values)));
-        rows.push_back(
-            fmt::format("{{\"components\": {}, {}}}", length, fmt::join(statistics, ", ")));
+            medians.push_back(fmt::format("\"{}_ns\": {:.0f}", change, median(values)));
+        rows.push_back(fmt::format("{{\"components\": {}, {}}}", length, fmt::join(medians, ", ")));
     }
     fmt::print("{{\"rounds\": {}, \"graphs\": [{}]}}\n", rounds, fmt::join(rows, ", "));
     return 0;

@@ -7,13 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import rtcf
 from actionlib_msgs.msg import GoalStatus
 from daemon_process import wait_for
 from launch_processes import Launching
 from pages import SUPPORT
 from ros_processes import Master
 from rtcf_launch import control_messages
+from values import port_value
 
 JOINTS = [f"joint{i}" for i in range(1, 7)]
 READY = [0.0, 0.3, 1.6, 0.0, 1.24, 0.0]
@@ -81,16 +81,10 @@ def peer(launching: Launching) -> Iterator[Peer]:
     peer.end()
 
 
-def position(launching: Launching, joint: str = "joint1") -> float:
-    """Return the measured position of a joint."""
+def measured(launching: Launching, port: str) -> float:
+    """Return the newest value of a port of the robot."""
     with launching.client() as (client, runner):
-        return _position(client, runner, joint)
-
-
-def _position(client: rtcf.Client, runner: str, joint: str) -> float:
-    ports = client.get_component("/robot", runner).ports
-    (value,) = (each.value for each in ports if each.name == f"{joint}_position")
-    return float(value.removeprefix("data: "))
+        return port_value(client, "/robot", port, runner)
 
 
 def test_the_messages_are_those_of_control_msgs() -> None:
@@ -107,22 +101,15 @@ def test_the_arm_follows_a_trajectory_with_joints_in_any_order(
     assert (result["state"], result["code"]) == (GoalStatus.SUCCEEDED, 0), result
     assert result["feedback"] >= 3
     for joint, wanted in zip(JOINTS, goal, strict=True):
-        assert position(launching, joint) == pytest.approx(wanted, abs=0.02)
+        assert measured(launching, f"{joint}_position") == pytest.approx(wanted, abs=0.02)
 
 
 def test_a_cancelled_goal_stops_the_arm(launching: Launching, peer: Peer) -> None:
     peer.send([[1.5, READY, STANDS]])
     result = peer.send([[5.0, [2.0, *READY[1:]], STANDS]], cancel=1.5)
     assert result["state"] == GoalStatus.PREEMPTED
-    wait_for(lambda: _stands(launching), "the arm to stand")
-    assert 0.0 < position(launching) < 1.5
-
-
-def _stands(launching: Launching) -> bool:
-    with launching.client() as (client, runner):
-        ports = client.get_component("/robot", runner).ports
-        (value,) = (each.value for each in ports if each.name == "joint1_velocity")
-        return abs(float(value.removeprefix("data: "))) < 1e-3
+    wait_for(lambda: abs(measured(launching, "joint1_velocity")) < 1e-3, "the arm to stand")
+    assert 0.0 < measured(launching, "joint1_position") < 1.5
 
 
 def test_a_new_goal_replaces_the_present_one(launching: Launching, peer: Peer) -> None:
@@ -130,7 +117,7 @@ def test_a_new_goal_replaces_the_present_one(launching: Launching, peer: Peer) -
     peer.send([[4.0, [1.5, *READY[1:]], STANDS]], replace=1.0)
     result = peer.send([[1.5, [-0.3, *READY[1:]], STANDS]], goal={"joint1": 0.01})
     assert (result["state"], result["code"]) == (GoalStatus.SUCCEEDED, 0), result
-    assert position(launching) == pytest.approx(-0.3, abs=0.02)
+    assert measured(launching, "joint1_position") == pytest.approx(-0.3, abs=0.02)
 
 
 @pytest.mark.parametrize(
