@@ -82,8 +82,8 @@ class EStop final : public rtcf::Component {
             const bool has_value = input.read() != rtcf::DataStatus::None;
             const bool is_required = i < static_cast<std::size_t>(required.value());
             bool& wired = wired_.value()[i];
-            wired = wired || input.connected();
-            const bool lost = !has_value || (wired && !input.connected());
+            wired = wired || input.connected(this);
+            const bool lost = !has_value || (wired && !input.connected(this));
             condition = condition || (has_value && input.value()) || (is_required && lost);
         }
         const rtcf::DataStatus command = in.read();

@@ -148,7 +148,7 @@ class JointLimiter final : public rtcf::Component {
 
     // False without a value that is needed. A value that is not finite is reported as a fault.
     bool usable(const rtcf::Input<double>& measured, bool needed) {
-        if (std::isfinite(measured.value())) return !needed || measured.age() >= 0;
+        if (std::isfinite(measured.value())) return !needed || measured.hasValue();
         out.write(measured.value());  // rejected by the check: readers keep the last output
         return false;
     }

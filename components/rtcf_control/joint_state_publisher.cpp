@@ -128,7 +128,7 @@ class JointStatePublisher final : public rtcf::Component {
             const bool has_value = input.read() != rtcf::DataStatus::None;
             part.used = part.used || has_value;
             values[i] = input.value();
-            if (!has_value || 1e-9 * static_cast<double>(input.age()) > timeout) {
+            if (!has_value || 1e-9 * static_cast<double>(input.age(this)) > timeout) {
                 part.missing |= 1U << i;
             } else if (!std::isfinite(values[i])) {
                 part.not_finite |= 1U << i;

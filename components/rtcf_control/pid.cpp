@@ -172,7 +172,7 @@ class Pid final : public rtcf::Component {
         const double schedule = valueOr(gain, 1.0);
         const bool by_hand = valueOr(manual, in_manual.value());
         const double by_hand_effort = valueOr(manual_effort, manual_value.value());
-        const bool has_actual = actual.read() != rtcf::DataStatus::None && actual.connected() &&
+        const bool has_actual = actual.read() != rtcf::DataStatus::None && actual.connected(this) &&
                                 std::isfinite(actual.value());
         const double r = setpoint.value();
         const double y = measured.value();

@@ -519,7 +519,7 @@ class StateSpace final : public rtcf::Component {
 
     static bool complete(const Ports<rtcf::Input<double>, kPorts>& ports, int count) {
         return std::all_of(ports.begin(), ports.begin() + count,
-                           [](const auto& port) { return port->age() >= 0; });
+                           [](const auto& port) { return port->hasValue(); });
     }
 
     // Rejected by the check: readers keep the last outputs.

@@ -73,7 +73,7 @@ class Chaos final : public rtcf::Component {
     bool readAny(rtcf::Input<T>& input) {
         const rtcf::DataStatus status = input.read();
         note(static_cast<double>(status));
-        if (timed) note(static_cast<double>(input.age()));
+        if (timed) note(static_cast<double>(input.age(this)));
         return status != rtcf::DataStatus::None;
     }
 

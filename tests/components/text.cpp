@@ -26,7 +26,7 @@ class Text final : public rtcf::Component {
         if (heard.read() >= rtcf::DataStatus::Old) {
             length.write(static_cast<std::int64_t>(heard.value().data.size()));
         }
-        age.write(heard.age());
+        age.write(heard.age(this));
     }
 };
 

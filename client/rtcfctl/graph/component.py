@@ -253,7 +253,7 @@ def _print_members(
 def print_ports(ports: list[graph_pb2.PortInfo], output: Output) -> None:
     """Print ports with mapped names, types and newest values."""
     output.table(
-        ("port", "", "mapped name", "type", "value", "unit", "age", "count", ""),
+        ("port", "", "mapped name", "type", "value", "unit", "age", ""),
         (
             (
                 port.name,
@@ -263,12 +263,11 @@ def print_ports(ports: list[graph_pb2.PortInfo], output: Output) -> None:
                 words.port_value(port.value) if port.HasField("value") else "",
                 port.unit,
                 words.age(port.age_ns) if port.HasField("age_ns") else "",
-                port.count or "",
                 _flags(port),
             )
             for port in ports
         ),
-        right=("age", "count"),
+        right=("age",),
     )
 
 

@@ -63,8 +63,8 @@ class $component : public rtcf::Component {
                                   rtcf::Doc("largest effort, either way")};
 
     void update() override {
-        setpoint.read();
-        if (measured.read() == rtcf::DataStatus::None) return;
+        const bool is_led = setpoint.read() != rtcf::DataStatus::None;
+        if (measured.read() == rtcf::DataStatus::None || !is_led) return;
         const double error = setpoint.value() - measured.value();
         effort.write(std::clamp(gain * error, -limit.value(), limit.value()));
     }
@@ -125,7 +125,7 @@ class $component(Component):
     limit: Parameter[float] = Parameter(10.0, min=0.0, doc="largest effort, either way")
 
     def update(self):
-        if not self.measured.valid:
+        if not (self.setpoint.valid and self.measured.valid):
             return
         error = self.setpoint.value - self.measured.value
         self.effort.write(min(max(self.gain * error, -self.limit), self.limit))

@@ -20,7 +20,6 @@ rtcf::Component* rtcf_python_create(const rtcf::python::ComponentTable* table,
                                     rtcf::ComponentContext* context);
 void rtcf_python_log(const rtcf::python::LogTable* table, rtcf::Component* component,
                      const std::int64_t* values) noexcept;
-std::int64_t rtcf_python_read(rtcf::python::ValueInput* input) noexcept;
 void rtcf_python_read_more(const rtcf::python::ValueInput* input, std::int64_t* age,
                            bool* connected) noexcept;
 }
@@ -97,12 +96,6 @@ void rtcf_python_log(const rtcf::python::LogTable* table, rtcf::Component* compo
     std::memcpy(record->payload.data(), values,
                 static_cast<std::size_t>(table->count) * sizeof *values);
     component->logSink().commit(record);
-}
-
-/// Reads the newest value of an input. Machine code does this itself while the writer of the input
-/// does not change, and calls this function otherwise. Real-time safe. @return the DataStatus
-std::int64_t rtcf_python_read(rtcf::python::ValueInput* input) noexcept {
-    return static_cast<std::int64_t>(input->read());
 }
 
 /// Stores the age and the connection of an input; null: no hook uses it. Real-time safe.

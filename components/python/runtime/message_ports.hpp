@@ -20,8 +20,9 @@ class MessageInput final : public InputBase {
    public:
     MessageInput(Component* owner, const InputTable& table, std::byte* record)
         : InputBase(owner, table.name, table.message->type(), emptySlot(table.message->type())),
+          owner_(*owner),
           fields_(*table.message, table.leaves, table.leaf_count),
-          offset_(valueOffset(type())),
+          offset_(valueOffset(table.message->type())),
           record_(record),
           flags_(placeIn<bool>(record, table.flags)),
           age_(placeIn<std::int64_t>(record, table.age)),
@@ -32,30 +33,30 @@ class MessageInput final : public InputBase {
     /// a warning. Real-time safe.
     void read() noexcept {
         const DataStatus status = readStatus();
-        const void* const message = reinterpret_cast<const std::byte*>(current()) + offset_;
+        const void* const message = reinterpret_cast<const std::byte*>(&slot()) + offset_;
         const bool fits = fields_.fit(message);
         flags_[0] = fits && status == DataStatus::New;
         if (fits && status != DataStatus::None) {
             flags_[1] = true;
             fields_.toRecord(record_, message);
-            if (age_ != nullptr) *age_ = age();
+            if (age_ != nullptr) *age_ = age(&owner_);
         } else if (!fits && status == DataStatus::New) {
             warn();
         }
-        if (connected_ != nullptr) *connected_ = connected();
+        if (connected_ != nullptr) *connected_ = connected(&owner_);
     }
 
    private:
     // Logs at most once a second.
     void warn() noexcept {
-        const Component& component = owner();
-        if (component.logs(too_large_.level) &&
-            detail::logThrottle(next_warning_ns_, component.time(), kWarnPeriod))
-            detail::logCall(component.logSink(), component.fullName().c_str(), too_large_);
+        if (owner_.logs(too_large_.level) &&
+            detail::logThrottle(next_warning_ns_, owner_.time(), kWarnPeriod))
+            detail::logCall(owner_.logSink(), owner_.fullName().c_str(), too_large_);
     }
 
     static constexpr std::int64_t kWarnPeriod = 1'000'000'000;
 
+    const Component& owner_;
     MessageFields fields_;
     std::size_t offset_;
     std::byte* record_;

@@ -24,15 +24,19 @@ T* placeIn(std::byte* record, std::int64_t offset) noexcept {
 }
 
 // Machine code accesses values and stamps at these offsets: port_access.py.
-static_assert(AbiProbe::portPlaces() == PortPlaces{0, 8, 16, 0, 8});
-static_assert(offsetof(SlotHeader, sequence) == 0 && offsetof(SlotHeader, time_ns) == 8);
-static_assert(offsetof(LoopClock, time_ns) == 8 && sizeof(std::atomic<std::int64_t>) == 8);
-constexpr std::size_t kSlotValue = 16;
+static_assert(AbiProbe::portPlaces() == PortPlaces{0, 8, 0, 8});
+static_assert(offsetof(SlotHeader, stamp) == 0 && sizeof(SlotHeader) == 8);
+static_assert(sizeof(Shared<std::int64_t>) == 8);
+/// Offset of a value in its slot; a matrix whose size is a multiple of 16 bytes is aligned to them.
+inline std::size_t slotValue(const TypeTable& table) {
+    return isMatrix(table) && sizeOf(table) % 16 == 0 ? 16 : 8;
+}
 
 /// Not real-time safe. @throws std::logic_error for a type with another offset of values in a slot
 inline const TypeInfo& valueTypeOf(const TypeTable& table) {
     const TypeInfo& type = typeInfoOf(table);
-    if (valueOffset(type) != kSlotValue) throw std::logic_error("unexpected layout of a slot");
+    if (valueOffset(type) != slotValue(table))
+        throw std::logic_error("unexpected layout of a slot");
     return type;
 }
 
@@ -41,10 +45,15 @@ class ValueInput final : public InputBase {
    public:
     ValueInput(Component* owner, const InputTable& table)
         : InputBase(owner, table.name, valueTypeOf(*table.type),
-                    emptySlot(valueTypeOf(*table.type))) {}
+                    emptySlot(valueTypeOf(*table.type))),
+          owner_(owner) {}
 
-    /// Reads the newest value. Real-time safe.
-    DataStatus read() noexcept { return readStatus(); }
+    /// Real-time safe.
+    std::int64_t age() const noexcept { return InputBase::age(owner_); }
+    bool connected() const noexcept { return InputBase::connected(owner_); }
+
+   private:
+    const Component* owner_;
 };
 
 /// Output of values. Machine code writes it.
@@ -73,7 +82,7 @@ class QueuePort final : public QueueBase {
 
     /// Moves new messages to the ring; drops and counts messages if it is full. Real-time safe.
     void read() noexcept {
-        const std::int64_t now_ns = owner().time();
+        const std::int64_t now_ns = owner_->time();
         for (const SlotHeader* slot = oldest(); slot != nullptr; slot = oldest()) {
             if (*count_ == capacity_) {
                 ++lost_;
@@ -95,8 +104,8 @@ class QueuePort final : public QueueBase {
 
     QueuePort(Component* owner, const InputTable& table, std::byte* record,
               std::unique_ptr<Slots> slots)
-        : QueueBase(owner, table.name, typeInfoOf(*table.type), *slots->front(),
-                    {slots->size(), &at, slots.get()}),
+        : QueueBase(owner, table.name, typeInfoOf(*table.type), {slots->size(), &at, slots.get()}),
+          owner_(owner),
           slots_(std::move(slots)),
           copy_(*table.type),
           offset_(valueOffset(type())),
@@ -118,6 +127,7 @@ class QueuePort final : public QueueBase {
         return (*static_cast<Slots*>(slots))[index].get();
     }
 
+    const Component* owner_;
     std::unique_ptr<Slots> slots_;
     ValueCopy copy_;
     std::size_t offset_;

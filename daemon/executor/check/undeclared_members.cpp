@@ -20,8 +20,8 @@ UndeclaredMembers::UndeclaredMembers(const Component& component) {
     before_.assign(object_, object_ + size);
     changed_.resize(size);
     add(&component, sizeof component, "the base class", true);
-    for (const InputBase* input : component.inputs())
-        add(input, sizeof *input, "input " + input->name(), true);
+    for (const InputPort* input : component.inputs())
+        add(&input->input(), sizeof(InputBase), "input " + input->name(), true);
     for (const OutputBase* output : component.outputs())
         add(output, sizeof *output, "output " + output->name(), true);
     for (const ParameterBase* parameter : component.parameters())

@@ -35,7 +35,7 @@ class Backlog {
         // Copying keeps the memory reserved in the slot. The slot's value moves to the queue, which
         // an output may feed later.
         if (!type_.deserialize(*arrived_, bytes, size)) return;
-        arrived_->time_ns = age_ns;
+        arrived_->stamp = age_ns;
         try {
             type_.copy(*slots_[head % slots_.size()], *arrived_);
         } catch (...) {  // no memory
@@ -50,7 +50,7 @@ class Backlog {
         std::size_t tail = tail_.load(std::memory_order_relaxed);
         for (const std::size_t head = head_.load(std::memory_order_acquire); tail != head; ++tail) {
             SlotHeader& slot = *slots_[tail % slots_.size()];
-            queue_.take(slot, now_ns - slot.time_ns);
+            queue_.take(slot, now_ns - slot.stamp);
         }
         tail_.store(tail, std::memory_order_release);
         if (const std::uint64_t lost = lost_.load(std::memory_order_relaxed); lost != told_) {

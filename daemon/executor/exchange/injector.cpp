@@ -81,7 +81,7 @@ bool Injector::store(const std::uint8_t* bytes, std::uint32_t size, std::int64_t
         return false;
     }
     for (const auto& backlog : backlogs_) backlog->store(bytes, size, age_ns);
-    slots_[back_]->time_ns = age_ns;
+    slots_[back_]->stamp = age_ns;
     const std::uint32_t before = middle_.exchange(back_ | kFresh, std::memory_order_acq_rel);
     if ((before & kFresh) != 0) passOver();
     back_ = before & ~kFresh;

@@ -75,25 +75,21 @@ class Injector {
     /// The slot that inputs read. Cycle thread.
     const SlotHeader* front() const noexcept { return slots_[front_].get(); }
 
-    /// Number of values adopted so far. Cycle thread.
-    std::uint64_t sequence() const noexcept RTCF_NONBLOCKING { return sequence_; }
-    /// Swaps `slot` with the front slot, and sets the sequence. The caller then calls
-    /// InputBase::inject(), as after adopt(). Cycle thread; real-time safe.
-    void restore(std::shared_ptr<SlotHeader>& slot, std::uint64_t sequence) noexcept
-        RTCF_NONBLOCKING {
+    /// Swaps `slot` with the front slot. The caller then connects the inputs to it. Cycle thread;
+    /// real-time safe.
+    void restore(std::shared_ptr<SlotHeader>& slot) noexcept RTCF_NONBLOCKING {
         slots_[front_].swap(slot);
-        sequence_ = sequence;
     }
 
     /// Makes the newest delivered value the front slot; its time is the loop's time minus its age.
     /// Cycle thread; real-time safe.
-    /// @return true if there is a new value; the caller then calls InputBase::inject()
+    /// @return true if there is a new value; the caller then calls InputPort::inject()
     bool adopt(const LoopClock& clock) noexcept RTCF_NONBLOCKING {
         if ((middle_.load(std::memory_order_relaxed) & kFresh) == 0) return false;
         front_ = middle_.exchange(front_, std::memory_order_acq_rel) & ~kFresh;
         SlotHeader& slot = *slots_[front_];
-        slot.sequence = ++sequence_;
-        slot.time_ns = clock.time_ns - slot.time_ns;
+        const std::int64_t stamp = clock.time_ns - slot.stamp;
+        slot.stamp = stamp != 0 ? stamp : -1;
         return true;
     }
 
@@ -116,11 +112,10 @@ class Injector {
 
     std::string topic_;
     const TypeInfo& type_;
-    // Before adoption, time_ns of a delivered slot is its age.
+    // Before adoption, the stamp of a delivered slot is its age.
     std::array<std::shared_ptr<SlotHeader>, 3> slots_;
     std::uint32_t fixed_size_ = 0;  // size of a message of a type of fixed size, bytes
     std::uint32_t front_ = 0;       // of the cycle thread
-    std::uint64_t sequence_ = 0;    // of the cycle thread
     std::atomic<std::uint32_t> middle_{1};
     std::mutex mutex_;  // of the delivering threads: back_, backlogs_ and waiting_
     std::uint32_t back_ = 2;

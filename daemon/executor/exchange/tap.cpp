@@ -47,8 +47,8 @@ std::int64_t Tap::stampAt(std::size_t offset) const noexcept {
 }
 
 void Tap::push(std::int64_t stamp_ns) noexcept RTCF_NONBLOCKING {
-    if (source_->sequence == last_sequence_) return;
-    last_sequence_ = source_->sequence;
+    if (source_->stamp == last_stamp_) return;
+    last_stamp_ = source_->stamp;
     if (++passed_over_ < decimation_.load(std::memory_order_relaxed)) return;
     passed_over_ = 0;
     std::uint32_t length = fixed_length_;

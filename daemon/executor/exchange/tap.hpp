@@ -51,8 +51,12 @@ class Tap {
     /// @param stamp_ns ROS time of the cycle, ns
     void push(std::int64_t stamp_ns) noexcept RTCF_NONBLOCKING;
 
-    /// The source's sequence at the last push(). Producer only; real-time safe.
-    std::uint64_t lastSequence() const noexcept RTCF_NONBLOCKING { return last_sequence_; }
+    /// The source's stamp at the last push(). Producer only; real-time safe.
+    std::int64_t lastStamp() const noexcept RTCF_NONBLOCKING { return last_stamp_; }
+    /// Follows a move of the loop's time by `by` ns. Producer only; real-time safe.
+    void moveTime(std::int64_t by) noexcept RTCF_NONBLOCKING {
+        last_stamp_ = movedStamp(last_stamp_, by);
+    }
 
     /// Passes the oldest message to `use(const std::uint8_t* bytes, std::uint32_t size,
     /// std::int64_t stamp_ns)` and removes it. If no message can be built, removes the value
@@ -88,7 +92,7 @@ class Tap {
     std::string topic_;
     const TypeInfo& type_;
     std::shared_ptr<const SlotHeader> source_;
-    std::uint64_t last_sequence_ = 0;
+    std::int64_t last_stamp_ = 0;
     std::uint32_t passed_over_ = 0;  // values skipped since the last one taken
     std::atomic<std::uint32_t> decimation_{1};
     std::size_t largest_;

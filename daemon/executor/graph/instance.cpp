@@ -189,10 +189,14 @@ void Instance::callLastHook(Hook hook, const std::function<void()>& call) noexce
     log_.write(LogLevel::Error, context_.full_name, fmt::format("{}: {}", hookName(hook), why));
 }
 
+// What a hook writes is later than the last cycle's values, and earlier than the next cycle's.
+void Instance::setHookTime() noexcept { component_->setTime(context_.clock->time_ns + 1); }
+
 void Instance::configure() {
     if (configured_) return;
     // cleanup() also undoes a configure() that fails halfway.
     configured_ = true;
+    setHookTime();
     try {
         callHook(Hook::Configure, [this] { return component_->configure(); });
     } catch (...) {
@@ -213,7 +217,7 @@ void Instance::freezePorts() {
         requireLength("mapped name", name);
         return name;
     };
-    for (const InputBase* input : component_->inputs())
+    for (const InputPort* input : component_->inputs())
         input_names_.push_back(mapped(input->name()));
     for (const OutputBase* output : component_->outputs()) {
         output_names_.push_back(mapped(output->name()));
@@ -228,6 +232,7 @@ void Instance::freezePorts() {
 
 void Instance::start() {
     if (started_) return;
+    setHookTime();
     callHook(Hook::Start, [this] {
         if (!component_->start()) return false;
         // Publishes first values for components that run earlier in the schedule. Checked outputs
@@ -271,17 +276,17 @@ std::vector<std::string> Instance::uselessRemaps() const {
     return useless;
 }
 
-InputBase* Instance::findInput(const std::string& port) const noexcept {
-    for (InputBase* input : component_->inputs()) {
+InputPort* Instance::findInput(const std::string& port) const noexcept {
+    for (InputPort* input : component_->inputs()) {
         if (input->name() == port) return input;
     }
     return nullptr;
 }
 
-const InputBase& Instance::requireInput(const std::string& port) const {
-    if (const InputBase* const found = findInput(port)) return *found;
+const InputPort& Instance::requireInput(const std::string& port) const {
+    if (const InputPort* const found = findInput(port)) return *found;
     std::string names;
-    for (const InputBase* input : component_->inputs())
+    for (const InputPort* input : component_->inputs())
         names += (names.empty() ? "" : ", ") + input->name();
     throw Error(ErrorKind::PortNotFound, fmt::format("{} has no input {}; it has {}", fullName(),
                                                      port, names.empty() ? "none" : names));

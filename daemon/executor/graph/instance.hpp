@@ -72,9 +72,9 @@ class Instance {
     Source* source() const noexcept { return dynamic_cast<Source*>(component_.get()); }
     /// Frees staged values and values that an adopted batch has replaced.
     void releaseStaged() noexcept;
-    InputBase* findInput(const std::string& port) const noexcept;
+    InputPort* findInput(const std::string& port) const noexcept;
     /// @throws Error that lists the inputs
-    const InputBase& requireInput(const std::string& port) const;
+    const InputPort& requireInput(const std::string& port) const;
 
     /// The parameters' values as last staged, in the order of declaration.
     const std::vector<ParameterValue>& parameterValues() const noexcept {
@@ -100,6 +100,7 @@ class Instance {
 
    private:
     void setFirstParameters();
+    void setHookTime() noexcept;
     void callHook(Hook hook, const std::function<bool()>& call);
     /// Calls a hook whose failure rejects nothing: errors are logged.
     void callLastHook(Hook hook, const std::function<void()>& call) noexcept;

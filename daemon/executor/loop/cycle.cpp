@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <exception>
+#include <set>
 
 namespace rtcf::executor {
 
@@ -46,9 +47,10 @@ class DeviceLoan {
 Cycle::Cycle(FlightRecorder& recorder)
     : schedule_(&empty_), notes_(recorder.realtimeNotes()), counter_(CycleCounter::calibrate()) {}
 
-void Cycle::begin(std::int64_t period_ns, std::uint64_t warmup_cycles) {
+void Cycle::begin(std::int64_t period_ns, std::uint64_t warmup_cycles, std::int64_t time_ns) {
+    if (time_ns < clock_.time_ns) moveTime(time_ns - clock_.time_ns);
     clock_.iteration = 0;
-    clock_.time_ns = 0;
+    clock_.time_ns = time_ns;
     clock_.stamp_ns = 0;
     clock_.period_ns = period_ns;
     clock_.elapsed_ns = period_ns;
@@ -68,6 +70,29 @@ void Cycle::begin(std::int64_t period_ns, std::uint64_t warmup_cycles) {
     active_ = true;
 }
 
+// Stamps must be earlier than the next cycle, so that what it writes is new to each reader.
+void Cycle::moveTime(std::int64_t by_ns) {
+    std::set<const SlotHeader*> moved;  // several inputs may read one slot
+    const auto move = [&](const SlotHeader* slot) {
+        // An input that never had a writer reads a constant.
+        if (slot->stamp == 0 || !moved.insert(slot).second) return;
+        const_cast<SlotHeader*>(slot)->stamp = movedStamp(slot->stamp, by_ns);
+    };
+    for (const Step& step : schedule_->steps) {
+        for (const OutputBase* output : step.component->outputs()) {
+            move(output->slot().get());
+            move(output->written());
+        }
+        for (InputPort* input : step.component->inputs()) {
+            move(&input->slot());
+            input->moveTime(by_ns);
+        }
+    }
+    for (const Latch& latch : schedule_->latches) move(latch.to);
+    for (const Feed& feed : schedule_->feeds) move(feed.injector->front());
+    for (Tap* tap : schedule_->taps) tap->moveTime(by_ns);
+}
+
 bool Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NONBLOCKING {
     const std::int64_t begin = readCycleCounter();
     std::int64_t before = begin;
@@ -81,7 +106,8 @@ bool Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NON
     notes_.setIteration(iteration);
     if (schedule.selective) total_elapsed_ns_ += clock_.elapsed_ns;
     counted_ = iteration >= warmup_cycles_ && statistics_.counting.counts();
-    if (counted_) {
+    next_waiting_ = 0;
+    if (counted_ && waiting_.empty()) {
         for (const Stretch& stretch : schedule.stretches) {
             before = stretch.plain ? update<true>(stretch.begin, stretch.end, before)
                                    : updateSelected(stretch.begin, stretch.end, before);
@@ -90,6 +116,7 @@ bool Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NON
     } else {
         before = updateSelected(schedule.steps.data(),
                                 schedule.steps.data() + schedule.steps.size(), before);
+        dropConnected();
     }
     notes_.leaveComponents();
     if (exchanges_ && before != kAbandoned) {
@@ -143,12 +170,17 @@ template <bool Plain>
 [[gnu::always_inline]] inline std::int64_t Cycle::update(const Step* next, const Step* end,
                                                          std::int64_t before) noexcept {
     const FlightRecorder::RealtimeNotes notes = notes_;
+    const std::int64_t time = clock_.time_ns;
     while (true) {
         bool goes_on = false;
         try {
             for (; next != end; ++next) {
-                if (!Plain && !due(*next)) continue;
+                if (!Plain) {
+                    connectWaiting(*next);
+                    if (!due(*next)) continue;
+                }
                 notes.enterComponent(next->slot);
+                next->component->setTime(time);
                 if (Plain) {
                     next->component->update();
                 } else {
@@ -194,6 +226,19 @@ bool Cycle::due(const Step& step) const noexcept RTCF_NONBLOCKING {
     return true;
 }
 
+// Connects the inputs of a component whose new writers have written.
+void Cycle::connectWaiting(const Step& step) noexcept RTCF_NONBLOCKING {
+    for (; next_waiting_ < waiting_.size() && waiting_[next_waiting_].step <= &step;
+         ++next_waiting_)
+        waiting_[next_waiting_].input->connectWritten();
+}
+
+void Cycle::dropConnected() noexcept {
+    waiting_.erase(std::remove_if(waiting_.begin(), waiting_.end(),
+                                  [](const Waiting& each) { return !each.input->waiting(); }),
+                   waiting_.end());
+}
+
 // Publishes a component's staged outputs. @throws any exception of a copy
 void Cycle::commit(Component& component, ComponentStatistics& statistics, OnBadOutput may) {
     for (OutputBase* output : component.stagedOutputs()) {
@@ -212,7 +257,7 @@ void Cycle::commit(Component& component, ComponentStatistics& statistics, OnBadO
 // @return true if the cycle goes on with the next component
 bool Cycle::threw(const Step& step, const char* text) noexcept {
     step.context->disabled = true;
-    putBack(*step.component);
+    putBack(step);
     if (!step.optional) {
         endLoop(LoopFault::Kind::Exception, step.component, text);
         return false;
@@ -257,10 +302,10 @@ void Cycle::makeSafe(Component& component, ComponentStatistics& statistics,
 
 // Restores the outputs of a component that threw, so that neither readers nor its own safe() see
 // half-written values.
-void Cycle::putBack(Component& component) noexcept {
-    for (OutputBase* output : component.outputs()) {
+void Cycle::putBack(const Step& step) noexcept {
+    for (OutputBase* output : step.component->outputs()) {
         if (!output->staged()) {
-            putBack(*output);
+            putBack(*output, step.ended_ticks != 0);
             continue;
         }
         try {
@@ -271,29 +316,30 @@ void Cycle::putBack(Component& component) noexcept {
     }
 }
 
-// Restores the value from the last frame, and sequence and time from the readers' read positions.
-void Cycle::putBack(OutputBase& output) noexcept {
+// Restores the value from the last frame, and the stamp from the readers' read positions.
+// @param updated the component has completed an update in this schedule
+void Cycle::putBack(OutputBase& output, bool updated) noexcept {
     SlotHeader& slot = *output.slot();
     if (frames_ != nullptr) frames_->putBack(valueOf(output.type(), slot));
-    if (slot.time_ns != clock_.time_ns) return;  // not written in this cycle
-    const bool had_value = slot.sequence > 1;
-    slot.sequence = 0;
-    slot.time_ns = clock_.time_ns - clock_.elapsed_ns;
-    const auto known = [&slot](std::uint64_t sequence) {
-        slot.sequence = std::max(slot.sequence, sequence);
+    if (slot.stamp != clock_.time_ns) return;  // not written in this cycle
+    slot.stamp = 0;
+    bool read = false;
+    const auto known = [&](std::int64_t stamp) {
+        read = true;
+        if (stamp != 0 && (slot.stamp == 0 || stamp > slot.stamp)) slot.stamp = stamp;
     };
     for (const Step& step : schedule_->steps) {
-        for (const InputBase* input : step.component->inputs()) {
-            const InputBase::Reading reading = input->reading();
-            if (reading.source == &slot) known(reading.seen);
+        for (const InputPort* input : step.component->inputs()) {
+            if (&input->slot() == &slot) known(input->seen());
+            if (input->awaits(slot)) known(input->since());
         }
     }
     for (const Tap* tap : schedule_->taps)
-        if (tap->source() == &slot) known(tap->lastSequence());
+        if (tap->source() == &slot) known(tap->lastStamp());
     for (const Latch& latch : schedule_->latches)
-        if (latch.from == &slot) slot = *latch.to;
-    // No reader has read it so far, but another component's safe() may.
-    if (slot.sequence == 0 && had_value) slot.sequence = 1;
+        if (latch.from == &slot) known(latch.to->stamp);
+    // Without readers, the earlier cycles of the component tell whether there is a value.
+    if (!read && updated) slot.stamp = clock_.time_ns - clock_.elapsed_ns;
 }
 
 bool Cycle::copy(const Latch& latch) noexcept {
@@ -322,11 +368,15 @@ void Cycle::makeSafe(std::int64_t time_ns) noexcept {
     notes_.setIteration(clock_.iteration);
     feed();
     copyLatches();
+    next_waiting_ = 0;
     for (const Step& step : schedule_->steps) {
+        connectWaiting(step);
+        step.component->setTime(time_ns);
         // safe() of a component that was taken out has already run.
         if (step.optional && step.context->disabled) continue;
         makeSafe(*step.component, *step.statistics, OnBadOutput::GoOn);
     }
+    dropConnected();
     for (Tap* tap : schedule_->taps) tap->push(clock_.stamp_ns);
     if (frames_ != nullptr) {
         frames_->take();
@@ -343,7 +393,11 @@ void Cycle::apply(Adoption& adoption) noexcept {
     for (const Audience& audience : adoption.audiences)
         audience.output->setConnected(audience.present);
     for (StagedValue* value : adoption.values) value->commit();
-    if (adoption.schedule != nullptr) schedule_ = adoption.schedule;
+    if (adoption.schedule != nullptr) {
+        schedule_ = adoption.schedule;
+        waiting_.swap(adoption.waiting);
+        dropConnected();
+    }
     if (adoption.frames != nullptr) {
         frames_ = adoption.frames;
         timed_ = adoption.timed;
@@ -374,6 +428,8 @@ void Cycle::changeComponents(Adoption& adoption) noexcept {
         hand_over.skipped = hand_over.previous->context().disabled;
         if (hand_over.skipped) continue;
         for (const StateCopy& state : hand_over.states) state.copy();
+        // What it writes is earlier than the first cycle's values.
+        hand_over.successor->setTime(boundary_time_ns_ - 1);
         const HookNote note(notes_, *hand_over.successor, Hook::TakeOver);
         hand_over.successor->takeOver(Predecessor(*hand_over.previous));
     }
@@ -381,6 +437,7 @@ void Cycle::changeComponents(Adoption& adoption) noexcept {
         for (const Leaving& leaving : adoption.leaving) {
             // If the component threw, its safe() has already run. A fault of a leaving component
             // does not end the loop.
+            leaving.component->setTime(boundary_time_ns_);
             if (!leaving.component->context().disabled)
                 makeSafe(*leaving.component, *leaving.statistics, OnBadOutput::GoOn);
             for (const Latch& latch : leaving.latches) copy(latch);
@@ -398,10 +455,9 @@ void Cycle::capture(Capture& capture) noexcept {
     for (Capture::Value& value : capture.values) room = value.take() && room;
     for (Capture::Topic& topic : capture.topics) {
         topic.value.from = topic.injector->front();
-        topic.sequence = topic.injector->sequence();
         room = topic.value.take() && room;
     }
-    for (Capture::Input& input : capture.inputs) input.reading = input.input->reading();
+    for (Capture::Input& input : capture.inputs) room = input.take() && room;
     for (Capture::Turn& turn : capture.turns) {
         turn.updated_ns = turn.context->updated_ns;
         turn.elapsed_ns = turn.context->elapsed_ns;
@@ -422,25 +478,15 @@ bool Cycle::restore(Restoration& restoration) noexcept {
     for (const Restoration::Value& value : restoration.values) value.put();
     const ClockState& saved = restoration.clock;
     const std::int64_t later = restoration.sets_time ? 0 : clock_.time_ns - saved.time_ns;
-    for (SlotHeader* header : restoration.headers) header->time_ns += later;
-    for (OutputBase* output : restoration.staged) output->discard();
+    for (SlotHeader* header : restoration.headers) header->stamp = movedStamp(header->stamp, later);
     for (Restoration::Topic& topic : restoration.topics) {
-        topic.slot->time_ns += later;
-        topic.injector->restore(topic.slot, topic.sequence);
-        for (Restoration::Input& reader : topic.readers) {
-            if (QueueBase* const queue = reader.input->queue()) queue->clear();
-            reader.reading.source = topic.injector->front();
-            if (reader.reading.current == nullptr) reader.reading.current = reader.reading.source;
-            reader.input->setReading(reader.reading);
-        }
+        topic.slot->stamp = movedStamp(topic.slot->stamp, later);
+        topic.injector->restore(topic.slot);
+        for (const Restoration::Input& reader : topic.readers)
+            reader.put(topic.injector->front(), later);
     }
-    for (Restoration::Input& input : restoration.inputs) {
-        InputBase::Reading& reading = input.reading;
-        if (QueueBase* const queue = input.input->queue()) queue->clear();
-        if (reading.source == nullptr) reading.source = input.input->reading().source;
-        if (reading.current == nullptr) reading.current = reading.source;
-        input.input->setReading(reading);
-    }
+    for (const Restoration::Input& input : restoration.inputs)
+        input.put(&input.input->slot(), later);
     for (const Restoration::Turn& turn : restoration.turns) {
         turn.context->updated_ns = turn.updated_ns;
         turn.context->elapsed_ns = turn.elapsed_ns;
@@ -466,7 +512,7 @@ void Cycle::feed() noexcept RTCF_NONBLOCKING {
     for (const Feed& feed : schedule_->feeds) {
         if (!feed.injector->adopt(clock_)) continue;
         for (const auto& backlog : feed.backlogs) backlog->enter(clock_.time_ns);
-        for (InputBase* input : feed.readers) input->inject(feed.injector->front());
+        for (InputPort* input : feed.readers) input->inject(feed.injector->front());
         for (const auto& backlog : feed.backlogs) backlog->queue().skip();
     }
 }

@@ -6,6 +6,7 @@
 
 #include <atomic>
 #include <cstdint>
+#include <vector>
 
 #include "common/spsc_ring.hpp"
 #include "faults/flight_recorder.hpp"
@@ -62,7 +63,9 @@ class Cycle {
     /// @name Graph thread
     /// @{
     /// Resets clock and counters, so that the next cycle is number 0. While no cycle runs.
-    void begin(std::int64_t period_ns, std::uint64_t warmup_cycles);
+    /// @param time_ns loop time; the cycles' times are later. If it is earlier than before, the
+    /// stamps of all values move with it.
+    void begin(std::int64_t period_ns, std::uint64_t warmup_cycles, std::int64_t time_ns);
     /// Undoes begin() if no thread can run the cycles.
     void abandon() noexcept { active_ = false; }
     Boundary& boundary() noexcept { return boundary_; }
@@ -94,8 +97,8 @@ class Cycle {
     void makeSafe(std::int64_t time_ns) noexcept;
     /// Takes the newest values from outside.
     void feed() noexcept RTCF_NONBLOCKING;
-    /// Sets the loop time before the first cycle; the ages of a snapshot's values are relative to
-    /// it.
+    /// Sets the loop time before the first cycle, later than that of begin(); the ages of a
+    /// snapshot's values are relative to it.
     void setTime(std::int64_t time_ns) noexcept RTCF_NONBLOCKING { clock_.time_ns = time_ns; }
     /// Sets elapsed() of the next cycles, in whole periods.
     void setElapsed(std::int64_t elapsed_ns) noexcept RTCF_NONBLOCKING {
@@ -127,18 +130,21 @@ class Cycle {
         clock_.time_ns = time_ns;
         clock_.stamp_ns = time_ns + stamp_offset_ns_.load(std::memory_order_relaxed);
     }
+    void moveTime(std::int64_t by_ns);
     void changeComponents(Adoption& adoption) noexcept;
     std::int64_t exchange(std::int64_t begin_ticks, std::int64_t time_ns) noexcept;
     template <bool Plain>
     std::int64_t update(const Step* next, const Step* end, std::int64_t before) noexcept;
     std::int64_t updateSelected(const Step* next, const Step* end, std::int64_t before) noexcept;
     bool due(const Step& step) const noexcept RTCF_NONBLOCKING;
+    void connectWaiting(const Step& step) noexcept RTCF_NONBLOCKING;
+    void dropConnected() noexcept;
     // Copies a value for late readers, which may allocate.
     // @return false if that fails: the loop ends
     bool copy(const Latch& latch) noexcept;
     bool copyLatches() noexcept;
-    void putBack(Component& component) noexcept;
-    void putBack(OutputBase& output) noexcept;
+    void putBack(const Step& step) noexcept;
+    void putBack(OutputBase& output, bool updated) noexcept;
     /// Effect of a non-finite value on an output declared Finite(OnNonFinite::Stop): end the loop,
     /// or go on.
     enum class OnBadOutput { End, GoOn };
@@ -167,6 +173,8 @@ class Cycle {
     std::int64_t boundary_time_ns_ = 0;  // loop time of the cycle after the present boundary
     std::int64_t total_elapsed_ns_ = 0;  // sum of elapsed_ns of all cycles
     CycleMarks marks_;
+    std::vector<Waiting> waiting_;  // inputs that wait for a new writer, in schedule order
+    std::size_t next_waiting_ = 0;  // the first one whose component has not run in this cycle
     bool timed_ = false;            // a watch takes the components' times of each cycle
     std::int64_t given_ticks_ = 0;  // when the taps were last filled
     LoopFault fault_;

@@ -74,13 +74,13 @@ Loop::~Loop() {
     log_.setIteration(nullptr);
 }
 
-void Loop::reset(const LoopSettings& settings, std::uint64_t stops_known) {
+void Loop::reset(const LoopSettings& settings, std::uint64_t stops_known, std::int64_t time_ns) {
     stops_known_ = stops_known;
     if (stopRequested()) {
         throw Error(ErrorKind::LoopStopped,
                     "the loop is not started: a stop was requested after the start");
     }
-    cycle_.begin(settings.period_ns, settings.warmup_cycles);
+    cycle_.begin(settings.period_ns, settings.warmup_cycles, time_ns);
     bucket_ = 0;
     cycles_on_time_ = 0;
     caught_up_ = 0;
@@ -91,7 +91,7 @@ void Loop::reset(const LoopSettings& settings, std::uint64_t stops_known) {
 RealtimeProblems Loop::start(const LoopSettings& settings, std::uint64_t stops_known) {
     RealtimeProblems problems;
     retune(settings);
-    reset(settings, stops_known);
+    reset(settings, stops_known, settings.clock == nullptr ? monotonicNow() : 0);
     simulation_ = settings.clock;
     if (simulation_ == nullptr) {
         refreshWallClock();
@@ -266,8 +266,8 @@ void Loop::run() noexcept {
 
 void Loop::beginStepping(const LoopSettings& settings, std::uint64_t stops_known,
                          std::int64_t stamp_ns) {
-    reset(settings, stops_known);
-    cycle_.setStampOffset(stamp_ns);
+    reset(settings, stops_known, 0);
+    cycle_.setStampOffset(stamp_ns - nextStep());
 }
 
 std::uint64_t Loop::step(std::uint64_t cycles, const std::atomic<bool>* given_up) noexcept {
@@ -299,11 +299,9 @@ void Loop::endStepping() noexcept {
     cycle_.makeSafe(nextStep());
 }
 
-// Loop time of the next simulated cycle: begins at 0 and advances by a period each cycle.
+// Loop time of the next simulated cycle: advances by a period each cycle, from 0.
 std::int64_t Loop::nextStep() const noexcept {
-    const LoopClock& clock = cycle_.clock();
-    const std::int64_t period = clock.period_ns;
-    return clock.iteration == 0 ? 0 : clock.time_ns + period;
+    return cycle_.clock().time_ns + cycle_.clock().period_ns;
 }
 
 // The component whose device paces the loop; null = none, the clock does.

@@ -65,7 +65,8 @@ class Loop {
     /// Waits for the end of a loop that was stopped or ended by itself.
     /// @return false if it still runs after `timeout_ns`
     bool join(std::int64_t timeout_ns);
-    /// Executes cycles back to back on a simulated clock that begins at 0 with beginStepping().
+    /// Executes cycles back to back on a simulated clock; the time of the first one after
+    /// beginStepping() is a period.
     /// While the loop does not run. The same graph and inputs give the same values, bit by bit.
     /// @param given_up checked before each cycle; null = never given up
     /// @return cycles done; fewer than `cycles` if a component failed, if it was given up, or after
@@ -167,7 +168,7 @@ class Loop {
         std::int64_t missed = 0;  ///< beats of a device missed before this one
     };
 
-    void reset(const LoopSettings& settings, std::uint64_t stops_known);
+    void reset(const LoopSettings& settings, std::uint64_t stops_known, std::int64_t time_ns);
     RealtimeSettings placed(RealtimeSettings settings, RealtimeProblems& problems);
     void leaveCpu();
     bool perform(BoundaryWork& work, std::int64_t timeout_ns);

@@ -6,22 +6,15 @@
 
 namespace rtcf::executor {
 
-std::size_t Probe::add(const InputBase& input) {
+std::size_t Probe::add(const InputPort& input) {
     items_.push_back(
-        {&input, nullptr, &input.type(), {}, 0, 0, 0, false, std::vector<std::uint8_t>(kLargest)});
+        {&input, nullptr, &input.type(), {}, 0, 0, false, std::vector<std::uint8_t>(kLargest)});
     return items_.size() - 1;
 }
 
 std::size_t Probe::add(const OutputBase& output) {
-    items_.push_back({nullptr,
-                      &output,
-                      &output.type(),
-                      {},
-                      0,
-                      0,
-                      0,
-                      false,
-                      std::vector<std::uint8_t>(kLargest)});
+    items_.push_back(
+        {nullptr, &output, &output.type(), {}, 0, 0, false, std::vector<std::uint8_t>(kLargest)});
     return items_.size() - 1;
 }
 
@@ -37,11 +30,10 @@ bool Probe::takeSome(const LoopClock& clock) noexcept {
 }
 
 void Probe::take(Item& item, const LoopClock& clock) noexcept {
-    const SlotHeader& slot = item.input != nullptr ? item.input->newest() : *item.output->slot();
+    const SlotHeader& slot = item.input != nullptr ? item.input->slot() : *item.output->slot();
     item.now_ns = clock.time_ns;
     item.header = slot;
-    if (item.input != nullptr) item.seen = item.input->seen();
-    if (slot.sequence == 0) return;
+    if (slot.stamp == 0) return;
     const TypeInfo& type = *item.type;
     if (allocatesMessage(type)) return;
     item.length = type.flat ? static_cast<std::uint32_t>(type.size) : type.length(slot);
@@ -56,8 +48,8 @@ void Probe::take(Item& item, const LoopClock& clock) noexcept {
 
 Probe::Value Probe::value(std::size_t index) const {
     const Item& item = items_[index];
-    Value value{item.header.sequence, item.seen, item.now_ns - item.header.time_ns, {}};
-    if (item.header.sequence != 0 && allocatesMessage(*item.type)) {
+    Value value{item.header.stamp != 0, item.now_ns - item.header.stamp, {}};
+    if (value.written && allocatesMessage(*item.type)) {
         value.text = "(not shown: its message would be allocated in the cycle)";
     } else if (item.copied) {
         const std::shared_ptr<SlotHeader> slot = item.type->make_slot(nullptr);

@@ -18,15 +18,14 @@ class Probe {
    public:
     /// Result for one port.
     struct Value {
-        std::uint64_t sequence = 0;  ///< writes so far; 0 = no value
-        std::uint64_t seen = 0;  ///< inputs: sequence of the last value that the component has read
+        bool written = false;     ///< there is a value
         std::int64_t age_ns = 0;  ///< loop time since the write, ns
         /// Unset without a value, or if the value is too large to copy.
         std::optional<std::string> text;
     };
 
     /// Adds a port. @return its index for value()
-    std::size_t add(const InputBase& input);
+    std::size_t add(const InputPort& input);
     std::size_t add(const OutputBase& output);
 
     /// Copies some more values: at least one, and as many bytes as a cycle of this period can
@@ -46,12 +45,11 @@ class Probe {
     static constexpr std::size_t kLargest = 4096;  // largest copied value, bytes
 
     struct Item {
-        const InputBase* input;  // one of the two is set
+        const InputPort* input;  // one of the two is set
         const OutputBase* output;
         const TypeInfo* type;
         SlotHeader header;
         std::int64_t now_ns = 0;
-        std::uint64_t seen = 0;
         std::uint32_t length = 0;
         bool copied = false;
         std::vector<std::uint8_t> bytes;

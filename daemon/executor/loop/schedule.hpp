@@ -58,14 +58,14 @@ struct Latch {
 
     /// Real-time safe if TypeInfo::copy is. @throws any exception of a copy
     void copy() const {
-        if (to->sequence != from->sequence) type->copy(*to, *from);
+        if (to->stamp != from->stamp) type->copy(*to, *from);
     }
 };
 
 /// Values from outside the loop, and their readers.
 struct Feed {
     Injector* injector;
-    std::vector<InputBase*> readers;
+    std::vector<InputPort*> readers;
     std::vector<std::shared_ptr<Backlog>> backlogs;  ///< backlogs of the queues among the readers
 };
 
@@ -98,24 +98,34 @@ struct Schedule {
 /// A change of an input's source. Either `source` or `injector` is set; if neither is, the input
 /// keeps its value and has no writer any more.
 struct Rewire {
-    InputBase* input;
+    InputPort* input;
     const SlotHeader* source;
     const Injector* injector;
     bool continued;  ///< the same writer's values as before
-    /// Filled at the boundary: slot of the input's present value.
-    const SlotHeader* kept = nullptr;
+    /// Filled at the boundary: slot of the input's value before the change.
+    const SlotHeader* held = nullptr;
 
     void apply() noexcept {
         QueueBase* const queue = input->queue();
         if (queue != nullptr) queue->receive();
-        if (source == nullptr && injector == nullptr) {
-            input->disconnect();
+        input->connectWritten();
+        held = &input->slot();
+        if (injector != nullptr) {
+            input->connectOutside(injector->front());
+        } else if (source != nullptr) {
+            input->connect(source, continued);
         } else {
-            input->rewire(injector != nullptr ? injector->front() : source, continued);
-            if (queue != nullptr && !continued) queue->skip();
+            input->disconnect();
+            return;
         }
-        kept = queue != nullptr ? source : input->current();  // a queue has copies
+        if (queue != nullptr && !continued) queue->skip();
     }
+};
+
+/// An input that may keep the value of an earlier writer until the new one writes.
+struct Waiting {
+    const Step* step;  ///< of the input's component
+    InputPort* input;
 };
 
 /// A change of OutputBase::connected().
@@ -148,6 +158,8 @@ struct Adoption {
     std::vector<Latch> new_latches;      ///< latches to fill before inputs read them
     std::vector<Rewire> rewires;
     std::size_t rewires_of_new = 0;  ///< the first rewires, for inputs that never had a writer
+    /// Inputs of the schedule that may wait after the rewires and the restoration, in its order.
+    std::vector<Waiting> waiting;
     std::vector<Audience> audiences;
     std::vector<HandOver> hand_overs;
     std::vector<StateCopy> copies;  ///< copies of state, e.g. to show it

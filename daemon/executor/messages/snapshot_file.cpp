@@ -15,7 +15,7 @@ namespace rtcf::executor {
 namespace {
 
 constexpr std::string_view kMagic = "RTCFSNAP";
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kVersion = 2;
 constexpr std::size_t kHeader = 24;
 
 std::uint32_t checksum(std::string_view bytes) {
@@ -66,15 +66,12 @@ SnapshotType typeFrom(const v1::PortType& message) {
 
 v1::PortValue valueTo(const SnapshotValue& value) {
     v1::PortValue message;
-    message.set_sequence(value.sequence);
-    message.set_time_ns(value.time_ns);
+    message.set_stamp(value.stamp);
     message.set_value(value.bytes);
     return message;
 }
 
-SnapshotValue valueFrom(const v1::PortValue& message) {
-    return {message.sequence(), message.time_ns(), message.value()};
-}
+SnapshotValue valueFrom(const v1::PortValue& message) { return {message.stamp(), message.value()}; }
 
 v1::ComponentSnapshot componentTo(const SnapshotComponent& component) {
     v1::ComponentSnapshot message;
@@ -111,11 +108,8 @@ v1::ComponentSnapshot componentTo(const SnapshotComponent& component) {
         *to.mutable_type() = typeTo(input.type);
         to.set_source(input.source);
         to.set_seen(input.seen);
-        to.set_reads_source(input.reads_source);
-        to.set_kept_of(input.kept_of);
-        if (input.kept) *to.mutable_kept() = valueTo(*input.kept);
-        to.set_kept_is_new(input.kept_is_new);
-        if (input.left) *to.mutable_left() = valueTo(*input.left);
+        if (input.held) *to.mutable_held() = valueTo(*input.held);
+        to.set_since(input.since);
     }
     return message;
 }
@@ -150,11 +144,8 @@ SnapshotComponent componentFrom(const v1::ComponentSnapshot& message) {
         input.type = typeFrom(from.type());
         input.source = from.source();
         input.seen = from.seen();
-        input.reads_source = from.reads_source();
-        input.kept_of = from.kept_of();
-        if (from.has_kept()) input.kept = valueFrom(from.kept());
-        input.kept_is_new = from.kept_is_new();
-        if (from.has_left()) input.left = valueFrom(from.left());
+        if (from.has_held()) input.held = valueFrom(from.held());
+        input.since = from.since();
         component.inputs.push_back(std::move(input));
     }
     return component;
@@ -178,7 +169,6 @@ std::string snapshotToFile(const Snapshot& snapshot) {
         v1::TopicSnapshot& to = *message.add_topics();
         to.set_name(topic.name);
         *to.mutable_type() = typeTo(topic.type);
-        to.set_sequence(topic.sequence);
         *to.mutable_value() = valueTo(topic.value);
     }
     const std::string body = message.SerializeAsString();
@@ -212,8 +202,7 @@ Snapshot snapshotFromFile(std::string_view file) {
     for (const v1::ComponentSnapshot& component : message.components())
         snapshot.components.push_back(componentFrom(component));
     for (const v1::TopicSnapshot& topic : message.topics()) {
-        snapshot.topics.push_back(
-            {topic.name(), typeFrom(topic.type()), topic.sequence(), valueFrom(topic.value())});
+        snapshot.topics.push_back({topic.name(), typeFrom(topic.type()), valueFrom(topic.value())});
     }
     return snapshot;
 }

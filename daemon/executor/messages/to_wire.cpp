@@ -279,9 +279,7 @@ void addValues(pb::ComponentInfo& info, const std::vector<Probe::Value>& values)
     for (std::size_t i = 0; i < values.size() && i < static_cast<std::size_t>(info.ports_size());
          ++i) {
         pb::PortInfo& port = *info.mutable_ports(static_cast<int>(i));
-        port.set_count(port.direction() == pb::DIRECTION_OUTPUT ? values[i].sequence
-                                                                : values[i].seen);
-        if (values[i].sequence == 0) continue;
+        if (!values[i].written) continue;
         port.set_value(values[i].text.value_or("(too large to show)"));
         port.set_age_ns(values[i].age_ns);
     }
@@ -315,7 +313,7 @@ pb::ComponentType typeTo(const std::string& package, const std::string& library,
     type.set_type(record.type);
     type.set_library(library);
     type.set_doc(record.doc);
-    for (const InputBase* input : component.inputs()) {
+    for (const InputPort* input : component.inputs()) {
         setPortType(*type.add_ports(), input->name(), false, input->type());
     }
     for (const OutputBase* output : component.outputs()) {

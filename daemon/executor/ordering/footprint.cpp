@@ -33,14 +33,14 @@ class Lines {
 }  // namespace
 
 std::vector<const void*> footprint(
-    const Schedule& schedule, const std::function<const SlotHeader*(const InputBase*)>& source) {
+    const Schedule& schedule, const std::function<const SlotHeader*(const InputPort*)>& source) {
     Lines lines;
     for (const Step& step : schedule.steps) {
         if (lines.full()) break;
         lines.add(&step, sizeof step);
         lines.add(step.component, sizeof *step.component);
-        for (const InputBase* input : step.component->inputs()) {
-            lines.add(input, sizeof *input);
+        for (const InputPort* input : step.component->inputs()) {
+            lines.add(&input->input(), sizeof(InputBase));
             lines.addSlot(source(input));
         }
         for (const OutputBase* output : step.component->outputs()) {

@@ -22,6 +22,6 @@ constexpr std::size_t kLargestFootprint = 256;
 /// thread.
 /// @param source slot that an input reads; null = none
 std::vector<const void*> footprint(
-    const Schedule& schedule, const std::function<const SlotHeader*(const InputBase*)>& source);
+    const Schedule& schedule, const std::function<const SlotHeader*(const InputPort*)>& source);
 
 }  // namespace rtcf::executor

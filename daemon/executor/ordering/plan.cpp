@@ -48,6 +48,7 @@ class Builder {
         for (const auto& [name, connection] : plan_.wiring.connections)
             addConnection(name, connection);
         addSteps();
+        addWaiting();
         addLeaving();
         // Puts the rewires of new inputs first. So a new component has its inputs in takeOver(),
         // and a leaving component writes its last values before its readers are connected to new
@@ -58,7 +59,7 @@ class Builder {
                                       return previous_.bindings.count(rewire.input) == 0;
                                   }) -
             adoption_.rewires.begin());
-        plan_.schedule.footprint = footprint(plan_.schedule, [this](const InputBase* input) {
+        plan_.schedule.footprint = footprint(plan_.schedule, [this](const InputPort* input) {
             const auto binding = plan_.bindings.find(input);
             return binding == plan_.bindings.end() ? nullptr : binding->second.source;
         });
@@ -200,19 +201,25 @@ class Builder {
         return latch;
     }
 
-    void unbind(InputBase* input) {
+    void unbind(InputPort* input) {
         Binding binding = present(input);
         // The input never had a writer, nor a value from a snapshot.
-        if (binding.source_owner == nullptr && binding.kept_owner == nullptr) return;
+        if (binding.source_owner == nullptr && binding.held_owner == nullptr) return;
         if (binding.writer != nullptr)
             adoption_.rewires.push_back({input, nullptr, nullptr, false});
         binding.writer = nullptr;
         plan_.bindings.emplace(input, std::move(binding));
     }
 
-    Binding present(const InputBase* input) const {
+    Binding present(const InputPort* input) const {
         const auto found = previous_.bindings.find(input);
-        return found == previous_.bindings.end() ? Binding{} : found->second;
+        if (found == previous_.bindings.end()) return {};
+        Binding binding = found->second;
+        if (binding.source != nullptr && binding.writer != nullptr && !input->waiting()) {
+            binding.held = nullptr;
+            binding.held_owner = nullptr;
+        }
+        return binding;
     }
 
     void addSteps() {
@@ -226,6 +233,18 @@ class Builder {
                 plan_.schedule.source = source;
         }
         plan_.schedule.findStretches();
+    }
+
+    void addWaiting() {
+        std::set<const InputPort*> rewired;
+        for (const Rewire& rewire : adoption_.rewires) rewired.insert(rewire.input);
+        for (const Step& step : plan_.schedule.steps) {
+            for (InputPort* input : step.component->inputs()) {
+                if (adoption_.restoration != nullptr || input->waiting() ||
+                    rewired.count(input) != 0)
+                    adoption_.waiting.push_back({&step, input});
+            }
+        }
     }
 
     void addLeaving() {
@@ -260,21 +279,15 @@ class Builder {
 
 }  // namespace
 
-void Plan::noteKept(const Adoption& adoption, const Plan& previous) noexcept {
+void Plan::noteHeld(const Adoption& adoption, const Plan& previous) noexcept {
     for (const Rewire& rewire : adoption.rewires) {
         const auto found = bindings.find(rewire.input);
-        if (found == bindings.end()) continue;
-        Binding& binding = found->second;
         const auto before = previous.bindings.find(rewire.input);
-        const bool nothing_kept =
-            before == previous.bindings.end() || rewire.kept == binding.source;
-        if (nothing_kept) {
-            binding.kept = nullptr;
-            binding.kept_owner = nullptr;
-        } else if (rewire.kept != before->second.kept) {
-            binding.kept = rewire.kept;
-            binding.kept_owner = before->second.source_owner;
-        }
+        if (found == bindings.end() || before == previous.bindings.end() || rewire.continued ||
+            rewire.held == before->second.held)
+            continue;
+        found->second.held = rewire.held;
+        found->second.held_owner = before->second.source_owner;
     }
 }
 

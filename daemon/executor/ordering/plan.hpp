@@ -21,23 +21,24 @@ struct Binding {
     const void* writer = nullptr;
     const SlotHeader* source = nullptr;  ///< slot that the input reads; null with an injector
     std::shared_ptr<const void> source_owner;
-    /// Value of an earlier writer that the component may still read.
-    const SlotHeader* kept = nullptr;
-    std::shared_ptr<const void> kept_owner;
+    /// Slot of an earlier writer's value that the input may still read, until the present one
+    /// writes.
+    const SlotHeader* held = nullptr;
+    std::shared_ptr<const void> held_owner;
 };
 
 struct Plan {
     Graph graph;
     Wiring wiring;
     Schedule schedule;
-    std::map<const InputBase*, Binding> bindings;
+    std::map<const InputPort*, Binding> bindings;
     std::map<const SlotHeader*, std::shared_ptr<SlotHeader>> latches;  ///< by the writer's slot
     /// By topic; by topic and port if the topic has several writers.
     std::map<std::string, std::shared_ptr<Tap>> taps;
     std::map<std::string, std::shared_ptr<Injector>> injectors;  ///< by topic
 
     /// Records the earlier values that inputs still refer to. After the loop has adopted the plan.
-    void noteKept(const Adoption& adoption, const Plan& previous) noexcept;
+    void noteHeld(const Adoption& adoption, const Plan& previous) noexcept;
 
     BridgeTable bridgeTable() const;
 };

@@ -76,7 +76,7 @@ class Collector {
         }
     }
 
-    void addInput(std::size_t index, const GraphNode& node, InputBase* input,
+    void addInput(std::size_t index, const GraphNode& node, InputPort* input,
                   const std::string& name) {
         const Instance& instance = *node.instance;
         ConnectionPlan& plan = planFor(name, index, input->name(), input->type());

@@ -27,7 +27,7 @@ struct MappingFilter {
 /// An input within a graph.
 struct Reader {
     std::size_t node;  ///< index into Graph::nodes()
-    InputBase* input;
+    InputPort* input;
     bool broken;  ///< true = its connection is a loop break
 };
 

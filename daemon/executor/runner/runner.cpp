@@ -160,7 +160,7 @@ std::vector<Probe::Value> Runner::probe(const std::string& name) {
     loop_.adoptInjections();
     Probe probe;
     std::size_t count = 0;
-    for (const InputBase* input : instance.component().inputs()) count = probe.add(*input) + 1;
+    for (const InputPort* input : instance.component().inputs()) count = probe.add(*input) + 1;
     for (const OutputBase* output : instance.component().outputs()) count = probe.add(*output) + 1;
     std::vector<Probe::Value> values;
     if (!loop_.probe(probe, kProbeTimeout + 2 * settings_.loop.period_ns)) return values;

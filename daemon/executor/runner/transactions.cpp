@@ -66,13 +66,13 @@ std::vector<std::string> Transactions::adopt(Change change, const Progress& prog
         connection.written = !connection.writer && written_.count(name) != 0;
     checkTaps(wiring);
     Adoption adoption;
+    adoption.restoration = change.restoration;
     std::unique_ptr<Plan> plan = buildPlan(graph, std::move(wiring), *plan_, settings_.frequency_hz,
                                            adoption, settings_.bridge);
     adoption.values = change.values;
     adoption.hand_overs = change.hand_overs;
     adoption.copies = change.copies;
     adoption.period_ns = change.period_ns;
-    adoption.restoration = change.restoration;
     // Frames must not copy values of leaving components, even if a client watches them.
     std::shared_ptr<const FrameTable> frames = framesOf(*plan, adoption);
     if (loop_.running() || control_.state() == RunnerState::Stepping) {
@@ -89,7 +89,7 @@ std::vector<std::string> Transactions::adopt(Change change, const Progress& prog
                     fmt::format("{} was taken out after a fault: replace it first",
                                 change.restoration->taken_out->full_name));
     }
-    plan->noteKept(adoption, *plan_);
+    plan->noteHeld(adoption, *plan_);
     // Destroyed last: leaving components use it until they are cleaned up.
     const std::unique_ptr<Plan> previous = plan_.replace(std::move(plan));
     frames_.publish(std::move(frames));

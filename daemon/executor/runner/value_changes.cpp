@@ -94,7 +94,7 @@ ChangeOutcome ValueChanges::setParameters(
 }
 
 WritableInput ValueChanges::writableInput(const std::string& name, const std::string& port) const {
-    const InputBase& input = plan_->graph.get(name).instance->requireInput(port);
+    const InputPort& input = plan_->graph.get(name).instance->requireInput(port);
     const std::string full = fmt::format("{}.{}", name, port);
     for (const auto& [topic, connection] : plan_->wiring.connections) {
         const bool found =

@@ -29,9 +29,8 @@ SnapshotType snapshotTypeOf(const TypeInfo& type);
 bool same(const SnapshotType& saved, const TypeInfo& type);
 
 struct SnapshotValue {
-    std::uint64_t sequence = 0;
-    std::int64_t time_ns = 0;
-    std::string bytes;  ///< flat types: as in memory; others: serialised
+    std::int64_t stamp = 0;  ///< loop time of the write, ns; 0 = never written
+    std::string bytes;       ///< flat types: as in memory; others: serialised
 };
 
 struct SnapshotState {
@@ -52,13 +51,11 @@ struct SnapshotOutput {
 struct SnapshotInput {
     std::string name;
     SnapshotType type;
-    std::string source;  ///< its writer, e.g. "/C.out"; empty = none
-    std::uint64_t seen = 0;
-    bool reads_source = true;           ///< the component has the source's value,
-    std::string kept_of;                ///< or that of an earlier writer in the graph,
-    std::optional<SnapshotValue> kept;  ///< or that of a removed writer; if none of these: no value
-    bool kept_is_new = false;           ///< the component has not read that value yet
-    std::optional<SnapshotValue> left;  ///< without a writer: the last value of the removed writer
+    std::string source;     ///< its writer, e.g. "/C.out"; empty = none
+    std::int64_t seen = 0;  ///< stamp of the value of the last read
+    /// The value of a removed writer, until the present one writes; unset = the present one's.
+    std::optional<SnapshotValue> held;
+    std::int64_t since = 0;  ///< stamp of the present writer's value when it was connected
 };
 
 struct SnapshotComponent {
@@ -79,7 +76,6 @@ struct SnapshotComponent {
 struct SnapshotTopic {
     std::string name;
     SnapshotType type;
-    std::uint64_t sequence = 0;
     SnapshotValue value;
 };
 

@@ -172,7 +172,6 @@ void SnapshotRestorer::fitOutputs(const SnapshotComponent& saved, const Instance
             restoreTo(slot, type, from.value, name);
             if (is_staged) {
                 restoreTo(to->written(), type, *from.staged, name);
-                restoration_.staged.push_back(to);
             }
             if (from.latched) restoreTo(latch->second.get(), type, *from.latched, name);
         });
@@ -181,13 +180,13 @@ void SnapshotRestorer::fitOutputs(const SnapshotComponent& saved, const Instance
 void SnapshotRestorer::fitInputs(const SnapshotComponent& saved, const Instance& instance) {
     fitEach(
         saved.name + ".", "input", saved.inputs, instance.component().inputs(),
-        [](const InputBase* input) { return input->name(); },
-        [&](const SnapshotInput& from, InputBase* to) {
+        [](const InputPort* input) { return input->name(); },
+        [&](const SnapshotInput& from, InputPort* to) {
             fitInput(from, *to, saved.name + "." + to->name());
         });
 }
 
-void SnapshotRestorer::fitInput(const SnapshotInput& saved, InputBase& input,
+void SnapshotRestorer::fitInput(const SnapshotInput& saved, InputPort& input,
                                 const std::string& name) {
     const TypeInfo& type = input.type();
     if (!same(saved.type, type)) {
@@ -200,39 +199,23 @@ void SnapshotRestorer::fitInput(const SnapshotInput& saved, InputBase& input,
                             orNothing(source)));
         return;
     }
-    Restoration::Input to{&input, {nullptr, nullptr, saved.seen, saved.kept_is_new}};
-    const auto binding = plan_.bindings.find(&input);
-    const bool was_bound = binding != plan_.bindings.end();
-    if (source.empty() && saved.seen != 0 && !saved.left) {
+    if (source.empty() && saved.seen != 0 && !saved.held) {
         problem(fmt::format("input {} has read a removed writer, whose value is missing", name));
         return;
     }
-    if (source.empty() && (saved.left || was_bound)) {
-        auto left = saved.left ? slotFrom(type, *saved.left, name) : type.make_slot(nullptr);
-        restoration_.headers.push_back(left.get());
-        to.reading.source = left.get();
-        kept_[&input].left = std::move(left);
+    const auto found = plan_.bindings.find(&input);
+    const Binding binding = found == plan_.bindings.end() ? Binding{} : found->second;
+    Restoration::Input to{&input, source.empty() ? nullptr : binding.source, nullptr, saved.seen,
+                          saved.since};
+    // Without a writer and a value, but bound before: the value goes.
+    const bool is_emptied = source.empty() && found != plan_.bindings.end();
+    if (saved.held || is_emptied) {
+        auto held = saved.held ? slotFrom(type, *saved.held, name) : type.make_slot(nullptr);
+        restoration_.headers.push_back(held.get());
+        to.held = held.get();
+        held_[&input] = std::move(held);
     }
-    if (!saved.reads_source) {
-        std::shared_ptr<SlotHeader> kept;
-        if (!saved.kept_of.empty()) {
-            const auto output = outputs_.find(saved.kept_of);
-            if (output == outputs_.end() || !sameType(output->second.first->type(), type)) {
-                problem(fmt::format("input {} has a value of {}, which does not exist", name,
-                                    saved.kept_of));
-                return;
-            }
-            kept = output->second.first->slot();
-        } else {
-            kept = saved.kept ? slotFrom(type, *saved.kept, name) : type.make_slot(nullptr);
-            restoration_.headers.push_back(kept.get());
-        }
-        to.reading.current = kept.get();
-        kept_[&input].kept = std::move(kept);
-    }
-    const auto readers = was_bound
-                             ? readers_.find(static_cast<const Injector*>(binding->second.writer))
-                             : readers_.end();
+    const auto readers = readers_.find(static_cast<const Injector*>(binding.writer));
     (readers != readers_.end() ? readers->second : restoration_.inputs).push_back(to);
 }
 
@@ -247,7 +230,7 @@ void SnapshotRestorer::fitTopics() {
                 return;
             }
             restoration_.topics.push_back(
-                {&to, slotFrom(to.type(), from.value, from.name), from.sequence, readers_[&to]});
+                {&to, slotFrom(to.type(), from.value, from.name), readers_[&to]});
         });
 }
 
@@ -265,8 +248,7 @@ std::shared_ptr<SlotHeader> SnapshotRestorer::slotFrom(const TypeInfo& type,
         valid = type.deserialize(*slot, bytes, static_cast<std::uint32_t>(value.bytes.size()));
     }
     if (!valid) problem(fmt::format("the value of {} is not of type {}", name, type.name));
-    slot->sequence = value.sequence;
-    slot->time_ns = value.time_ns;
+    slot->stamp = value.stamp;
     return slot;
 }
 
@@ -293,14 +275,10 @@ void SnapshotRestorer::requireReserved() const {
 }
 
 void SnapshotRestorer::noteIn(Plan& plan) const {
-    for (const auto& [input, kept] : kept_) {
+    for (const auto& [input, held] : held_) {
         Binding& binding = plan.bindings[input];
-        if (kept.left) {
-            binding.source = kept.left.get();
-            binding.source_owner = kept.left;
-        }
-        binding.kept = kept.kept.get();
-        binding.kept_owner = kept.kept;
+        binding.held = held.get();
+        binding.held_owner = held;
     }
 }
 

@@ -44,7 +44,7 @@ class SnapshotRestorer {
     void fitStates(const SnapshotComponent& saved, const Instance& instance);
     void fitOutputs(const SnapshotComponent& saved, const Instance& instance);
     void fitInputs(const SnapshotComponent& saved, const Instance& instance);
-    void fitInput(const SnapshotInput& saved, InputBase& input, const std::string& name);
+    void fitInput(const SnapshotInput& saved, InputPort& input, const std::string& name);
     void fitTopics();
     /// Matches the elements of one kind by name, and calls `fit` for each pair.
     /// @param from elements of the snapshot
@@ -72,11 +72,7 @@ class SnapshotRestorer {
     std::map<const SlotHeader*, std::pair<std::string, const SlotHeader*>> reserved_;
     std::map<Instance*, Batch> parameters_;
     std::map<Instance*, std::uint32_t> phases_;
-    struct Kept {
-        std::shared_ptr<const SlotHeader> left;  // in place of a removed writer
-        std::shared_ptr<const SlotHeader> kept;
-    };
-    std::map<InputBase*, Kept> kept_;
+    std::map<InputPort*, std::shared_ptr<const SlotHeader>> held_;  // values of removed writers
     std::map<const Injector*, std::vector<Restoration::Input>> readers_;
 };
 

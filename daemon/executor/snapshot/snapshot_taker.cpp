@@ -13,7 +13,7 @@ const Instance& instanceOf(const Plan& plan, std::size_t step) {
 }
 
 SnapshotValue valueFrom(const Capture::Value& value) {
-    return {value.header.sequence, value.header.time_ns,
+    return {value.header.stamp,
             std::string(value.bytes.begin(), value.bytes.begin() + value.length)};
 }
 
@@ -27,13 +27,6 @@ void requireCopied(const TypeInfo& type) {
                             type.name, type.ros_type));
 }
 
-// The slot that an input without a writer still reads; null if it never had a writer.
-const SlotHeader* leftBy(const Binding& binding) {
-    if (binding.writer != nullptr) return nullptr;
-    if (binding.source != nullptr || binding.source_owner == nullptr) return binding.source;
-    return static_cast<const Injector*>(binding.source_owner.get())->front();
-}
-
 }  // namespace
 
 Sources::Sources(const Plan& plan) : plan_(plan) {
@@ -44,12 +37,7 @@ Sources::Sources(const Plan& plan) : plan_(plan) {
     for (const auto& [topic, injector] : plan.injectors) names_[injector.get()] = "topic " + topic;
 }
 
-std::string Sources::output(const SlotHeader* slot) const {
-    const auto found = names_.find(slot);
-    return found == names_.end() ? std::string() : found->second;
-}
-
-std::string Sources::of(const InputBase& input) const {
+std::string Sources::of(const InputPort& input) const {
     const auto found = plan_.bindings.find(&input);
     if (found == plan_.bindings.end() || found->second.writer == nullptr) return {};
     const Binding& binding = found->second;
@@ -81,13 +69,7 @@ SnapshotTaker::SnapshotTaker(const Plan& plan) : plan_(plan), sources_(plan) {
             if (const auto latch = plan.latches.find(slot); latch != plan.latches.end())
                 add(output.type(), latch->second.get(), instance.sample(port));
         }
-        for (const InputBase* input : component.inputs()) {
-            capture_.inputs.push_back({input});
-            const auto binding = plan.bindings.find(input);
-            if (binding == plan.bindings.end()) continue;
-            add(input->type(), leftBy(binding->second), nullptr);
-            add(input->type(), binding->second.kept, nullptr);
-        }
+        for (const InputPort* input : component.inputs()) addInput(*input);
     }
     for (const auto& [name, injector] : plan.injectors) {
         const TypeInfo& type = injector->type();
@@ -106,11 +88,28 @@ void SnapshotTaker::add(const TypeInfo& type, const SlotHeader* slot, const Slot
     capture_.values.push_back({&type, slot, std::vector<std::uint8_t>(room)});
 }
 
+void SnapshotTaker::addInput(const InputPort& input) {
+    const auto found = plan_.bindings.find(&input);
+    const Binding binding = found == plan_.bindings.end() ? Binding{} : found->second;
+    const bool is_bound = binding.writer != nullptr;
+    const bool from_outside = is_bound && binding.source == nullptr;
+    // Without a writer, or with a new one, it may have the value of a removed one.
+    const bool may_hold = is_bound ? binding.held_owner != nullptr : found != plan_.bindings.end();
+    if (may_hold) requireCopied(input.type());
+    const std::size_t room = may_hold && input.type().flat ? input.type().size : 0;
+    capture_.inputs.push_back(
+        {&input,
+         is_bound ? binding.source : nullptr,
+         from_outside ? static_cast<const Injector*>(binding.writer) : nullptr,
+         {&input.type(), nullptr, std::vector<std::uint8_t>(room)}});
+}
+
 void SnapshotTaker::makeRoom() {
     const auto enlarge = [](Capture::Value& value) {
         if (value.bytes.size() < value.length) value.bytes.resize(value.length);
     };
     for (Capture::Value& value : capture_.values) enlarge(value);
+    for (Capture::Input& input : capture_.inputs) enlarge(input.held);
     for (Capture::Topic& topic : capture_.topics) enlarge(topic.value);
 }
 
@@ -118,22 +117,14 @@ SnapshotValue SnapshotTaker::valueAt(const SlotHeader* slot) const {
     return valueFrom(capture_.values[values_.at(slot)]);
 }
 
-SnapshotInput SnapshotTaker::inputOf(const InputBase& input,
-                                     const InputBase::Reading& reading) const {
+SnapshotInput SnapshotTaker::inputOf(const Capture::Input& input) const {
     SnapshotInput result;
-    result.name = input.name();
-    result.type = snapshotTypeOf(input.type());
-    result.source = sources_.of(input);
-    result.seen = reading.seen;
-    result.kept_is_new = reading.kept_is_new;
-    result.reads_source = reading.current == reading.source;
-    const auto binding = plan_.bindings.find(&input);
-    if (binding == plan_.bindings.end()) return result;
-    if (const SlotHeader* const left = leftBy(binding->second); left != nullptr)
-        result.left = valueAt(left);
-    if (result.reads_source || reading.current != binding->second.kept) return result;
-    result.kept_of = sources_.output(reading.current);
-    if (result.kept_of.empty()) result.kept = valueAt(reading.current);
+    result.name = input.input->name();
+    result.type = snapshotTypeOf(input.input->type());
+    result.source = sources_.of(*input.input);
+    result.seen = input.seen;
+    result.since = input.since;
+    if (input.held.from != nullptr) result.held = valueFrom(input.held);
     return result;
 }
 
@@ -182,14 +173,12 @@ Snapshot SnapshotTaker::snapshot() const {
                                     instance.fullName()));
         }
         result.components.push_back(componentOf(step));
-        for (const InputBase* port : instance.component().inputs()) {
-            result.components.back().inputs.push_back(inputOf(*port, input->reading));
-            ++input;
-        }
+        for (std::size_t i = 0; i < instance.component().inputs().size(); ++i)
+            result.components.back().inputs.push_back(inputOf(*input++));
     }
     for (const Capture::Topic& topic : capture_.topics) {
         result.topics.push_back({topic.injector->topic(), snapshotTypeOf(topic.injector->type()),
-                                 topic.sequence, valueFrom(topic.value)});
+                                 valueFrom(topic.value)});
     }
     return result;
 }

@@ -19,9 +19,7 @@ class Sources {
     /// @param plan outlives this object
     explicit Sources(const Plan& plan);
     /// The source of an input: "/C.out", "/C.out one cycle late", "topic /x"; empty = none.
-    std::string of(const InputBase& input) const;
-    /// The output of a slot, e.g. "/C.out"; empty = no output of the graph.
-    std::string output(const SlotHeader* slot) const;
+    std::string of(const InputPort& input) const;
 
    private:
     const Plan& plan_;
@@ -44,10 +42,11 @@ class SnapshotTaker {
     Snapshot snapshot() const;
 
    private:
+    void addInput(const InputPort& input);
     void add(const TypeInfo& type, const SlotHeader* slot, const SlotHeader* sample);
     SnapshotValue valueAt(const SlotHeader* slot) const;
     SnapshotComponent componentOf(std::size_t step) const;
-    SnapshotInput inputOf(const InputBase& input, const InputBase::Reading& reading) const;
+    SnapshotInput inputOf(const Capture::Input& input) const;
 
     const Plan& plan_;
     const Sources sources_;

@@ -24,6 +24,23 @@ bool Capture::Value::take() noexcept {
     return true;
 }
 
+bool Capture::Input::take() noexcept {
+    seen = input->seen();
+    since = input->since();
+    const SlotHeader& slot = input->slot();
+    const bool own = &slot == (injector != nullptr ? injector->front() : source);
+    held.from = own || slot.stamp == 0 ? nullptr : &slot;
+    return held.from == nullptr || held.take();
+}
+
+void Restoration::Input::put(const SlotHeader* other, std::int64_t later) const noexcept {
+    if (QueueBase* const queue = input->queue()) queue->clear();
+    const SlotHeader* const own = source != nullptr ? source : other;
+    const bool waits = held != nullptr && source != nullptr;
+    input->set(held != nullptr ? held : own, movedStamp(seen, later), waits ? source : nullptr,
+               movedStamp(since, later));
+}
+
 void Restoration::Value::put() const noexcept {
     if (type->flat) {
         type->copy(*to, *from);
@@ -37,6 +54,7 @@ std::size_t Capture::bytes() const {
     std::size_t bytes = (inputs.size() + turns.size()) * kLine;
     for (const StateCopy& state : states) bytes += lines(state.size);
     for (const Value& value : values) bytes += lines(sizeof(SlotHeader) + value.bytes.size());
+    for (const Input& input : inputs) bytes += lines(input.held.bytes.size());
     for (const Topic& topic : topics) bytes += lines(sizeof(SlotHeader) + topic.value.bytes.size());
     return bytes;
 }

@@ -38,13 +38,20 @@ struct Capture {
         bool take() noexcept;
     };
     struct Input {
-        const InputBase* input;
-        InputBase::Reading reading = {};
+        const InputPort* input;
+        const SlotHeader* source;  ///< slot of its writer; null = none, or an injector
+        const Injector* injector;  ///< null = none
+        Value held;  ///< value of an earlier writer; `from` is null if the input has none
+        std::int64_t seen = 0;
+        std::int64_t since = 0;
+
+        /// Copies the read position and the value of an earlier writer. Real-time safe.
+        /// @return false if the buffer is too small
+        bool take() noexcept;
     };
     struct Topic {
         const Injector* injector;
         Value value;
-        std::uint64_t sequence = 0;
     };
     struct Turn {
         const ComponentContext* context;
@@ -78,13 +85,20 @@ struct Restoration {
         void put() const noexcept;
     };
     struct Input {
-        InputBase* input;
-        InputBase::Reading reading;  ///< null source or current = keep the input's own
+        InputPort* input;
+        const SlotHeader* source;  ///< slot of its writer; null = none, or an injector
+        const SlotHeader* held;    ///< value of an earlier writer; null = none
+        std::int64_t seen;
+        std::int64_t since;
+
+        /// Restores the value and the read position; empties a queue. Real-time safe.
+        /// @param other source if none is set
+        /// @param later moves the stamps, ns
+        void put(const SlotHeader* other, std::int64_t later) const noexcept;
     };
     struct Topic {
         Injector* injector;
         std::shared_ptr<SlotHeader> slot;
-        std::uint64_t sequence;
         std::vector<Input> readers;
     };
     struct Turn {
@@ -94,8 +108,7 @@ struct Restoration {
     };
     std::vector<StateCopy> states;
     std::vector<Value> values;
-    std::vector<OutputBase*> staged;   ///< outputs whose staged slots are among `values`
-    std::vector<SlotHeader*> headers;  ///< headers whose times to shift to the loop's time
+    std::vector<SlotHeader*> headers;  ///< headers whose stamps to move to the loop's time
     std::vector<Input> inputs;
     std::vector<Topic> topics;
     std::vector<Turn> turns;

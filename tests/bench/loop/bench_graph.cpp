@@ -84,7 +84,7 @@ void BenchGraph::adopt(const executor::Graph& graph) {
     executor::Adoption adoption;
     auto plan = executor::buildPlan(graph, std::move(wiring), *plan_, kFrequencyHz, adoption);
     loop_.adopt(adoption, kAdoptionTimeoutNs);
-    plan->noteKept(adoption, *plan_);
+    plan->noteHeld(adoption, *plan_);
     std::swap(plan_, plan);
     order_.clear();
     for (const executor::Step& step : plan_->schedule.steps) order_.push_back(step.component);

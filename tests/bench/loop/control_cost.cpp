@@ -50,19 +50,20 @@ class Component {
 
     // The value of an input, for writing in each cycle.
     std::function<void(double)> input(const std::string& name) {
-        for (rtcf::InputBase* input : component_.inputs()) {
+        for (rtcf::InputPort* input : component_.inputs()) {
             if (input->name() != name) continue;
             slots_.push_back(input->type().make_slot(nullptr));
-            input->rewire(slots_.back().get(), false);
+            input->connect(slots_.back().get(), false);
             auto* const slot = static_cast<rtcf::Slot<double>*>(slots_.back().get());
             return [slot](double value) {
                 slot->value = value;
-                ++slot->sequence;
+                ++slot->stamp;
             };
         }
         throw std::runtime_error("no input " + name);
     }
     void update() {
+        component_.setTime(component_.time() + 1);
         component_.update();
         for (rtcf::OutputBase* output : component_.stagedOutputs()) output->commit();
     }

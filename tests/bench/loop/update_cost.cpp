@@ -75,11 +75,11 @@ class Contender {
         for (rtcf::DerivedBase* derived : component_->derived())
             if (derived->staged()) derived->commit();
         // By name: the two may declare their ports in different orders.
-        std::vector<rtcf::InputBase*> inputs = component_->inputs();
+        std::vector<rtcf::InputPort*> inputs = component_->inputs();
         std::sort(inputs.begin(), inputs.end(),
                   [](const auto* a, const auto* b) { return a->name() < b->name(); });
         std::mt19937 draw(1);
-        for (rtcf::InputBase* input : inputs) feed(*input, signalOf(type, input->name()), draw);
+        for (rtcf::InputPort* input : inputs) feed(*input, signalOf(type, input->name()), draw);
         outputs_ = component_->outputs();
         std::sort(outputs_.begin(), outputs_.end(),
                   [](const auto* a, const auto* b) { return a->name() < b->name(); });
@@ -136,10 +136,10 @@ class Contender {
     }
 
     // For inputs of doubles only.
-    void feed(rtcf::InputBase& input, const Signal& signal, std::mt19937& draw) {
+    void feed(rtcf::InputPort& input, const Signal& signal, std::mt19937& draw) {
         const rtcf::TypeInfo& info = input.type();
         slots_.push_back(info.make_slot(nullptr));
-        input.rewire(slots_.back().get(), false);
+        input.connect(slots_.back().get(), false);
         std::normal_distribution<double> noise;
         std::uniform_real_distribution<double> any(0.0, 2.0 * M_PI);
         const std::size_t elements = info.size / sizeof(double);
@@ -162,11 +162,12 @@ class Contender {
 
     void write() {
         const std::size_t at = written_++ % kUpdates;
+        component_->setTime(component_->time() + 1);
         for (Feed& each : feeds_) {
             if (each.every != 1 && at % each.every != 0) continue;
             const std::size_t doubles = each.size / sizeof(double);
             std::memcpy(each.place, &each.values[at * doubles], each.size);
-            ++each.slot->sequence;
+            ++each.slot->stamp;
         }
     }
 
@@ -179,11 +180,11 @@ class Contender {
                                                  theirs.type().name));
         const rtcf::SlotHeader& mine = *ours.written();
         const rtcf::SlotHeader& other = *theirs.written();
-        if (mine.sequence != other.sequence)
+        if (mine.stamp != other.stamp)
             throw std::runtime_error(
                 fmt::format("{}: cycle {}: {} was written {} times, {} times "
                             "in the reference",
-                            name_, cycle, ours.name(), mine.sequence, other.sequence));
+                            name_, cycle, ours.name(), mine.stamp, other.stamp));
         const bool is_whole = type.find("int") != std::string_view::npos || type == "bool";
         if (is_whole) {
             if (std::memcmp(valueOf(mine, info), valueOf(other, info), info.size) != 0)

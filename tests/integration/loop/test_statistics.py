@@ -9,7 +9,7 @@ import pytest
 import rtcf
 from daemon_process import Daemon, wait_for
 from rtcf.v1 import graph_pb2, runner_pb2
-from values import iteration, state
+from values import iteration, port_value, state
 
 
 def _slow(name: str) -> graph_pb2.ComponentSpec:
@@ -284,9 +284,6 @@ def test_incompatible_rates_are_rejected_with_a_compatible_one(
     assert load("eight", "--every", "8") == ""
     wait_for(lambda: iteration(client) > 200, "200 cycles")
     client.stop()
-    counts = {
-        each: next(p for p in client.get_component(each).ports if p.name == "out").count
-        for each in ("four", "eight")
-    }
+    counts = {each: port_value(client, each, "out") for each in ("four", "eight")}
     assert counts["four"] in (iteration(client) // 4, iteration(client) // 4 + 1)
     assert 0 < counts["eight"] <= counts["four"] // 2 + 1

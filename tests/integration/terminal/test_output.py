@@ -95,7 +95,7 @@ def test_values_have_their_declared_types(daemon: Daemon) -> None:
     assert parameters["mode"]["choices"] == ["idle", "run"]
     assert parameters["enabled"]["minimum"] is None
     ports = {each["name"]: each for each in found["ports"]}
-    assert (ports["product"]["value"], ports["product"]["count"]) == ({"data": 3}, 1)
+    assert ports["product"]["value"] == {"data": 3}
     assert ports["product"]["direction"] == "output"
 
 

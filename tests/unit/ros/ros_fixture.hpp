@@ -35,7 +35,7 @@ class Source {
     /// @param stamp_ns stamp of the cycle
     void write(double value, std::int64_t stamp_ns = 0) {
         slot_->value.data = value;
-        ++slot_->sequence;
+        ++slot_->stamp;
         tap_->push(stamp_ns);
     }
 

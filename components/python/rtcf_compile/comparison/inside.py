@@ -15,9 +15,8 @@ from rtcf_compile.machine_code.lowering import Compiled
 from rtcf_compile.machine_code.raises import hash_of
 from rtcf_compile.source.mistake import Mistake
 
-# Functions of the runtime for earlier writers and ages. Records contain these values already.
+# Function of the runtime for ages. Records contain these values already.
 _RUNTIME = f"""extern "C" {{
-long {port_access.READ}(void*) {{ return 0; }}
 void {port_access.READ_MORE}(void*, void*, void*) {{}}
 """
 
@@ -92,13 +91,12 @@ class _Ports:
     def __init__(self, description: Description) -> None:
         self._inputs = [_Port(each) for each in port_access.inputs(description)]
         self._outputs = [_Port(each) for each in port_access.outputs(description)]
-        self._clock = np.zeros(8, np.int64)
+        self._now = np.ones(1, np.int64)
         for each in self._inputs:
             each.place[port_access.SOURCE // 8] = each.slot.ctypes.data
-            each.place[port_access.CURRENT // 8] = each.slot.ctypes.data
         for each in self._outputs:
             each.place[port_access.RAW // 8] = each.slot.ctypes.data
-            each.place[port_access.CLOCK // 8] = self._clock.ctypes.data
+            each.place[port_access.NOW // 8] = self._now.ctypes.data
         ports = [each.place.ctypes.data for each in (*self._inputs, *self._outputs)]
         self._addresses = np.array(ports or [0], np.int64)
         self.address: int = int(self._addresses.ctypes.data)
@@ -107,17 +105,17 @@ class _Ports:
         """Set inputs to the values of a record."""
         for each in self._inputs:
             is_new, is_valid = (bool(record[f"{each.name}__{flag}"]) for flag in ("new", "valid"))
-            each.sequence = int(is_new) + int(is_valid)
-            each.place[port_access.SEEN // 8] = each.sequence - is_new
+            each.stamp = int(is_new) + int(is_valid)
+            each.place[port_access.SEEN // 8] = each.stamp - is_new
             each.value = record[each.name]
 
     def take(self, record: Any) -> None:
         """Copy the values of written outputs to a record."""
         for each in self._outputs:
-            if each.sequence:
+            if each.stamp:
                 record[each.name] = each.value
                 record[f"{each.name}__written"] = True
-                each.sequence = 0
+                each.stamp = 0
 
 
 class _Port:
@@ -127,17 +125,18 @@ class _Port:
         self.name = member.name
         self.place = np.zeros(4, np.int64)
         self._type = member.type
-        size = port_access.SLOT_VALUE + member.type.count * member.type.scalar.itemsize
+        self._begin = port_access.slot_value(member)
+        size = self._begin + member.type.count * member.type.scalar.itemsize
         self.slot = np.zeros((size + 7) // 8, np.int64)
 
     @property
-    def sequence(self) -> int:
-        """The number of writes."""
-        return int(self.slot[port_access.SEQUENCE // 8])
+    def stamp(self) -> int:
+        """The time of the last write; 0 = never written."""
+        return int(self.slot[port_access.STAMP // 8])
 
-    @sequence.setter
-    def sequence(self, number: int) -> None:
-        self.slot[port_access.SEQUENCE // 8] = number
+    @stamp.setter
+    def stamp(self, time: int) -> None:
+        self.slot[port_access.STAMP // 8] = time
 
     @property
     def value(self) -> Any:
@@ -151,6 +150,6 @@ class _Port:
 
     def _elements(self) -> Any:
         """Return the elements in the order of the slot: matrices of floats by columns."""
-        memory = self.slot.view(np.uint8)[port_access.SLOT_VALUE :]
+        memory = self.slot.view(np.uint8)[self._begin :]
         used = self._type.count * self._type.scalar.itemsize
         return memory[:used].view(self._type.scalar)

@@ -58,7 +58,7 @@ ALLOWED = {
     *_MATHEMATICS,
     *(f"{name}f" for name in _MATHEMATICS),
     *("memcpy", "memmove", "memset", "bcmp", "memcmp"),
-    *(port_access.READ, port_access.READ_MORE),
+    port_access.READ_MORE,
 }
 _HEAP = {"aligned_alloc", "free"}
 _MEANING = {

@@ -9,12 +9,10 @@ from collections.abc import Iterator, Sequence
 
 from rtcf.component.declaration import Description, Input, Member, Output
 
-SEQUENCE, SLOT_TIME, SLOT_VALUE = 0, 8, 16  # byte offsets in a slot
-SOURCE, CURRENT, SEEN = 0, 8, 16  # byte offsets in an input
-RAW, CLOCK = 0, 8  # byte offsets in an output
-CLOCK_TIME = 8  # byte offset in the loop's clock
-READ, READ_MORE = "rtcf_python_read", "rtcf_python_read_more"
-NONE, OLD, NEW = 0, 1, 2  # the results of READ
+STAMP = 0  # byte offset in a slot
+SOURCE, SEEN = 0, 8  # byte offsets in an input
+RAW, NOW = 0, 8  # byte offsets in an output
+READ_MORE = "rtcf_python_read_more"
 _UNROLLED = 64  # elements copied without a loop
 
 
@@ -53,10 +51,18 @@ done:
 
 
 DECLARATIONS = f"""
-declare i64 @{READ}(i8*)
 declare void @{READ_MORE}(i8*, i8*, i8*)
 declare i8* @memcpy(i8*, i8*, i64)
 {_transpose(4)}{_transpose(8)}"""
+
+
+def slot_value(member: Member) -> int:
+    """Return the offset of a port's value in its slot, bytes.
+
+    Eigen aligns a matrix whose size is a multiple of 16 bytes to them.
+    """
+    kind = member.type
+    return 16 if kind.is_float and kind.count * kind.scalar.itemsize % 16 == 0 else 8
 
 
 def inputs(description: Description) -> list[Member]:
@@ -98,48 +104,18 @@ class PortAccess:
     def _read(self, member: Member, name: str, index: int) -> Iterator[str]:
         yield from _port(name, index)
         yield from _loaded(f"{name}.source", f"{name}.port", SOURCE, "i8*")
-        yield from _loaded(f"{name}.sequence", f"{name}.source", SEQUENCE, "i64")
+        yield from _loaded(f"{name}.stamp", f"{name}.source", STAMP, "i64")
         yield from _loaded(f"{name}.seen", f"{name}.port", SEEN, "i64")
-        yield from _place(f"{name}.current.place", f"{name}.port", CURRENT, "i8*")
-        yield f"  %{name}.is_new = icmp ne i64 %{name}.sequence, %{name}.seen"
-        yield f"  br i1 %{name}.is_new, label %{name}.new, label %{name}.old"
-        yield f"{name}.new:"
-        yield f"  store i64 %{name}.sequence, i64* %{name}.seen.place"
-        yield f"  store i8* %{name}.source, i8** %{name}.current.place"
-        yield f"  br label %{name}.read"
-        yield f"{name}.old:"
-        yield f"  %{name}.kept = load i8*, i8** %{name}.current.place"
-        yield f"  %{name}.is_same = icmp eq i8* %{name}.kept, %{name}.source"
-        yield f"  br i1 %{name}.is_same, label %{name}.same, label %{name}.other"
-        yield f"{name}.same:"
-        yield f"  %{name}.has_value = icmp ne i64 %{name}.sequence, 0"
-        yield f"  br label %{name}.read"
-        # The port holds the value of an earlier writer.
-        yield f"{name}.other:"
-        yield f"  %{name}.status = call i64 @{READ}(i8* %{name}.port)"
-        yield f"  %{name}.other.new = icmp eq i64 %{name}.status, {NEW}"
-        yield f"  %{name}.other.valid = icmp ne i64 %{name}.status, {NONE}"
-        yield f"  br label %{name}.read"
-        yield f"{name}.read:"
-        blocks = [f"%{name}.{each}" for each in ("new", "same", "other")]
-        for found, kind, values in (
-            ("slot", "i8*", ("source", "source", "kept")),
-            ("fresh", "i1", (None, None, "other.new")),
-            ("valid", "i1", (None, "has_value", "other.valid")),
-        ):
-            constants = ("true", "false", "")
-            pairs = ", ".join(
-                f"[ {f'%{name}.{value}' if value else constant}, {block} ]"
-                for value, constant, block in zip(values, constants, blocks, strict=True)
-            )
-            yield f"  %{name}.{found} = phi {kind} {pairs}"
+        yield f"  %{name}.fresh = icmp ne i64 %{name}.stamp, %{name}.seen"
+        yield f"  %{name}.valid = icmp ne i64 %{name}.stamp, 0"
+        yield f"  store i64 %{name}.stamp, i64* %{name}.seen.place"
         for field, found in (("new", "fresh"), ("valid", "valid")):
             if f"{member.name}__{field}" in self._used:
                 place = self._places[f"{member.name}__{field}"]
                 yield f"  %{name}.{found}.byte = zext i1 %{name}.{found} to i8"
                 yield from _place(f"{name}.{found}.place", "record", place, "i8")
                 yield f"  store i8 %{name}.{found}.byte, i8* %{name}.{found}.place"
-        yield from _place(f"{name}.from", f"{name}.slot", SLOT_VALUE, "i8")
+        yield from _place(f"{name}.from", f"{name}.source", slot_value(member), "i8")
         yield from _place(f"{name}.to", "record", self._places[member.name], "i8")
         yield from _copy(member, name, to_port=False)
         more = [f"{member.name}__{each}" for each in ("age", "connected")]
@@ -162,16 +138,12 @@ class PortAccess:
         yield from _port(name, index)
         yield from _loaded(f"{name}.raw", f"{name}.port", RAW, "i8*")
         yield from _place(f"{name}.from", "record", self._places[member.name], "i8")
-        yield from _place(f"{name}.to", f"{name}.raw", SLOT_VALUE, "i8")
+        yield from _place(f"{name}.to", f"{name}.raw", slot_value(member), "i8")
         yield from _copy(member, name, to_port=True)
-        yield from _loaded(f"{name}.sequence", f"{name}.raw", SEQUENCE, "i64")
-        yield f"  %{name}.next = add i64 %{name}.sequence, 1"
-        yield f"  store i64 %{name}.next, i64* %{name}.sequence.place"
-        yield from _loaded(f"{name}.clock", f"{name}.port", CLOCK, "i8*")
-        yield from _place(f"{name}.now.place", f"{name}.clock", CLOCK_TIME, "i64")
+        yield from _loaded(f"{name}.now.place", f"{name}.port", NOW, "i64*")
         yield f"  %{name}.now = load atomic i64, i64* %{name}.now.place monotonic, align 8"
-        yield from _place(f"{name}.time.place", f"{name}.raw", SLOT_TIME, "i64")
-        yield f"  store i64 %{name}.now, i64* %{name}.time.place"
+        yield from _place(f"{name}.stamp.place", f"{name}.raw", STAMP, "i64")
+        yield f"  store i64 %{name}.now, i64* %{name}.stamp.place"
         yield f"  store i8 0, i8* %{name}.written.place"
         yield f"  br label %{name}.done"
         yield f"{name}.done:"

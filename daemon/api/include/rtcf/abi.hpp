@@ -21,22 +21,19 @@ namespace rtcf {
 /// Offsets of a port's members, bytes, for code that is not compiled by a C++ compiler (components
 /// in Python).
 struct PortPlaces {
-    std::size_t source;   ///< inputs: pointer to the writer's slot
-    std::size_t current;  ///< inputs: pointer to the slot with the value
-    std::size_t seen;     ///< inputs: the source's sequence at the last read
-    std::size_t raw;      ///< outputs: pointer to the slot that it writes
-    std::size_t clock;    ///< outputs: pointer to the clock that stamps it
+    std::size_t source;  ///< inputs: pointer to the slot with the value
+    std::size_t seen;    ///< inputs: stamp of the value of the last read
+    std::size_t raw;     ///< outputs: pointer to the slot that it writes
+    std::size_t now;     ///< outputs: pointer to the component's time, which stamps it
     constexpr bool operator==(const PortPlaces& other) const noexcept {
-        return source == other.source && current == other.current && seen == other.seen &&
-               raw == other.raw && clock == other.clock;
+        return source == other.source && seen == other.seen && raw == other.raw && now == other.now;
     }
 };
 
 struct AbiProbe {
     static constexpr PortPlaces portPlaces() noexcept {
-        return {offsetof(InputBase, source_), offsetof(InputBase, current_),
-                offsetof(InputBase, seen_), offsetof(OutputBase, raw_),
-                offsetof(OutputBase, clock_)};
+        return {offsetof(InputBase, source_), offsetof(InputBase, seen_),
+                offsetof(OutputBase, raw_), offsetof(OutputBase, now_)};
     }
     /// @param meaning RTCF_ABI_VERSION, raised by hand when a meaning changes but no layout
     static std::uint32_t fingerprint(std::uint32_t meaning) noexcept {
@@ -45,12 +42,13 @@ struct AbiProbe {
             for (const std::size_t number : numbers) hash = detail::stateHash(number, hash);
         };
         add({sizeof(Component), alignof(Component), offsetof(Component, context_),
-             offsetof(Component, rest_), sizeof(Source), sizeof(Component::Rest)});
+             offsetof(Component, rest_), offsetof(Component, now_), sizeof(Source),
+             sizeof(Component::Rest)});
         using Rest = Component::Rest;
-        add({offsetof(Rest, frozen), offsetof(Rest, inputs), offsetof(Rest, outputs),
-             offsetof(Rest, parameters), offsetof(Rest, derived), offsetof(Rest, mailboxes),
-             sizeof(MailboxBase), offsetof(MailboxBase, open_), offsetof(Rest, states),
-             offsetof(Rest, staged_outputs), offsetof(Rest, failure)});
+        add({offsetof(Rest, frozen), offsetof(Rest, input_ports), offsetof(Rest, inputs),
+             offsetof(Rest, outputs), offsetof(Rest, parameters), offsetof(Rest, derived),
+             offsetof(Rest, mailboxes), sizeof(MailboxBase), offsetof(MailboxBase, open_),
+             offsetof(Rest, states), offsetof(Rest, staged_outputs), offsetof(Rest, failure)});
         using Context = ComponentContext;
         add({sizeof(Context), offsetof(Context, full_name), offsetof(Context, name),
              offsetof(Context, ns), offsetof(Context, runner), offsetof(Context, clock),
@@ -64,24 +62,35 @@ struct AbiProbe {
              offsetof(LoopClock, elapsed_ns)});
         add({sizeof(DeviceFigures), offsetof(DeviceFigures, calls),
              offsetof(DeviceFigures, time_ns)});
-        add({sizeof(InputBase), offsetof(InputBase, source_), offsetof(InputBase, current_),
-             offsetof(InputBase, seen_), offsetof(InputBase, identity_)});
-        add({sizeof(OutputBase), offsetof(OutputBase, raw_), offsetof(OutputBase, clock_),
+        add({sizeof(InputBase), offsetof(InputBase, source_), offsetof(InputBase, seen_)});
+        add({sizeof(OutputBase), offsetof(OutputBase, raw_), offsetof(OutputBase, now_),
              offsetof(OutputBase, rest_), sizeof(OutputBase::Rest),
              offsetof(OutputBase::Rest, identity), offsetof(OutputBase::Rest, slot),
              offsetof(OutputBase::Rest, staged), offsetof(OutputBase::Rest, sample),
-             offsetof(OutputBase::Rest, checked), offsetof(OutputBase::Rest, examined),
-             offsetof(OutputBase::Rest, policy)});
-        add({sizeof(PortIdentity), offsetof(PortIdentity, owner), offsetof(PortIdentity, name),
-             offsetof(PortIdentity, unit), offsetof(PortIdentity, type),
-             offsetof(PortIdentity, connected), offsetof(PortIdentity, kept_is_new),
-             offsetof(PortIdentity, queue), sizeof(QueueBase), offsetof(QueueBase, ring_),
-             sizeof(QueueBase::Ring), offsetof(QueueBase::Ring, capacity),
-             offsetof(QueueBase::Ring, at), offsetof(QueueBase::Ring, slots),
-             offsetof(QueueBase::Ring, oldest), offsetof(QueueBase::Ring, count),
-             offsetof(QueueBase::Ring, dropped), offsetof(QueueBase::Ring, sample)});
-        add({sizeof(SlotHeader), offsetof(SlotHeader, sequence), offsetof(SlotHeader, time_ns),
-             offsetof(Slot<double>, value)});
+             offsetof(OutputBase::Rest, checked), offsetof(OutputBase::Rest, policy)});
+        add({sizeof(OutputIdentity), offsetof(OutputIdentity, name), offsetof(OutputIdentity, unit),
+             offsetof(OutputIdentity, type), offsetof(OutputIdentity, connected)});
+        add({sizeof(InputPort),
+             offsetof(InputPort, input_),
+             offsetof(InputPort, owner_),
+             offsetof(InputPort, name_),
+             offsetof(InputPort, type_),
+             offsetof(InputPort, queue_),
+             offsetof(InputPort, connected_),
+             offsetof(InputPort, since_),
+             offsetof(InputPort, awaited_),
+             sizeof(QueueBase),
+             offsetof(QueueBase, ring_),
+             sizeof(QueueBase::Ring),
+             offsetof(QueueBase::Ring, capacity),
+             offsetof(QueueBase::Ring, at),
+             offsetof(QueueBase::Ring, slots),
+             offsetof(QueueBase::Ring, oldest),
+             offsetof(QueueBase::Ring, count),
+             offsetof(QueueBase::Ring, dropped),
+             offsetof(QueueBase::Ring, sample),
+             offsetof(QueueBase::Ring, port)});
+        add({sizeof(SlotHeader), offsetof(SlotHeader, stamp), offsetof(Slot<double>, value)});
         add({sizeof(TypeInfo), offsetof(TypeInfo, name), offsetof(TypeInfo, size),
              offsetof(TypeInfo, ros_type), offsetof(TypeInfo, fixed_size), offsetof(TypeInfo, flat),
              offsetof(TypeInfo, builds_message), offsetof(TypeInfo, plain),

@@ -117,7 +117,7 @@ class Component {
     /// that they also work in simulation and replay.
     /// @{
     /// Monotonic loop time of this cycle, ns; simulated under simulated time.
-    std::int64_t time() const noexcept RTCF_NONBLOCKING { return context_->clock->time_ns; }
+    std::int64_t time() const noexcept RTCF_NONBLOCKING { return now_; }
     /// ROS time of this cycle, for message headers, ns since 1970.
     std::int64_t stamp() const noexcept RTCF_NONBLOCKING { return context_->clock->stamp_ns; }
     /// Cycles since the loop started; 0 in the first one.
@@ -151,13 +151,12 @@ class Component {
     /// @name For the executor; not for components
     /// @{
     /// Sets the context. Before configure(); not real-time.
-    void attach(ComponentContext& context) noexcept {
-        context_ = &context;
-        for (OutputBase* output : rest_->outputs) output->setClock(clock());
-    }
+    void attach(ComponentContext& context) noexcept { context_ = &context; }
+    /// Sets the loop time of the next hook, > 0, which stamps what the hook writes. Real-time safe.
+    void setTime(std::int64_t time_ns) noexcept RTCF_NONBLOCKING { now_ = time_ns; }
     /// Rejects further declarations. After configure(); not real-time.
     void freeze() noexcept { rest_->frozen = true; }
-    const std::vector<InputBase*>& inputs() const noexcept { return rest_->inputs; }
+    const std::vector<InputPort*>& inputs() const noexcept { return rest_->inputs; }
     const std::vector<OutputBase*>& outputs() const noexcept { return rest_->outputs; }
     const std::vector<ParameterBase*>& parameters() const noexcept { return rest_->parameters; }
     const std::vector<DerivedBase*>& derived() const noexcept { return rest_->derived; }
@@ -184,7 +183,10 @@ class Component {
     /// Not real-time.
     /// @throws std::logic_error if the name is taken or not a ROS base name, and after freeze()
     /// @{
-    void declare(InputBase* input) { declareIn(rest_->inputs, input, input->name(), "port"); }
+    void declare(std::unique_ptr<InputPort> input) {
+        declareIn(rest_->inputs, input.get(), input->name(), "port");
+        rest_->input_ports.push_back(std::move(input));
+    }
     void declare(OutputBase* output) { declareIn(rest_->outputs, output, output->name(), "port"); }
     void declare(StateDeclaration state);
     void declare(DerivedBase* derived) { rest_->derived.push_back(derived); }
@@ -226,13 +228,15 @@ class Component {
         return context;
     }
 
+    friend class OutputBase;
     ComponentContext* context_ =
         detail::under_construction != nullptr ? detail::under_construction : &detached();
     // Kept outside the object, so that the derived class's ports, which each cycle touches, lie
     // close together.
     struct Rest {
         bool frozen = false;
-        std::vector<InputBase*> inputs;
+        std::vector<std::unique_ptr<InputPort>> input_ports;
+        std::vector<InputPort*> inputs;
         std::vector<OutputBase*> outputs;
         std::vector<ParameterBase*> parameters;
         std::vector<DerivedBase*> derived;
@@ -242,6 +246,7 @@ class Component {
         std::string failure;
     };
     std::unique_ptr<Rest> rest_ = std::make_unique<Rest>();
+    Shared<std::int64_t> now_ = 1;  // loop time; stamps of outputs must not be 0
 };
 
 inline void Component::requireDeclarable(const std::string& name, const char* what) const {
@@ -290,7 +295,7 @@ template <typename T>
 const T* Predecessor::output(std::string_view name) const noexcept {
     for (const OutputBase* output : component_.outputs()) {
         if (output->name() != name) continue;
-        const bool there = output->slot()->sequence != 0 && sameType(output->type(), typeInfo<T>());
+        const bool there = output->slot()->stamp != 0 && sameType(output->type(), typeInfo<T>());
         return there ? &static_cast<const Slot<T>*>(output->slot().get())->value : nullptr;
     }
     return nullptr;
@@ -321,30 +326,38 @@ void Component::declareIn(std::vector<T*>& members, T* member, const std::string
 
 inline InputBase::InputBase(Component* owner, std::string name, const TypeInfo& type,
                             const SlotHeader& empty)
-    : source_(&empty),
-      current_(&empty),
-      identity_(new PortIdentity{owner, std::move(name), {}, type}) {
-    owner->declare(this);
+    : source_(&empty) {
+    owner->declare(std::make_unique<InputPort>(*this, *owner, std::move(name), type));
 }
 
-inline std::int64_t InputBase::age() const noexcept RTCF_NONBLOCKING {
-    // Loop time goes back when a simulated clock is reset.
-    return current_->sequence == 0
-               ? -1
-               : std::max<std::int64_t>(0, identity_->owner->time() - current_->time_ns);
+inline std::int64_t InputBase::age(const Component* owner) const noexcept RTCF_NONBLOCKING {
+    if (source_->stamp == 0) return -1;
+    return std::max<std::int64_t>(0, owner->time() - source_->stamp);
+}
+
+inline bool InputBase::connected(const Component* owner) const noexcept RTCF_NONBLOCKING {
+    for (const InputPort* port : owner->inputs())
+        if (&port->input() == this) return port->connected();
+    return false;
+}
+
+inline QueueBase::QueueBase(Component* owner, std::string name, const TypeInfo& type,
+                            const Ring& ring)
+    : InputBase(owner, std::move(name), type, kNoValue), ring_(new Ring(ring)) {
+    ring_->port = owner->inputs().back();
+    ring_->port->setQueue(this);
 }
 
 inline std::int64_t QueueBase::age() noexcept {
     const SlotHeader* const slot = oldest();
     if (slot == nullptr) return -1;
-    return std::max<std::int64_t>(0, owner().time() - slot->time_ns);
+    return std::max<std::int64_t>(0, ring_->port->owner().time() - slot->stamp);
 }
 
 inline OutputBase::OutputBase(Component* owner, std::string name, std::string unit,
                               const TypeInfo& type, const Finite* finite)
-    : clock_(&owner->clock()),
-      rest_(new Rest{
-          {owner, std::move(name), std::move(unit), type}, type.make_slot(nullptr), {}, {}}) {
+    : now_(&owner->now_),
+      rest_(new Rest{{std::move(name), std::move(unit), type}, type.make_slot(nullptr), {}, {}}) {
     raw_ = rest_->slot.get();
     owner->declare(this);
     if (finite == nullptr) return;

@@ -28,117 +28,156 @@ enum class DataStatus {
     New,   ///< written since this input's last read
 };
 
-/// Name, type and connection of a port. Kept outside the port object, so that the members that each
-/// cycle touches lie close together in the processor's caches.
-struct PortIdentity {
-    Component* owner;
-    std::string name;
-    std::string unit;
-    const TypeInfo& type;
-    bool connected = false;  ///< an input has a writer; an output has a reader
-    /// Inputs: the value is of an earlier writer, and the component has not read it yet.
-    bool kept_is_new = false;
-    QueueBase* queue = nullptr;  ///< inputs: the input itself if it is a Queue
-};
-
-/// Base class of inputs of all types.
+/// Base class of inputs of all types: what each cycle touches, and no more. An InputPort holds the
+/// rest.
 class InputBase {
    public:
+    /// Declares the input to its owner.
     InputBase(Component* owner, std::string name, const TypeInfo& type, const SlotHeader& empty);
     InputBase(const InputBase&) = delete;
     InputBase& operator=(const InputBase&) = delete;
 
-    /// Name within the component. Real-time safe.
-    const std::string& name() const noexcept { return identity_->name; }
-    /// Description of the value's type. Real-time safe.
-    const TypeInfo& type() const noexcept { return identity_->type; }
-
+    /// True if there is a value. Real-time safe.
+    bool hasValue() const noexcept RTCF_NONBLOCKING { return source_->stamp != 0; }
+    /// True if the next read() returns DataStatus::New. Real-time safe.
+    bool isNew() const noexcept RTCF_NONBLOCKING { return source_->stamp != seen_; }
+    /// Loop time since the newest value was written, ns; -1 if there is none. Real-time safe.
+    /// @param owner the component, `this`
+    std::int64_t age(const Component* owner) const noexcept RTCF_NONBLOCKING;
     /// True if an output or a ROS topic feeds this input. Real-time safe.
-    bool connected() const noexcept RTCF_NONBLOCKING { return identity_->connected; }
-    /// Loop time since the current value was written, ns; -1 if there is none. Real-time safe.
-    std::int64_t age() const noexcept RTCF_NONBLOCKING;
-    /// Sequence number, in the source, of the last value that this input has read. Real-time safe.
-    std::uint64_t seen() const noexcept RTCF_NONBLOCKING { return seen_; }
-
-    /// @name For the executor, at a cycle boundary; real-time safe
-    /// @{
-    /// This input as a queue; null if it is none.
-    QueueBase* queue() const noexcept RTCF_NONBLOCKING { return identity_->queue; }
-    /// Connects the input to `source`. The last value stays until the new writer writes; if the
-    /// component has not read it, it is still new data.
-    /// @param continued `source` is another slot with values of the same writer
-    void rewire(const SlotHeader* source, bool continued) noexcept RTCF_NONBLOCKING {
-        if (continued) {
-            // A value of an earlier writer stays.
-            if (current_ == source_) current_ = source;
-        } else if (current_->sequence == 0 && seen_ == 0) {
-            current_ = source;
-        } else {
-            if (source_->sequence != seen_) {
-                current_ = source_;
-                identity_->kept_is_new = true;
-            }
-            seen_ = source->sequence;
-        }
-        source_ = source;
-        identity_->connected = true;
-    }
-    /// Removes the writer; the last value stays.
-    void disconnect() noexcept RTCF_NONBLOCKING { identity_->connected = false; }
-    /// Sets a value that arrived from outside the loop, in `source`. The slot of the previous value
-    /// is free again.
-    void inject(const SlotHeader* source) noexcept RTCF_NONBLOCKING {
-        source_ = source;
-        current_ = source;
-    }
-    /// The slot with the newest value: the one that the next read() returns.
-    const SlotHeader& newest() const noexcept {
-        return source_->sequence != seen_ ? *source_ : *current_;
-    }
-    /// The slot with the value of the last read().
-    const SlotHeader* current() const noexcept RTCF_NONBLOCKING { return current_; }
-    /// Read position of the component.
-    struct Reading {
-        const SlotHeader* source = nullptr;
-        const SlotHeader* current = nullptr;
-        std::uint64_t seen = 0;
-        bool kept_is_new = false;
-    };
-    Reading reading() const noexcept RTCF_NONBLOCKING {
-        return {source_, current_, seen_, identity_->kept_is_new};
-    }
-    void setReading(const Reading& reading) noexcept RTCF_NONBLOCKING {
-        source_ = reading.source;
-        current_ = reading.current;
-        seen_ = reading.seen;
-        identity_->kept_is_new = reading.kept_is_new;
-    }
-    /// @}
+    /// @param owner the component, `this`
+    bool connected(const Component* owner) const noexcept RTCF_NONBLOCKING;
 
    protected:
     ~InputBase() = default;
 
-    Component& owner() const noexcept RTCF_NONBLOCKING { return *identity_->owner; }
-
-    void setQueue(QueueBase* queue) noexcept { identity_->queue = queue; }
-
     DataStatus readStatus() noexcept RTCF_NONBLOCKING {
-        if (__builtin_expect(static_cast<long>(source_->sequence != seen_), 1) != 0) {
-            seen_ = source_->sequence;
-            current_ = source_;
+        const std::int64_t stamp = source_->stamp;
+        if (__builtin_expect(static_cast<long>(stamp != seen_), 1) != 0) {
+            seen_ = stamp;
             return DataStatus::New;
         }
-        if (current_ != source_ && std::exchange(identity_->kept_is_new, false))
-            return DataStatus::New;
-        return current_->sequence != 0 ? DataStatus::Old : DataStatus::None;
+        return stamp != 0 ? DataStatus::Old : DataStatus::None;
     }
+    /// The slot with the newest value.
+    const SlotHeader& slot() const noexcept RTCF_NONBLOCKING { return *source_; }
+    void skipValue() noexcept RTCF_NONBLOCKING { seen_ = source_->stamp; }
 
    private:
     friend struct AbiProbe;
-    const SlotHeader* source_;   // slot of the writer
-    const SlotHeader* current_;  // slot of the value of the last read
-    std::uint64_t seen_ = 0;     // source_->sequence at the last read
-    std::unique_ptr<PortIdentity> identity_;
+    friend class InputPort;
+    const SlotHeader* source_;
+    std::int64_t seen_ = 0;  // stamp of the value of the last read()
+};
+
+/// Name, type and connection of an input. Owned by the component, but kept outside its object, so
+/// that the members that each cycle touches lie close together in the processor's caches. For the
+/// executor.
+class InputPort {
+   public:
+    InputPort(InputBase& input, const Component& owner, std::string name, const TypeInfo& type)
+        : input_(input), owner_(owner), name_(std::move(name)), type_(type) {}
+    InputPort(const InputPort&) = delete;
+    InputPort& operator=(const InputPort&) = delete;
+
+    /// Name within the component. Real-time safe.
+    const std::string& name() const noexcept { return name_; }
+    /// Description of the value's type. Real-time safe.
+    const TypeInfo& type() const noexcept { return type_; }
+    const Component& owner() const noexcept RTCF_NONBLOCKING { return owner_; }
+    const InputBase& input() const noexcept RTCF_NONBLOCKING { return input_; }
+    /// This input as a queue; null if it is none. Real-time safe.
+    QueueBase* queue() const noexcept RTCF_NONBLOCKING { return queue_; }
+    void setQueue(QueueBase* queue) noexcept { queue_ = queue; }
+    /// True if the input has a writer. Real-time safe.
+    bool connected() const noexcept RTCF_NONBLOCKING { return connected_; }
+
+    /// @name Cycle thread; real-time safe
+    /// @{
+    /// The slot with the value that the next read() returns.
+    const SlotHeader& slot() const noexcept RTCF_NONBLOCKING { return *input_.source_; }
+    /// Stamp of the value of the last read().
+    std::int64_t seen() const noexcept RTCF_NONBLOCKING { return input_.seen_; }
+    /// True if the input waits for the first write into `slot`.
+    bool awaits(const SlotHeader& slot) const noexcept RTCF_NONBLOCKING {
+        return awaited_ == &slot;
+    }
+    /// Stamp of the awaited slot when the input was connected to it; 0 = none is awaited.
+    std::int64_t since() const noexcept RTCF_NONBLOCKING { return waiting() ? since_ : 0; }
+
+    /// Connects the input to an output's slot. If the input has a value, it keeps it until the new
+    /// writer writes, see connectWritten(); a queue has copies and does not wait.
+    /// @param continued `source` is another slot with values of the same writer
+    void connect(const SlotHeader* source, bool continued) noexcept RTCF_NONBLOCKING {
+        connected_ = true;
+        if (continued) {
+            if (waiting()) {
+                awaited_ = source;
+            } else {
+                input_.source_ = source;
+            }
+            return;
+        }
+        connectWritten();  // the value of the present writer, if it has written
+        if (queue_ != nullptr || input_.source_->stamp == 0) {
+            set(source, 0);
+        } else {
+            awaited_ = source;
+            since_ = source->stamp;
+        }
+    }
+    /// Connects the input to values from outside, of which `front` is the newest. If the input has
+    /// a value, it keeps it until inject().
+    void connectOutside(const SlotHeader* front) noexcept RTCF_NONBLOCKING {
+        connected_ = true;
+        connectWritten();
+        awaited_ = nullptr;
+        if (queue_ != nullptr || input_.source_->stamp == 0) set(front, 0);
+    }
+    /// Removes the writer; the value stays.
+    void disconnect() noexcept RTCF_NONBLOCKING {
+        connectWritten();
+        awaited_ = nullptr;
+        connected_ = false;
+    }
+    /// Sets a new value that arrived from outside the loop, in `source`. The slot of the previous
+    /// value is free again.
+    void inject(const SlotHeader* source) noexcept RTCF_NONBLOCKING { set(source, 0); }
+    /// Ends the wait for a new writer if it has written since the connection.
+    void connectWritten() noexcept RTCF_NONBLOCKING {
+        const SlotHeader* const awaited = awaited_;
+        if (awaited != nullptr && awaited->stamp != since_) set(awaited, 0);
+    }
+    /// Sets the value and the read position, to restore them.
+    /// @param awaited slot of a new writer that has not written yet; null = none
+    void set(const SlotHeader* source, std::int64_t seen, const SlotHeader* awaited = nullptr,
+             std::int64_t since = 0) noexcept RTCF_NONBLOCKING {
+        input_.source_ = source;
+        input_.seen_ = seen;
+        since_ = since;
+        awaited_ = awaited;
+    }
+    /// Follows a move of the loop's time by `by` ns.
+    void moveTime(std::int64_t by) noexcept RTCF_NONBLOCKING {
+        input_.seen_ = movedStamp(input_.seen_, by);
+        since_ = movedStamp(since_, by);
+    }
+    /// @}
+
+    /// True if the input keeps a value of an earlier writer until the new one writes. Real-time
+    /// safe; any thread.
+    bool waiting() const noexcept RTCF_NONBLOCKING { return awaited_ != nullptr; }
+
+   private:
+    friend struct AbiProbe;
+    InputBase& input_;
+    const Component& owner_;
+    std::string name_;
+    const TypeInfo& type_;
+    QueueBase* queue_ = nullptr;
+    bool connected_ = false;
+    std::int64_t since_ = 0;
+    Shared<const SlotHeader*> awaited_ = nullptr;
 };
 
 /// An input port carrying values of type T.
@@ -150,7 +189,7 @@ class Input final : public InputBase {
     Input(Component* owner, std::string name)
         : InputBase(owner, std::move(name), typeInfo<T>(), empty()) {}
 
-    /// Makes the newest value the one that value() returns. Real-time safe.
+    /// Tells whether value() is new to this input: written since its last read(). Real-time safe.
     DataStatus read() noexcept RTCF_NONBLOCKING { return readStatus(); }
 
     /// Like read(), and copies the value if it is new; with `copy_old`, also an old one. Real-time
@@ -161,10 +200,10 @@ class Input final : public InputBase {
         return status;
     }
 
-    /// The value of the last read(); default-constructed before the first value. The reference is
-    /// valid until update() returns. Real-time safe.
+    /// The newest value, whether it was read() or not; default-constructed before the first one. It
+    /// does not change until update() returns. Real-time safe.
     const T& value() const noexcept RTCF_NONBLOCKING {
-        return static_cast<const Slot<T>*>(current())->value;
+        return static_cast<const Slot<T>&>(slot()).value;
     }
 
    private:
@@ -172,6 +211,14 @@ class Input final : public InputBase {
         static const Slot<T> slot{};
         return slot;
     }
+};
+
+/// Name, type and connection of an output. Kept outside the port object.
+struct OutputIdentity {
+    std::string name;
+    std::string unit;
+    const TypeInfo& type;
+    bool connected = false;  ///< has a reader
 };
 
 /// Base class of outputs of all types.
@@ -205,9 +252,6 @@ class OutputBase {
     const SlotHeader* sample() const noexcept {
         return rest_->sample != nullptr ? rest_->sample.get() : rest_->slot.get();
     }
-    /// Sets the clock that stamps written values. For the executor; not real-time.
-    void setClock(const LoopClock& clock) noexcept { clock_ = &clock; }
-
     /// @name Staged outputs; for the executor
     /// Readers of a staged output see a written value only after commit(). Outputs declared Finite
     /// are staged, and so are those that the executor stages.
@@ -223,7 +267,6 @@ class OutputBase {
         std::shared_ptr<SlotHeader> seen = type().make_slot(sample());
         type().copy(*seen, *rest_->slot);
         rest_->staged = std::exchange(rest_->slot, std::move(seen));
-        rest_->examined = rest_->staged->sequence;
     }
     /// Publishes the written value to readers. Called after update(). Real-time safe if
     /// TypeInfo::copy is.
@@ -232,9 +275,11 @@ class OutputBase {
     /// @throws any exception of a copy; readers then have the previous value or the new one
     bool commit() {
         Rest& rest = *rest_;
-        if (rest.staged->sequence == rest.examined) return true;
-        rest.examined = rest.staged->sequence;
-        if (rest.checked && !type().finite(*rest.staged)) return false;
+        if (rest.staged->stamp == rest.slot->stamp) return true;
+        if (rest.checked && !type().finite(*rest.staged)) {
+            discard();
+            return false;
+        }
         if (type().flat) {
             type().copy(*rest.slot, *rest.staged);
             return true;
@@ -245,14 +290,13 @@ class OutputBase {
         return true;
     }
     /// Hides the value written since the last commit() from readers. Real-time safe.
-    void discard() noexcept RTCF_NONBLOCKING { rest_->examined = rest_->staged->sequence; }
+    void discard() noexcept RTCF_NONBLOCKING { rest_->staged->stamp = rest_->slot->stamp; }
     /// Like discard(), and resets the component's value to the one that readers see. Real-time safe
     /// if TypeInfo::copy is.
     /// @throws any exception of a copy
     void takeBack() {
         discard();
         type().copy(*rest_->staged, *rest_->slot);
-        discard();
     }
     /// Policy for values that are not finite. Real-time safe.
     OnNonFinite nonFinitePolicy() const noexcept RTCF_NONBLOCKING { return rest_->policy; }
@@ -264,26 +308,22 @@ class OutputBase {
     void setSample(std::shared_ptr<SlotHeader> sample) noexcept {
         rest_->sample = std::move(sample);
     }
-    void stampWrite() noexcept RTCF_NONBLOCKING {
-        ++raw_->sequence;
-        raw_->time_ns = clock_->time_ns;
-    }
+    void stampWrite() noexcept RTCF_NONBLOCKING { raw_->stamp = *now_; }
 
     friend struct AbiProbe;
     SlotHeader* raw_;  // the slot that write() fills: rest_->staged, or rest_->slot
 
    private:
     struct Rest {
-        PortIdentity identity;
+        OutputIdentity identity;
         std::shared_ptr<SlotHeader> slot;
         std::shared_ptr<SlotHeader> staged;  // null = readers see written values at once
         std::shared_ptr<SlotHeader> sample;  // null = reserve() was not called
         bool checked = false;                // declared Finite
-        std::uint64_t examined = 0;          // staged->sequence at the last check
         OnNonFinite policy = OnNonFinite::Hold;
     };
 
-    const LoopClock* clock_;
+    const Shared<std::int64_t>* now_;  // the component's time
     std::unique_ptr<Rest> rest_;
 };
 

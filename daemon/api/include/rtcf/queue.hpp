@@ -36,6 +36,8 @@ class QueueBase : public InputBase {
     /// Loop time since the oldest message was written, ns; -1 if the queue is empty. Real-time safe
     /// if the assignment of T is.
     std::int64_t age() noexcept;
+    /// True if an output or a ROS topic feeds this queue. Real-time safe.
+    bool connected() const noexcept RTCF_NONBLOCKING { return ring_->port->connected(); }
     /// Number of messages lost so far, because the queue was full or memory ran out. Real-time
     /// safe.
     std::uint64_t dropped() const noexcept RTCF_NONBLOCKING { return ring_->dropped; }
@@ -44,13 +46,15 @@ class QueueBase : public InputBase {
 
     /// @name For the executor; real-time safe if TypeInfo::copy is
     /// @{
+    /// Description of the messages' type.
+    const TypeInfo& type() const noexcept { return ring_->port->type(); }
     /// Appends the source's value if it is new. If memory runs out, the message counts as dropped.
     void receive() noexcept {
         if (readStatus() != DataStatus::New) return;
         SlotHeader* const to = claim();
         if (to == nullptr) return;
         try {
-            type().copy(*to, *current());
+            type().copy(*to, slot());
         } catch (...) {
             --ring_->count;
             ++ring_->dropped;
@@ -64,14 +68,11 @@ class QueueBase : public InputBase {
         SlotHeader* const to = claim();
         if (to == nullptr) return;
         type().exchange(*to, from);
-        to->time_ns = time_ns;
+        to->stamp = time_ns;
     }
     /// Ignores the present value of the source, so that a reloaded component does not get an old
     /// trajectory again.
-    void skip() noexcept RTCF_NONBLOCKING {
-        const SlotHeader* const source = reading().source;
-        setReading({source, source, source->sequence, false});
-    }
+    void skip() noexcept RTCF_NONBLOCKING { skipValue(); }
     /// Counts messages that were lost before they reached the queue.
     void noteDropped(std::uint64_t count) noexcept RTCF_NONBLOCKING { ring_->dropped += count; }
     /// Empties the queue without counting drops.
@@ -89,13 +90,10 @@ class QueueBase : public InputBase {
         std::size_t count = 0;
         std::uint64_t dropped = 0;
         std::shared_ptr<SlotHeader> sample = nullptr;
+        InputPort* port = nullptr;
     };
 
-    QueueBase(Component* owner, std::string name, const TypeInfo& type, const SlotHeader& empty,
-              const Ring& ring)
-        : InputBase(owner, std::move(name), type, empty), ring_(new Ring(ring)) {
-        setQueue(this);
-    }
+    QueueBase(Component* owner, std::string name, const TypeInfo& type, const Ring& ring);
     ~QueueBase() = default;
 
     void setSample(std::shared_ptr<SlotHeader> sample) noexcept {
@@ -119,6 +117,8 @@ class QueueBase : public InputBase {
         }
         return ring.at(ring.slots, (ring.oldest + ring.count++) % ring.capacity);
     }
+
+    static inline const SlotHeader kNoValue{};  // read without a writer
 
     std::unique_ptr<Ring> ring_;
 };
@@ -153,7 +153,7 @@ class Queue final : public QueueBase {
     using Slots = std::array<Slot<T>, N>;
 
     Queue(Component* owner, std::string name, std::unique_ptr<Slots> slots)
-        : QueueBase(owner, std::move(name), typeInfo<T>(), (*slots)[0], {N, &at, slots.get()}),
+        : QueueBase(owner, std::move(name), typeInfo<T>(), {N, &at, slots.get()}),
           slots_(std::move(slots)) {}
 
     static SlotHeader* at(void* slots, std::size_t index) {

@@ -9,12 +9,20 @@
 
 namespace rtcf {
 
-/// Sequence number and time of a value. Plain data: while the loop runs, only the real-time thread
-/// uses it.
+/// Stamp of a value. Plain data: while the loop runs, only the real-time thread uses it.
 struct SlotHeader {
-    std::uint64_t sequence = 0;  ///< writes so far; 0 = never written
-    std::int64_t time_ns = 0;    ///< loop time of the last write, ns
+    /// Loop time of the last write, ns; 0 = never written. As loop time rises strictly, a reader
+    /// sees by the stamp alone whether the value was written since its last read. Several writes in
+    /// one cycle are one for a reader.
+    std::int64_t stamp = 0;
 };
+
+/// A stamp after the loop's time was moved by `by` ns: a reader sees the same values as new, and of
+/// the same age. Real-time safe.
+constexpr std::int64_t movedStamp(std::int64_t stamp, std::int64_t by) noexcept {
+    if (stamp == 0) return 0;
+    return stamp + by != 0 ? stamp + by : -1;
+}
 
 /// A value with its header.
 template <typename T>

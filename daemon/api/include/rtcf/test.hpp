@@ -14,6 +14,7 @@
 /// std::invalid_argument; a failing hook throws std::runtime_error with the hook's error text.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -40,6 +41,7 @@ class Bench {
         : log_(lines_) {
         clock_.period_ns = period_ns;
         clock_.elapsed_ns = period_ns;
+        clock_.time_ns = period_ns;
         context_.full_name = "/" + type;
         context_.name = type;
         context_.runner = "test";
@@ -53,6 +55,7 @@ class Bench {
         set(parameters);
         require(component_->configure(), "configure");
         component_->freeze();
+        countWrites();
     }
     ~Bench() {
         for (MailboxBase* mailbox : component_->mailboxes()) mailbox->close();
@@ -88,22 +91,25 @@ class Bench {
     /// Writes a new value to an input, or one more message to a queue.
     template <typename T>
     void write(const std::string& name, const T& value) {
-        InputBase& input = named(component_->inputs(), name, "input");
+        InputPort& input = named(component_->inputs(), name, "input");
         requireType(input.type(), typeInfo<T>(), name);
-        std::shared_ptr<SlotHeader>& slot = slotOf(input);
-        static_cast<Slot<T>&>(*slot).value = value;
-        ++slot->sequence;
-        slot->time_ns = clock_.time_ns;
+        SlotHeader& slot = slotOf(input);
+        static_cast<Slot<T>&>(slot).value = value;
+        slot.stamp = now();
+        input.inject(&slot);
         if (QueueBase* const queue = input.queue()) queue->receive();
     }
 
     /// Runs cycles; calls start() before the first one.
     void cycle(std::uint64_t cycles = 1) {
         if (!started_) {
+            component_->setTime(now() - 1);  // before the first cycle
             require(component_->start(), "start");
+            countWrites();
             for (MailboxBase* mailbox : component_->mailboxes()) mailbox->open();
         }
         for (started_ = true; cycles > 0; --cycles) {
+            component_->setTime(now());
             component_->update();
             commit();
             clock_.iteration = clock_.iteration + 1;
@@ -113,6 +119,7 @@ class Bench {
     }
     /// Calls safe(), as at the end of a loop.
     void safe() {
+        component_->setTime(now());
         component_->safe();
         commit();
     }
@@ -122,16 +129,14 @@ class Bench {
     const T* read(const std::string& name) const {
         const OutputBase& output = named(component_->outputs(), name, "output");
         requireType(output.type(), typeInfo<T>(), name);
-        return output.slot()->sequence == 0
-                   ? nullptr
-                   : &static_cast<const Slot<T>*>(output.slot().get())->value;
+        return output.slot()->stamp == 0 ? nullptr
+                                         : &static_cast<const Slot<T>*>(output.slot().get())->value;
     }
-    /// Number of values that an output has written, without the non-finite values of Finite
-    /// outputs.
+    /// Number of cycles and hooks in which an output was written, without those in which the value
+    /// of a Finite output was not finite.
     std::uint64_t writes(const std::string& name) const {
-        const OutputBase& output = named(component_->outputs(), name, "output");
-        const auto found = staged_writes_.find(&output);
-        return found == staged_writes_.end() ? output.slot()->sequence : found->second.seen;
+        const auto found = writes_.find(&named(component_->outputs(), name, "output"));
+        return found == writes_.end() ? 0 : found->second.count;
     }
     /// Number of non-finite values on outputs declared Finite.
     std::uint64_t nonFinite() const noexcept { return non_finite_; }
@@ -160,7 +165,7 @@ class Bench {
         component_->takeOver(Predecessor(*previous.component_));
     }
 
-    /// The loop's clock. The test may set time and stamp between cycles.
+    /// The loop's clock. The test may set time and stamp between cycles; a loop's time only rises.
     LoopClock& clock() noexcept { return clock_; }
     /// Number of RTCF_DEVICE_IO scopes so far.
     std::uint64_t deviceCalls() const noexcept { return device_.calls; }
@@ -184,9 +189,9 @@ class Bench {
         LogRecord record_{};
     };
 
-    struct StagedWrites {
-        std::uint64_t seen = 0;      // writes that readers have seen
-        std::uint64_t examined = 0;  // writes checked
+    struct Writes {
+        std::uint64_t count = 0;
+        std::int64_t last = 0;  // stamp
     };
 
     static const ComponentRecord& find(const std::string& type) {
@@ -227,30 +232,32 @@ class Bench {
         if (passed) return;
         throw std::runtime_error(std::string(hook) + " failed: " + component_->failure());
     }
+    /// The loop's time; 0 is no stamp.
+    std::int64_t now() const { return std::max<std::int64_t>(2, clock_.time_ns); }
     /// Publishes the values of staged outputs.
     void commit() {
-        for (OutputBase* output : component_->stagedOutputs()) {
-            StagedWrites& writes = staged_writes_[output];
-            const std::uint64_t written = output->written()->sequence;
-            if (output->commit()) {
-                writes.seen += written - writes.examined;
-            } else {
-                ++non_finite_;
-            }
-            writes.examined = written;
+        for (OutputBase* output : component_->stagedOutputs())
+            if (!output->commit()) ++non_finite_;
+        countWrites();
+    }
+    void countWrites() {
+        for (const OutputBase* output : component_->outputs()) {
+            Writes& writes = writes_[output];
+            if (std::exchange(writes.last, output->slot()->stamp) != output->slot()->stamp)
+                ++writes.count;
         }
     }
     void release() {
         for (ParameterBase* parameter : component_->parameters()) parameter->release();
         for (DerivedBase* derived : component_->derived()) derived->release();
     }
-    std::shared_ptr<SlotHeader>& slotOf(InputBase& input) {
-        for (auto& [known, slot] : slots_) {
-            if (known == &input) return slot;
+    SlotHeader& slotOf(InputPort& input) {
+        std::shared_ptr<SlotHeader>& slot = slots_[&input];
+        if (slot == nullptr) {
+            slot = input.type().make_slot(nullptr);
+            input.connect(slot.get(), false);
         }
-        slots_.emplace_back(&input, input.type().make_slot(nullptr));
-        input.rewire(slots_.back().second.get(), false);
-        return slots_.back().second;
+        return *slot;
     }
 
     LoopClock clock_;
@@ -258,8 +265,8 @@ class Bench {
     DeviceFigures device_;
     std::vector<std::string> lines_;
     Lines log_;
-    std::vector<std::pair<InputBase*, std::shared_ptr<SlotHeader>>> slots_;
-    std::map<const OutputBase*, StagedWrites> staged_writes_;
+    std::map<const InputPort*, std::shared_ptr<SlotHeader>> slots_;
+    std::map<const OutputBase*, Writes> writes_;
     std::uint64_t non_finite_ = 0;
     bool started_ = false;
     std::unique_ptr<Component> component_;

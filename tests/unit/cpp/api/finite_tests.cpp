@@ -107,6 +107,7 @@ TEST(FiniteCheck, KeepsAStructFromReaders) {
     out.write(pair);
     EXPECT_TRUE(out.commit());
     pair.second.torque = kInfinity;
+    component.setTime(component.time() + 1);
     out.write(pair);
     EXPECT_FALSE(out.commit());
     const auto& seen = static_cast<const Slot<Commands>&>(*out.slot()).value;

@@ -289,22 +289,20 @@ TEST(MessageType, IsPrintedOnOneLine) {
 TEST(PortType, SlotIsCreatedWithTheSamplesValue) {
     Slot<std_msgs::String> sample;
     sample.value.data = "long enough not to fit into the string itself";
-    sample.sequence = 5;
+    sample.stamp = 5;
     const auto made = typeInfo<std_msgs::String>().make_slot(&sample);
     EXPECT_EQ(static_cast<Slot<std_msgs::String>&>(*made).value.data, sample.value.data);
-    EXPECT_EQ(made->sequence, 0U) << "a new slot counts no write";
+    EXPECT_EQ(made->stamp, 0) << "a new slot was never written";
 }
 
 TEST(PortType, CopyIncludesValueAndHeader) {
     Slot<double> from;
     from.value = 2.5;
-    from.sequence = 3;
-    from.time_ns = 5;
+    from.stamp = 5;
     Slot<double> to;
     typeInfo<double>().copy(to, from);
     EXPECT_EQ(to.value, 2.5);
-    EXPECT_EQ(to.sequence, 3U);
-    EXPECT_EQ(to.time_ns, 5);
+    EXPECT_EQ(to.stamp, 5);
 }
 
 TEST(SameType, IsDecidedByNameMd5SizeAndAlignment) {

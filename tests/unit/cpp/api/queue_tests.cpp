@@ -19,11 +19,12 @@ class QueueAlone : public ::testing::Test {
     // As at a boundary, like Rewire::apply().
     void connect(OutputBase& output) {
         queue.receive();
-        queue.rewire(output.slot().get(), false);
+        component.inputs().front()->connect(output.slot().get(), false);
         queue.skip();
     }
-    void write(Output<int>& output, int value, std::int64_t time_ns = 0) {
-        component.loop_clock.time_ns = time_ns;
+    void write(Output<int>& output, int value) { write(output, value, component.time() + 1); }
+    void write(Output<int>& output, int value, std::int64_t time_ns) {
+        component.setTime(time_ns);
         output.write(value);
         queue.receive();
     }
@@ -97,7 +98,7 @@ TEST_F(QueueAlone, AgeIsThatOfTheOldestMessage) {
     connect(first);
     write(first, 1, 100);
     write(first, 2, 300);
-    component.loop_clock.time_ns = 450;
+    component.setTime(450);
     EXPECT_EQ(queue.age(), 350);
     queue.pop();
     EXPECT_EQ(queue.age(), 150);
@@ -109,8 +110,9 @@ TEST_F(QueueAlone, MessagesOfVariableSizeKeepTheirCapacity) {
     std_msgs::String longest;
     longest.data = std::string(100, 'x');
     texts.reserve(longest);
-    texts.rewire(output.slot().get(), false);
+    component.inputs().back()->connect(output.slot().get(), false);
     for (int round = 0; round < 4; ++round) {
+        component.setTime(component.time() + 1);
         output.value().data = "a text that is longer than what a string has at hand";
         output.publish();
         const char* const place = texts.front()->data.data();

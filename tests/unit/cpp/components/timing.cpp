@@ -47,7 +47,7 @@ class Watch final : public rtcf::Component {
         updates.write(++count_);
         nominal.write(static_cast<double>(period()) / kMillisecond);
         since.write(static_cast<double>(elapsed()) / kMillisecond);
-        age.write(static_cast<double>(in.age()) / kMillisecond);
+        age.write(static_cast<double>(in.age(this)) / kMillisecond);
         cycle.write(static_cast<double>(iteration()));
     }
 

@@ -36,7 +36,7 @@ double front(const Injector& injector) {
 TEST(Injector, StartsEmpty) {
     Injector injector("/x", typeInfo<double>());
     EXPECT_FALSE(injector.adopt(LoopClock{}));
-    EXPECT_EQ(injector.front()->sequence, 0U);
+    EXPECT_EQ(injector.front()->stamp, 0);
 }
 
 TEST(Injector, PassesSkippedMessagesToABacklog) {
@@ -117,13 +117,20 @@ TEST(Injector, ReturnsTheNewestOfSeveral) {
 TEST(Injector, StampsWithTheLoopsClock) {
     Injector injector("/x", typeInfo<double>());
     LoopClock clock;
-    clock.time_ns = 1234;
-    for (std::uint64_t i = 1; i <= 3; ++i) {
+    for (const std::int64_t time : {1234, 1235, 1236}) {
+        clock.time_ns = time;
         deliver(injector, 1.0);
         ASSERT_TRUE(injector.adopt(clock));
-        EXPECT_EQ(injector.front()->sequence, i);
-        EXPECT_EQ(injector.front()->time_ns, 1234);
+        EXPECT_EQ(injector.front()->stamp, time);
     }
+}
+
+// A message that is as old as the loop is not taken for a value that was never written.
+TEST(Injector, ItsValueAlwaysHasAStamp) {
+    Injector injector("/x", typeInfo<double>());
+    deliver(injector, 1.0);
+    ASSERT_TRUE(injector.adopt(LoopClock{}));
+    EXPECT_NE(injector.front()->stamp, 0);
 }
 
 TEST(Injector, RejectsInvalidMessagesAndKeepsTheLastOne) {

@@ -46,7 +46,7 @@ using executor::Tap;
 template <typename T>
 void write(const std::shared_ptr<Slot<T>>& slot, const T& value) {
     slot->value = value;
-    ++slot->sequence;
+    ++slot->stamp;
 }
 
 std::vector<double> takeAll(Tap& tap) {

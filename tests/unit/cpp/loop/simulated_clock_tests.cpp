@@ -184,7 +184,7 @@ TEST_F(QueueingInjector, DoesNotDelayATopicFasterThanTheLoop) {
 }
 
 TEST_F(QueueingInjector, AgeIsThatOfTheMessageInSimulatedTime) {
-    const auto time = [&] { return injector_.front()->time_ns; };
+    const auto time = [&] { return injector_.front()->stamp; };
     injector_.setQueueing(true);
     deliver(1.0, 50);
     deliver(2.0, 80);

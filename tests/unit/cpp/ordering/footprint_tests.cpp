@@ -42,7 +42,8 @@ TEST_F(FootprintTest, CoversStepsComponentsPortsAndValues) {
     for (const Step& step : plan->schedule.steps) {
         EXPECT_TRUE(covers(lines, &step));
         EXPECT_TRUE(covers(lines, step.component));
-        for (const InputBase* input : step.component->inputs()) EXPECT_TRUE(covers(lines, input));
+        for (const InputPort* input : step.component->inputs())
+            EXPECT_TRUE(covers(lines, &input->input()));
         for (const OutputBase* output : step.component->outputs()) {
             EXPECT_TRUE(covers(lines, output));
             EXPECT_TRUE(covers(lines, output->slot().get()));

@@ -9,6 +9,7 @@
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "rtcf/component.hpp"
 
@@ -55,16 +56,17 @@ const void* update(void* memory, void* const* ports) {
     Record& record = *static_cast<Record*>(memory);
     record.head.line = 12;
     ++record.count;
-    const bool is_new = static_cast<ValueInput*>(ports[0])->read() == DataStatus::New;
-    record.u = placeIn<Slot<double>*>(ports[0], places.current)->value;
+    const Slot<double>& read = *placeIn<Slot<double>*>(ports[0], places.source);
+    const bool is_new =
+        std::exchange(placeIn<std::int64_t>(ports[0], places.seen), read.stamp) != read.stamp;
+    record.u = read.value;
     record.is_written = true;
     record.raised = {7, 3};
     if (record.u < 0.0) return &kLimit;
     if (is_new) {
         Slot<double>& written = *placeIn<Slot<double>*>(ports[1], places.raw);
         written.value = record.u * record.gain;
-        ++written.sequence;
-        written.time_ns = placeIn<const LoopClock*>(ports[1], places.clock)->time_ns;
+        written.stamp = *placeIn<const Shared<std::int64_t>*>(ports[1], places.now);
     }
     record.is_written = false;
     return nullptr;
@@ -104,7 +106,12 @@ class PythonComponents : public testing::Test {
    protected:
     PythonComponents() {
         source_->value = 3.0;
-        component_.inputs().front()->rewire(source_.get(), false);
+        component_.inputs().front()->connect(source_.get(), false);
+    }
+    // A new value, in the next cycle.
+    void arrive() {
+        component_.setTime(component_.time() + 1);
+        source_->stamp = component_.time();
     }
     const Slot<double>& written() const {
         return *static_cast<const Slot<double>*>(component_.outputs().front()->slot().get());
@@ -128,24 +135,26 @@ TEST_F(PythonComponents, DeclaresTheContentOfItsTable) {
 TEST_F(PythonComponents, WritesOnlyInACycle) {
     ASSERT_TRUE(component_.start());
     component_.update();
-    EXPECT_EQ(written().sequence, 0U);
-    ++source_->sequence;
+    EXPECT_EQ(written().stamp, 0);
+    arrive();
     component_.update();
-    EXPECT_EQ(written().sequence, 1U);
+    const std::int64_t time = component_.time();
+    EXPECT_EQ(written().stamp, time);
     EXPECT_EQ(written().value, 7.5);
+    component_.setTime(time + 1);
     component_.update();
-    EXPECT_EQ(written().sequence, 1U);
+    EXPECT_EQ(written().stamp, time);
 }
 
 TEST_F(PythonComponents, AParameterTakesEffectAtItsCommit) {
     ParameterBase& gain = *component_.parameters().front();
-    ++source_->sequence;
+    arrive();
     gain.stage(10.0);
     component_.update();
     EXPECT_EQ(written().value, 7.5);
     gain.commit();
     gain.release();
-    ++source_->sequence;
+    arrive();
     component_.update();
     EXPECT_EQ(written().value, 30.0);
     EXPECT_FALSE(gain.staged());
@@ -179,7 +188,7 @@ TEST(PythonParameters, AnEnumIsSetByName) {
 
 TEST_F(PythonComponents, AnExceptionWritesNothingAndHasItsPlace) {
     source_->value = -1.0;
-    ++source_->sequence;
+    arrive();
     std::string said;
     try {
         component_.update();
@@ -187,10 +196,10 @@ TEST_F(PythonComponents, AnExceptionWritesNothingAndHasItsPlace) {
         said = error.what();
     }
     EXPECT_EQ(said, "gain.py:12: `self.x.write(y)`: IndexError: index 7 beyond size 3");
-    EXPECT_EQ(written().sequence, 0U);
+    EXPECT_EQ(written().stamp, 0);
     source_->value = 1.0;
     component_.update();
-    EXPECT_EQ(written().sequence, 0U);
+    EXPECT_EQ(written().stamp, 0);
 }
 
 TEST_F(PythonComponents, StateIsInItsRecord) {

@@ -504,8 +504,8 @@ TEST_F(Snapshots, AlteredFileIsRejected) {
     for (const std::string& none : {std::string(), std::string("RTCF"), std::string(100, 'x')})
         EXPECT_NE(told(none).find("the file is not a snapshot"), std::string::npos);
     std::string newer = file;
-    newer[8] = 2;
-    EXPECT_NE(told(newer).find("has format 2, this rtcf reads format 1"), std::string::npos);
+    newer[8] = 3;
+    EXPECT_NE(told(newer).find("has format 3, this rtcf reads format 2"), std::string::npos);
     for (std::size_t at = 12; at < file.size(); at += 1 + at / 97) {
         std::string damaged = file;
         damaged[at] = static_cast<char>(damaged[at] ^ 0x10);

@@ -1,6 +1,6 @@
 /// @file
-/// A component without hooks, for ports and parameters, attached to a clock that the
-/// test sets. For tests of the API alone.
+/// A component without hooks, for ports and parameters; setTime() sets its time. For tests of the
+/// API alone.
 #pragma once
 
 #include "rtcf/component.hpp"

@@ -59,7 +59,6 @@ extern "C" {
 int frames = 0;
 void* stack[32];
 void rtcf_log_Regler_0(std::int64_t, double) { frames = backtrace(stack, 32); }
-std::int64_t rtcf_python_read(void*) { return 0; }
 // An input that nobody has written, and an output, as port.hpp has them.
 std::int64_t slot[3] = {}, time_base[5] = {};
 void* input[4] = {slot, slot};

@@ -106,8 +106,8 @@ class InputPort final : public base::InputPortInterface {
     FlowStatus readNewest(T& sample, bool copy_old_data = true) {
         return read(sample, copy_old_data);
     }
-    /// Copies the value of the last read(); before the first one, a default-constructed value. Does
-    /// nothing if the port was not added. Real-time safe if the assignment of T is.
+    /// Copies the newest value; before the first one, a default-constructed value. Does nothing if
+    /// the port was not added. Real-time safe if the assignment of T is.
     void getDataSample(T& sample) {
         if (port_) sample = port_->value();
     }
@@ -116,16 +116,20 @@ class InputPort final : public base::InputPortInterface {
         cleared_ = true;
     }
     bool hasNewData() const noexcept RTCF_NONBLOCKING override {
-        return port_ && !disconnected() && port_->newest().sequence != port_->seen();
+        return port_ && !disconnected() && port_->isNew();
     }
     bool connected() const noexcept RTCF_NONBLOCKING override {
-        return port_ && !disconnected() && port_->connected();
+        return port_ && !disconnected() && port_->connected(component_);
     }
 
    private:
     bool added() const noexcept override { return port_.has_value(); }
-    void declare(::rtcf::Component* component) override { port_.emplace(component, getName()); }
+    void declare(::rtcf::Component* component) override {
+        component_ = component;
+        port_.emplace(component, getName());
+    }
 
+    const ::rtcf::Component* component_ = nullptr;
     std::optional<::rtcf::Input<T>> port_;
     bool cleared_ = false;
 };
