@@ -189,8 +189,12 @@ void Instance::callLastHook(Hook hook, const std::function<void()>& call) noexce
     log_.write(LogLevel::Error, context_.full_name, fmt::format("{}: {}", hookName(hook), why));
 }
 
-// What a hook writes is later than the last cycle's values, and earlier than the next cycle's.
-void Instance::setHookTime() noexcept { component_->setTime(context_.clock->time_ns + 1); }
+// What a hook writes is later than the last cycle's values and those of earlier hooks, and earlier
+// than the next cycle's. What a constructor writes has the stamp 1.
+void Instance::setHookTime() noexcept {
+    component_->setTime(
+        std::max<std::int64_t>(context_.clock->time_ns + 2, component_->time() + 1));
+}
 
 void Instance::configure() {
     if (configured_) return;
@@ -250,6 +254,7 @@ void Instance::stop() noexcept {
     started_ = false;
     // First ends calls that wait in a callback: stop() may wait for the callback.
     for (MailboxBase* mailbox : component_->mailboxes()) mailbox->close();
+    setHookTime();
     callLastHook(Hook::Stop, [this] { component_->stop(); });
 }
 

@@ -79,6 +79,7 @@ void Cycle::moveTime(std::int64_t by_ns) {
         const_cast<SlotHeader*>(slot)->stamp = movedStamp(slot->stamp, by_ns);
     };
     for (const Step& step : schedule_->steps) {
+        step.component->setTime(std::max<std::int64_t>(1, step.component->time() + by_ns));
         for (const OutputBase* output : step.component->outputs()) {
             move(output->slot().get());
             move(output->written());
@@ -428,10 +429,11 @@ void Cycle::changeComponents(Adoption& adoption) noexcept {
         hand_over.skipped = hand_over.previous->context().disabled;
         if (hand_over.skipped) continue;
         for (const StateCopy& state : hand_over.states) state.copy();
-        // What it writes is earlier than the first cycle's values.
-        hand_over.successor->setTime(boundary_time_ns_ - 1);
-        const HookNote note(notes_, *hand_over.successor, Hook::TakeOver);
-        hand_over.successor->takeOver(Predecessor(*hand_over.previous));
+        // What it writes is later than its hooks' values, and earlier than the first cycle's.
+        Component& successor = *hand_over.successor;
+        successor.setTime(active_ ? boundary_time_ns_ - 1 : successor.time() + 1);
+        const HookNote note(notes_, successor, Hook::TakeOver);
+        successor.takeOver(Predecessor(*hand_over.previous));
     }
     if (active_) {
         for (const Leaving& leaving : adoption.leaving) {

@@ -84,13 +84,15 @@ class VectorSource final : public rtcf::Component {
     void update() override { out.write(Eigen::Vector3d::Ones()); }
 };
 
-// Writes before the first cycle, and modifies a value from configure() in place.
+// Writes in the hooks before the first cycle, and modifies a value from configure() in place.
 class Herald final : public rtcf::Component {
     rtcf::Output<std_msgs::Float64> announced{this, "announced"};
     rtcf::Output<std_msgs::Float64> counted{this, "counted"};
 
     bool configure() override {
         count_ = &counted.value().data;
+        announced.value().data = 3.0;
+        announced.publish();
         return true;
     }
     bool start() override {

@@ -415,6 +415,23 @@ TEST_P(FirstValues, OfStartAreReadInTheFirstCycle) {
     EXPECT_EQ(value("/H", "counted"), 3.0) << "by a reference from configure()";
 }
 
+// Also by a reader with a loop break, which has a copy since it was loaded.
+TEST_P(FirstValues, OfStartReplaceThoseOfConfigure) {
+    ComponentDefinition herald = definition("Herald", "H");
+    herald.optional = GetParam();
+    load(herald);
+    for (const std::string name : {"R", "Z"}) {
+        ComponentDefinition relay = definition("Relay", name);
+        relay.remaps = {{"in", "announced"}, {"out", name + "_out"}, {"status", name + "_status"}};
+        if (name == "Z") relay.breaks = {"in"};
+        load(relay);
+    }
+    ASSERT_EQ(order(), (std::vector<std::string>{"/H", "/R", "/Z"}));
+    step(1);
+    EXPECT_EQ(value("/R", "out"), 8.0);
+    EXPECT_EQ(value("/Z", "out"), 8.0);
+}
+
 INSTANTIATE_TEST_SUITE_P(Safe, FirstValues, ::testing::Bool());
 
 }  // namespace
