@@ -266,6 +266,8 @@ bool Cycle::threw(const Step& step, const char* text) noexcept {
     step.statistics->faults.taken_out.note(clock_.iteration, text);
     step.statistics->faults.count.add(1);
     statistics_.faults.add(1);
+    // If a commit threw, outputs committed before it already have the stamp of this cycle.
+    step.component->setTime(clock_.time_ns + 1);
     makeSafe(*step.component, *step.statistics, OnBadOutput::End);
     return true;
 }

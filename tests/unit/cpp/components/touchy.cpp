@@ -54,6 +54,19 @@ class Touchy final : public rtcf::Component {
     }
 };
 
+// Commands 5, and 0 in safe(), beside a value whose copy may fail.
+class Couple final : public rtcf::Component {
+    rtcf::Output<double> command{this, "command"};
+    rtcf::Output<rtcf_unit_test::Fragile> fragile{this, "fragile"};
+
+    void update() override {
+        command.write(5.0);
+        fragile.publish();
+    }
+    void safe() noexcept override { command.write(0.0); }
+};
+
 }  // namespace
 
+RTCF_COMPONENT(Couple, "Has a command, and a value whose copies may fail")
 RTCF_COMPONENT(Touchy, "Has values whose copies may fail")

@@ -156,6 +156,19 @@ TEST_F(Rollback, NoMemoryForAnOptionalComponentsValueTakesItOut) {
     stop();
 }
 
+// The first output's value of that cycle is already published.
+TEST_F(Rollback, NoMemoryForOneOutputWithholdsNoSafeValueOfAnother) {
+    WantedComponent writer{definition("Couple", "A"), kUnitTest};
+    writer.definition.optional = true;
+    apply({writer});
+    step(2);
+    ASSERT_EQ(value("/A", "command"), 5.0);
+    journal().copies_throw = true;
+    step(1);
+    journal().copies_throw = false;
+    EXPECT_EQ(value("/A", "command"), 0.0);
+}
+
 // A reader with a loop break has a copy, made before the components run.
 TEST_F(Rollback, NoMemoryBeforeTheComponentsRunIsNoCycle) {
     WantedComponent writer = wanted("Touchy", "A");
