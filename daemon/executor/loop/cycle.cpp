@@ -333,7 +333,9 @@ void Cycle::putBack(OutputBase& output, bool updated) noexcept {
     };
     for (const Step& step : schedule_->steps) {
         for (const InputPort* input : step.component->inputs()) {
-            if (&input->slot() == &slot) known(input->seen());
+            // A component that has not run yet has not read either.
+            if (&input->slot() == &slot && (input->seen() != 0 || step.ended_ticks != 0))
+                known(input->seen());
             if (input->awaits(slot)) known(input->since());
         }
     }

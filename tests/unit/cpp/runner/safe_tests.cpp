@@ -315,6 +315,21 @@ TEST_F(Safe, PartialOutputOfAThrowingControllerReachesNoDriver) {
     }
 }
 
+// Its value of the previous cycles is there, although the driver has not run so far.
+TEST_F(Safe, PartialOutputOfAThrowingControllerLeavesASlowDriverItsValue) {
+    ComponentDefinition throwing = controller("C", "other");
+    throwing.parameters = {{"throws_at", std::int64_t{3}}, {"keeps", true}};
+    load(throwing);
+    ComponentDefinition slow = driver();
+    slow.every = 8;
+    slow.phase = 7;
+    load(slow);
+    step(4);
+    ASSERT_EQ(state(), RunnerState::Faulted);
+    EXPECT_EQ(value("/D", "held"), 5.0);
+    EXPECT_EQ(value("/D", "last_status"), static_cast<double>(DataStatus::New));
+}
+
 TEST_F(Safe, PartialOutputOfTheFirstCycleIsNoValue) {
     ComponentDefinition throwing = controller("C", "other");
     throwing.parameters = {{"throws_at", std::int64_t{0}}, {"keeps", true}};
