@@ -87,6 +87,7 @@ void Cycle::moveTime(std::int64_t by_ns) {
         for (InputPort* input : step.component->inputs()) {
             move(&input->slot());
             input->moveTime(by_ns);
+            if (QueueBase* const queue = input->queue()) queue->moveTime(by_ns);
         }
     }
     for (const Latch& latch : schedule_->latches) move(latch.to);

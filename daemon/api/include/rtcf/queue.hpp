@@ -73,6 +73,12 @@ class QueueBase : public InputBase {
     /// Ignores the present value of the source, so that a reloaded component does not get an old
     /// trajectory again.
     void skip() noexcept RTCF_NONBLOCKING { skipValue(); }
+    /// Follows a move of the loop's time by `by` ns: the messages keep their ages.
+    void moveTime(std::int64_t by) noexcept {
+        Ring& ring = *ring_;
+        for (std::size_t i = 0; i < ring.count; ++i)
+            ring.at(ring.slots, (ring.oldest + i) % ring.capacity)->stamp += by;
+    }
     /// Counts messages that were lost before they reached the queue.
     void noteDropped(std::uint64_t count) noexcept RTCF_NONBLOCKING { ring_->dropped += count; }
     /// Empties the queue without counting drops.

@@ -104,6 +104,23 @@ TEST_F(QueueAlone, AgeIsThatOfTheOldestMessage) {
     EXPECT_EQ(queue.age(), 150);
 }
 
+// A new run of the loop begins at an earlier time.
+TEST_F(QueueAlone, MessagesKeepTheirAgesIfTheTimeMoves) {
+    connect(first);
+    write(first, 1, 600);
+    queue.pop();
+    write(first, 2, 1000);
+    write(first, 3, 1200);
+    queue.moveTime(-1500);
+    component.setTime(10);
+    EXPECT_EQ(queue.age(), 510);
+    queue.pop();
+    EXPECT_EQ(queue.age(), 310);
+    queue.pop();
+    queue.moveTime(-1500);
+    EXPECT_EQ(queue.age(), -1);
+}
+
 TEST_F(QueueAlone, MessagesOfVariableSizeKeepTheirCapacity) {
     Queue<std_msgs::String, 2> texts{&component, "texts"};
     Output<std_msgs::String> output{&component, "output"};
