@@ -44,10 +44,6 @@ def test_a_value_is_new_in_one_cycle_and_passes_through_the_graph(
     assert (done.returncode, done.stdout, done.stderr) == (0, "/a.in written\n", "")
     reads(client, "b.out", "1.5")
     assert passing.ctl("get", "b.out").stdout == "1.5\n"
-    # Writing the same value again counts as another value.
-    written = port(client, "a.out").count
-    client.write("a.in", 1.5)
-    wait_for(lambda: port(client, "a.out").count == written + 1, "another value")
     assert port(client, "a.in").age_ns >= 0
 
 
@@ -78,7 +74,13 @@ def test_a_stopped_loop_reads_the_value_in_its_first_cycle(client: rtcf.Client) 
     client.write("a.in", 3.5)
     client.step(1)
     reads(client, "a.out", "3.5")
-    assert port(client, "a.out").count == 1
+    # It is new in that cycle only, and again if the same value is written once more.
+    for _ in range(2):
+        assert port(client, "a.out").age_ns == 0
+        client.step(2)
+        assert port(client, "a.out").age_ns > 0
+        client.write("a.in", 3.5)
+        client.step(1)
 
 
 def test_an_unmapped_input_can_be_written_until_a_component_writes_it(
