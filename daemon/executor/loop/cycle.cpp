@@ -445,6 +445,7 @@ void Cycle::changeComponents(Adoption& adoption) noexcept {
             // If the component threw, its safe() has already run. A fault of a leaving component
             // does not end the loop.
             leaving.component->setTime(boundary_time_ns_);
+            for (InputPort* input : leaving.component->inputs()) input->connectWritten();
             if (!leaving.component->context().disabled)
                 makeSafe(*leaving.component, *leaving.statistics, OnBadOutput::GoOn);
             for (const Latch& latch : leaving.latches) copy(latch);

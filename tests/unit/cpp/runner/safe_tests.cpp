@@ -230,6 +230,29 @@ TEST_F(Safe, OfALeavingComponentSeesTheTimeOfItsOwnCycle) {
     EXPECT_EQ(value("/D", "furthest_off"), 0.0) << "other components see the same times";
 }
 
+// The new controller runs after the driver, so the driver has not had a turn to read its value.
+TEST_F(Safe, OfALeavingDriverReadsTheFirstValueOfANewController) {
+    ComponentDefinition silent = controller("B");
+    silent.parameters = {{"silent", true}};
+    load(silent);
+    ComponentDefinition early = driver();
+    early.first = true;
+    load(early);
+    ComponentDefinition watching = definition("Watcher", "W");
+    watching.remaps = {{"in", "D_applied"}, {"highest", "W_highest"}};
+    load(watching);
+    step(1);
+    unload("/B");
+    step(1);
+    ASSERT_EQ(value("/W", "highest"), 0.0) << "the safe command of the first controller";
+    load(controller("C"));
+    step(1);
+    ASSERT_EQ(value("/W", "highest"), 0.0);
+    unload("/D");
+    step(1);
+    EXPECT_EQ(value("/W", "highest"), 5.0);
+}
+
 TEST_F(Safe, IsNotCalledAgainOnceTheLoopHasEnded) {
     load(controller("C"));
     start();
