@@ -63,8 +63,8 @@ class $component : public rtcf::Component {
                                   rtcf::Doc("largest effort, either way")};
 
     void update() override {
-        const bool is_led = setpoint.read() != rtcf::DataStatus::None;
-        if (measured.read() == rtcf::DataStatus::None || !is_led) return;
+        const bool has_setpoint = setpoint.read() != rtcf::DataStatus::None;
+        if (measured.read() == rtcf::DataStatus::None || !has_setpoint) return;
         const double error = setpoint.value() - measured.value();
         effort.write(std::clamp(gain * error, -limit.value(), limit.value()));
     }
