@@ -161,6 +161,10 @@ class Listener : public RTT::TaskContext, public RtcfExtension {
         if (getIteration() == 2) in_.clear();
         if (getIteration() == 5) in_.disconnect();
         RT_INFO_STREAM(getIteration() << ": " << in_.read(sample));
+        if (getIteration() != 4 && getIteration() != 6) return;
+        sample.data = -1.0;
+        in_.getDataSample(sample);
+        RT_INFO_STREAM("sample " << sample.data);
     }
 
    private:

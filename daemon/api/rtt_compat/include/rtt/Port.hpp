@@ -107,9 +107,9 @@ class InputPort final : public base::InputPortInterface {
         return read(sample, copy_old_data);
     }
     /// Copies the newest value; before the first one, a default-constructed value. Does nothing if
-    /// the port was not added. Real-time safe if the assignment of T is.
+    /// the port was not added, and after disconnect(). Real-time safe if the assignment of T is.
     void getDataSample(T& sample) {
-        if (port_) sample = port_->value();
+        if (port_ && !disconnected()) sample = port_->value();
     }
     void clear() noexcept RTCF_NONBLOCKING override {
         if (port_) port_->read();
