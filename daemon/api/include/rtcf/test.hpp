@@ -162,6 +162,7 @@ class Bench {
                     std::memcpy(state.value, before.value, state.size);
             }
         }
+        component_->setTime(now() - 1);  // before the next cycle
         component_->takeOver(Predecessor(*previous.component_));
     }
 

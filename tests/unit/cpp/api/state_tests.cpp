@@ -4,6 +4,8 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 
+#include <utility>
+
 #include "rtcf/component.hpp"
 #include "rtcf/test.hpp"
 
@@ -62,6 +64,17 @@ class BenchPi final : public rtcf::Component {
     void safe() noexcept override { effort.write(0.0); }
 };
 
+// Writes once in update(), and in takeOver().
+class Heir final : public rtcf::Component {
+    rtcf::Output<double> out{this, "out", "", rtcf::Finite()};
+    bool has_written_ = false;
+
+    void update() override {
+        if (!std::exchange(has_written_, true)) out.write(1.0);
+    }
+    void takeOver(const rtcf::Predecessor& /*previous*/) noexcept override { out.write(2.0); }
+};
+
 class TwiceDeclared final : public rtcf::Component {
     rtcf::State<double> one{this, "same", 0.0};
     rtcf::State<float> other{this, "same", 0.0F};
@@ -77,6 +90,7 @@ class TooLarge final : public rtcf::Component {
 }  // namespace
 
 RTCF_COMPONENT(BenchPi, "For rtcf/test.hpp")
+RTCF_COMPONENT(Heir, "Writes in takeOver()")
 
 namespace rtcf::test {
 namespace {
@@ -183,6 +197,17 @@ TEST(Bench, TransfersState) {
     Bench fresh("BenchPi");
     fresh.takeOver(old);
     EXPECT_EQ(fresh.state<double>("integral"), old.state<double>("integral"));
+}
+
+TEST(Bench, PublishesWhatTakeOverWrites) {
+    Bench old("Heir");
+    Bench fresh("Heir");
+    fresh.cycle();
+    ASSERT_EQ(*fresh.read<double>("out"), 1.0);
+    fresh.takeOver(old);
+    fresh.cycle();
+    EXPECT_EQ(*fresh.read<double>("out"), 2.0);
+    EXPECT_EQ(fresh.writes("out"), 2U);
 }
 
 // Each of six joints of one class logs once, and a reloaded one logs again.
