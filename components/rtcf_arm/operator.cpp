@@ -167,7 +167,7 @@ class Operator final : public rtcf::Component {
 
     // Moves the target with the axes, from the commanded position on, while the button is held.
     void jog() {
-        const bool has_joy = joy.read() != rtcf::DataStatus::None && joy.age() < kJoyTimeout;
+        const bool has_joy = joy.read() != rtcf::DataStatus::None && joy.age(this) < kJoyTimeout;
         const auto button = static_cast<std::size_t>(enable_button.value());
         const bool enabled = has_joy && button < joy.value().buttons.size() &&
                              joy.value().buttons[button] != 0 && fits(command.value());
