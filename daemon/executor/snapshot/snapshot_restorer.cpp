@@ -4,6 +4,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <cstring>
 
 #include "common/error.hpp"
@@ -13,6 +14,7 @@ namespace rtcf::executor {
 namespace {
 
 constexpr std::size_t kToldProblems = 5;
+constexpr std::int64_t kLongest = INT64_MAX / 2;  // ns
 
 std::string orNothing(const std::string& source) { return source.empty() ? "nothing" : source; }
 
@@ -58,9 +60,14 @@ void SnapshotRestorer::fitEach(const std::string& of, const char* kind, const Fr
         problem(fmt::format("the graph has no {} {}{}", kind, of, left));
 }
 
+// Components compute with the ages of values.
+void SnapshotRestorer::checkStamp(std::int64_t stamp, const std::string& name) {
+    if (stamp < -kLongest || stamp > kLongest)
+        problem(fmt::format("{} has the time {} ns: the file was modified", name, stamp));
+}
+
 // Requires times that a loop can have, because components compute with them.
 void SnapshotRestorer::requireTimes() const {
-    constexpr std::int64_t kLongest = INT64_MAX / 2;
     constexpr std::int64_t kLastStamp = 4'294'967'295'999'999'999;  // of a ros::Time
     const auto is = [](std::int64_t time, std::int64_t most) { return time >= 0 && time <= most; };
     const auto isElapsed = [&](std::int64_t elapsed) {
@@ -203,6 +210,8 @@ void SnapshotRestorer::fitInput(const SnapshotInput& saved, InputPort& input,
         problem(fmt::format("input {} has read a removed writer, whose value is missing", name));
         return;
     }
+    checkStamp(saved.seen, name);
+    checkStamp(saved.since, name);
     const auto found = plan_.bindings.find(&input);
     const Binding binding = found == plan_.bindings.end() ? Binding{} : found->second;
     Restoration::Input to{&input, source.empty() ? nullptr : binding.source, nullptr, saved.seen,
@@ -248,6 +257,7 @@ std::shared_ptr<SlotHeader> SnapshotRestorer::slotFrom(const TypeInfo& type,
         valid = type.deserialize(*slot, bytes, static_cast<std::uint32_t>(value.bytes.size()));
     }
     if (!valid) problem(fmt::format("the value of {} is not of type {}", name, type.name));
+    checkStamp(value.stamp, name);
     slot->stamp = value.stamp;
     return slot;
 }

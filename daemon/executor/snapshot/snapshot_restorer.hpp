@@ -59,6 +59,7 @@ class SnapshotRestorer {
     void restoreTo(SlotHeader* to, const TypeInfo& type, const SnapshotValue& value,
                    const std::string& name);
     void problem(std::string text) { problems_.push_back(std::move(text)); }
+    void checkStamp(std::int64_t stamp, const std::string& name);
     void requireFit() const;
     void requireTimes() const;
 

@@ -300,6 +300,14 @@ TEST_F(Snapshots, UnsuitableOneIsRejectedCompletely) {
     expect("above its maximum",
            [](Snapshot& other) { other.components[0].parameters[0].second = 5.0; });
     expect("topic /t", [](Snapshot& other) { other.topics.push_back({"/t", {}, 1, {}}); });
+    for (const std::int64_t time : {INT64_MAX, INT64_MIN}) {
+        expect("/P.x has the time " + std::to_string(time),
+               [&](Snapshot& other) { other.components[0].outputs[0].value.stamp = time; });
+        expect("has the time " + std::to_string(time),
+               [&](Snapshot& other) { other.components[0].inputs[0].seen = time; });
+        expect("has the time " + std::to_string(time),
+               [&](Snapshot& other) { other.components[0].inputs[0].since = time; });
+    }
     expect("taken at 500 Hz", [](Snapshot& other) { other.period_ns = 2'000'000; });
     expect("and 3 more", [](Snapshot& other) {
         for (auto& component : other.components) component.name += "x";
