@@ -53,6 +53,9 @@ class Tap {
 
     /// The source's stamp at the last push(). Producer only; real-time safe.
     std::int64_t lastStamp() const noexcept RTCF_NONBLOCKING { return last_stamp_; }
+    /// Lets the next push() take the source's value, if there is one: it was replaced. Producer
+    /// only; real-time safe.
+    void forget() noexcept RTCF_NONBLOCKING { last_stamp_ = 0; }
     /// Follows a move of the loop's time by `by` ns. Producer only; real-time safe.
     void moveTime(std::int64_t by) noexcept RTCF_NONBLOCKING {
         last_stamp_ = movedStamp(last_stamp_, by);

@@ -495,6 +495,7 @@ bool Cycle::restore(Restoration& restoration) noexcept {
     }
     for (const Restoration::Input& input : restoration.inputs)
         input.put(&input.input->slot(), later);
+    for (Tap* tap : schedule_->taps) tap->forget();
     for (const Restoration::Turn& turn : restoration.turns) {
         turn.context->updated_ns = turn.updated_ns;
         turn.context->elapsed_ns = turn.elapsed_ns;
