@@ -255,7 +255,7 @@ void Loop::run() noexcept {
     recorder_.setRunning(true);
     if (simulation_ == nullptr) {
         followRealTime();
-        cycle_.makeSafe(monotonicNow());
+        cycle_.makeSafe(afterLastCycle(monotonicNow()));
     } else {
         followClock();
         endStepping();
@@ -304,6 +304,12 @@ std::int64_t Loop::nextStep() const noexcept {
     return cycle_.clock().time_ns + cycle_.clock().period_ns;
 }
 
+// Loop time rises strictly, even if a coarse clock shows the same time twice. By 2 ns, as hooks at
+// a boundary write 1 ns before its cycle.
+std::int64_t Loop::afterLastCycle(std::int64_t time_ns) const noexcept {
+    return std::max(time_ns, cycle_.clock().time_ns + 2);
+}
+
 // The component whose device paces the loop; null = none, the clock does.
 Source* Loop::source() const noexcept {
     Source* const source = cycle_.schedule().source;
@@ -326,7 +332,8 @@ void Loop::followRealTime() noexcept {
         const Counting::Turn turn(cycle_.statistics().counting);
         noteMissed(wake_up.missed);
         const std::int64_t begin = readCycleCounter();
-        const std::int64_t time = device != nullptr ? wake_up.wake_ns : wake_up.deadline_ns;
+        const std::int64_t time =
+            device != nullptr ? afterLastCycle(wake_up.wake_ns) : wake_up.deadline_ns;
         if (!cycle_.run(time, wake_up.wake_ns - wake_up.deadline_ns)) break;
         // A device begins the next cycle itself; waitForSource() counts missed beats.
         const std::int64_t limit = time + cycle_.clock().period_ns;
@@ -380,7 +387,7 @@ Loop::WakeUp Loop::waitForSource(Source& device) noexcept {
     waits_.add(1);
     const std::int64_t now = monotonicNow();
     if (!ready) {
-        cycle_.atBoundary(now);
+        cycle_.atBoundary(afterLastCycle(now));
         return {false, 0, now};
     }
     const std::int64_t period = cycle_.clock().period_ns;

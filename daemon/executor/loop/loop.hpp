@@ -181,6 +181,7 @@ class Loop {
     WakeUp waitForSource(Source& device) noexcept;
     Source* source() const noexcept;
     std::int64_t nextStep() const noexcept;
+    std::int64_t afterLastCycle(std::int64_t time_ns) const noexcept;
     std::int64_t endOfCycle(const WakeUp& wake_up, std::int64_t begin_ticks,
                             std::int64_t limit_ns) const noexcept RTCF_NONBLOCKING;
     void noteMissed(std::int64_t periods) noexcept RTCF_NONBLOCKING;
