@@ -332,7 +332,7 @@ inline InputBase::InputBase(Component* owner, std::string name, const TypeInfo& 
 
 inline std::int64_t InputBase::age(const Component* owner) const noexcept RTCF_NONBLOCKING {
     if (source_->stamp == 0) return -1;
-    return std::max<std::int64_t>(0, owner->time() - source_->stamp);
+    return std::max<std::int64_t>(0, owner->time() - timeOf(source_->stamp));
 }
 
 inline bool InputBase::connected(const Component* owner) const noexcept RTCF_NONBLOCKING {
@@ -351,7 +351,7 @@ inline QueueBase::QueueBase(Component* owner, std::string name, const TypeInfo& 
 inline std::int64_t QueueBase::age() noexcept {
     const SlotHeader* const slot = oldest();
     if (slot == nullptr) return -1;
-    return std::max<std::int64_t>(0, ring_->port->owner().time() - slot->stamp);
+    return std::max<std::int64_t>(0, ring_->port->owner().time() - timeOf(slot->stamp));
 }
 
 inline OutputBase::OutputBase(Component* owner, std::string name, std::string unit,

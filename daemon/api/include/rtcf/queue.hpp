@@ -76,8 +76,10 @@ class QueueBase : public InputBase {
     /// Follows a move of the loop's time by `by` ns: the messages keep their ages.
     void moveTime(std::int64_t by) noexcept {
         Ring& ring = *ring_;
-        for (std::size_t i = 0; i < ring.count; ++i)
-            ring.at(ring.slots, (ring.oldest + i) % ring.capacity)->stamp += by;
+        for (std::size_t i = 0; i < ring.count; ++i) {
+            SlotHeader& slot = *ring.at(ring.slots, (ring.oldest + i) % ring.capacity);
+            slot.stamp = movedStamp(slot.stamp, by);
+        }
     }
     /// Counts messages that were lost before they reached the queue.
     void noteDropped(std::uint64_t count) noexcept RTCF_NONBLOCKING { ring_->dropped += count; }

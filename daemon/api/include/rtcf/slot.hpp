@@ -11,17 +11,22 @@ namespace rtcf {
 
 /// Stamp of a value. Plain data: while the loop runs, only the real-time thread uses it.
 struct SlotHeader {
-    /// Loop time of the last write, ns; 0 = never written. As loop time rises strictly, a reader
-    /// sees by the stamp alone whether the value was written since its last read. Several writes in
-    /// one cycle are one for a reader.
+    /// Loop time of the last write, ns; 0 = never written; after a move of the loop's time also
+    /// below 0, see timeOf(). As loop time rises strictly, a reader sees by the stamp alone whether
+    /// the value was written since its last read. Several writes in one cycle are one for a reader.
     std::int64_t stamp = 0;
 };
+
+/// The loop time of a stamp, ns. Stamps of the times up to 0 are 1 lower, as 0 is none. Real-time
+/// safe.
+constexpr std::int64_t timeOf(std::int64_t stamp) noexcept { return stamp > 0 ? stamp : stamp + 1; }
 
 /// A stamp after the loop's time was moved by `by` ns: a reader sees the same values as new, and of
 /// the same age. Real-time safe.
 constexpr std::int64_t movedStamp(std::int64_t stamp, std::int64_t by) noexcept {
     if (stamp == 0) return 0;
-    return stamp + by != 0 ? stamp + by : -1;
+    const std::int64_t time = timeOf(stamp) + by;
+    return time > 0 ? time : time - 1;
 }
 
 /// A value with its header.
