@@ -75,6 +75,22 @@ TEST(Tap, PassesEachWrittenValueOnce) {
     EXPECT_FALSE(tap.pop([](const std::uint8_t*, std::uint32_t, std::int64_t) {}));
 }
 
+// A restored value may have the stamp of the one before.
+TEST(Tap, PassesAReplacedValueOfTheSameStamp) {
+    const auto slot = std::make_shared<Slot<double>>();
+    Tap tap("/x", typeInfo<double>(), slot, 1024);
+    tap.forget();
+    tap.push(0);
+    EXPECT_TRUE(takeAll(tap).empty()) << "nothing was written yet";
+    write(slot, 1.0);
+    tap.push(0);
+    slot->value = 2.0;
+    tap.forget();
+    tap.push(0);
+    tap.push(0);
+    EXPECT_EQ(takeAll(tap), (std::vector<double>{1.0, 2.0}));
+}
+
 TEST(Tap, HasTheStampOfTheCycleThatWroteAValue) {
     const auto slot = std::make_shared<Slot<double>>();
     Tap tap("/x", typeInfo<double>(), slot, 64);
