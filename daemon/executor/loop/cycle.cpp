@@ -29,7 +29,7 @@ class HookNote {
 // Replaces a component's device statistics for one update, unless `statistics` is null.
 class DeviceLoan {
    public:
-    DeviceLoan(ComponentContext& context, DeviceFigures* statistics) noexcept
+    DeviceLoan(ComponentContext& context, DeviceStatistics* statistics) noexcept
         : context_(context), own_(context.device) {
         if (statistics != nullptr) context.device = statistics;
     }
@@ -39,7 +39,7 @@ class DeviceLoan {
 
    private:
     ComponentContext& context_;
-    DeviceFigures* own_;
+    DeviceStatistics* own_;
 };
 
 }  // namespace

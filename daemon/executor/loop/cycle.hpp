@@ -179,7 +179,7 @@ class Cycle {
     std::int64_t given_ticks_ = 0;  // when the taps were last filled
     LoopFault fault_;
     LoopStatistics statistics_;
-    DeviceFigures uncounted_;  // device statistics of cycles that are not counted
+    DeviceStatistics uncounted_;  // device statistics of cycles that are not counted
     SpscRing<CycleRecord, 16384> records_;
     const Schedule empty_{};
 };

@@ -23,7 +23,7 @@ struct ComponentStatistics {
     Histogram duration;  ///< of update(), in ticks of the cycle counter
     /// Cycles whose next deadline passed during this component's update().
     std::atomic<std::uint64_t> overruns{0};
-    DeviceFigures device;
+    DeviceStatistics device;
     ComponentFaults faults;
 };
 

@@ -60,8 +60,8 @@ struct AbiProbe {
         add({sizeof(LoopClock), offsetof(LoopClock, iteration), offsetof(LoopClock, time_ns),
              offsetof(LoopClock, stamp_ns), offsetof(LoopClock, period_ns),
              offsetof(LoopClock, elapsed_ns)});
-        add({sizeof(DeviceFigures), offsetof(DeviceFigures, calls),
-             offsetof(DeviceFigures, time_ns)});
+        add({sizeof(DeviceStatistics), offsetof(DeviceStatistics, calls),
+             offsetof(DeviceStatistics, time_ns)});
         add({sizeof(InputBase), offsetof(InputBase, source_), offsetof(InputBase, seen_)});
         add({sizeof(OutputBase), offsetof(OutputBase, raw_), offsetof(OutputBase, now_),
              offsetof(OutputBase, rest_), sizeof(OutputBase::Rest),

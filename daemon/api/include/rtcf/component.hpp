@@ -34,7 +34,7 @@ namespace rtcf {
 
 /// Device input and output of a component, see RTCF_DEVICE_IO. The cycle thread writes it; any
 /// thread may read it.
-struct DeviceFigures {
+struct DeviceStatistics {
     std::atomic<std::uint64_t> calls{0};   ///< number of RTCF_DEVICE_IO scopes
     std::atomic<std::int64_t> time_ns{0};  ///< total time spent in these scopes, ns
 };
@@ -52,11 +52,11 @@ struct ComponentContext {
     /// Sum of the clock's elapsed_ns at its last update, ns; -1 before the first one. Only for
     /// components that do not run every cycle.
     std::int64_t updated_ns = -1;
-    bool disabled = false;            ///< taken out after a fault; written by the cycle thread
-    std::uint32_t recorder_slot = 0;  ///< slot number in the flight recorder
-    DeviceFigures* device = nullptr;  ///< null outside an executor
-    LogSink* log = nullptr;           ///< null = no log
-    NodeGate* gate = nullptr;         ///< access to the ROS node; null without one
+    bool disabled = false;               ///< taken out after a fault; written by the cycle thread
+    std::uint32_t recorder_slot = 0;     ///< slot number in the flight recorder
+    DeviceStatistics* device = nullptr;  ///< null outside an executor
+    LogSink* log = nullptr;              ///< null = no log
+    NodeGate* gate = nullptr;            ///< access to the ROS node; null without one
     std::vector<std::pair<std::string, std::string>> remaps;  ///< resolved names (from, to)
     std::atomic<LogLevel> log_level{LogLevel::Info};          ///< least severe level that is logged
     LogMemory said;  ///< state of the _ONCE and _THROTTLE macros

@@ -26,15 +26,15 @@ namespace rtcf {
 class DeviceIo {
    public:
     explicit DeviceIo(Component* component) noexcept
-        : figures_(component->context().device), begin_ns_(now()) {
+        : statistics_(component->context().device), begin_ns_(now()) {
         if (__rtsan_disable != nullptr) __rtsan_disable();
     }
     ~DeviceIo() {
         if (__rtsan_enable != nullptr) __rtsan_enable();
-        if (figures_ == nullptr) return;
+        if (statistics_ == nullptr) return;
         const auto relaxed = std::memory_order_relaxed;
-        figures_->calls.store(figures_->calls.load(relaxed) + 1, relaxed);
-        figures_->time_ns.store(figures_->time_ns.load(relaxed) + now() - begin_ns_, relaxed);
+        statistics_->calls.store(statistics_->calls.load(relaxed) + 1, relaxed);
+        statistics_->time_ns.store(statistics_->time_ns.load(relaxed) + now() - begin_ns_, relaxed);
     }
     DeviceIo(const DeviceIo&) = delete;
     DeviceIo& operator=(const DeviceIo&) = delete;
@@ -46,7 +46,7 @@ class DeviceIo {
         return std::int64_t{time.tv_sec} * 1'000'000'000 + time.tv_nsec;
     }
 
-    DeviceFigures* figures_;  // null outside an executor
+    DeviceStatistics* statistics_;  // null outside an executor
     std::int64_t begin_ns_;
 };
 

@@ -263,7 +263,7 @@ class Bench {
 
     LoopClock clock_;
     ComponentContext context_;
-    DeviceFigures device_;
+    DeviceStatistics device_;
     std::vector<std::string> lines_;
     Lines log_;
     std::map<const InputPort*, std::shared_ptr<SlotHeader>> slots_;
