@@ -8,7 +8,7 @@ from rtcf_shared.errors import RtcfError as RtcfError
 class RefusedError(RtcfError):
     """rtcfd rejected the request; nothing has changed.
 
-    Each reason has a subclass in rtcf.refusals, named by the reason: RunnerNotFoundError for
+    Each reason has a subclass in rtcf.reasons, named by the reason: RunnerNotFoundError for
     RUNNER_NOT_FOUND.
 
     reason   name in rtcf.v1.Reason without REASON_; empty if rtcfd sent none

@@ -20,9 +20,9 @@ def refused(
     message: str, code: str, reason: str, about: Mapping[str, str] | None = None
 ) -> RefusedError:
     """Return the RefusedError for a reason; see RefusedError for the arguments."""
-    from rtcf import refusals
+    from rtcf import reasons
 
-    return refusals.BY_REASON.get(reason, RefusedError)(message, code, reason, about)
+    return reasons.BY_REASON.get(reason, RefusedError)(message, code, reason, about)
 
 
 def from_grpc(error: Any, socket: str) -> RtcfError:

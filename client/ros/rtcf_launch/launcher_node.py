@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import rtcf
-from rtcf.refusals import HolderGoneError
+from rtcf.reasons import HolderGoneError
 from rtcf.v1 import control_pb2, graph_pb2
 
 from rtcf_launch import arguments, component_parameters

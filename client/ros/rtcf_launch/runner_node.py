@@ -17,7 +17,7 @@ from typing import Any
 import rtcf
 from rtcf.connection import DEFAULT_SOCKET
 from rtcf.private_daemon import PrivateDaemon, program
-from rtcf.refusals import ExpressionInvalidError
+from rtcf.reasons import ExpressionInvalidError
 from rtcf.v1 import control_pb2, runner_pb2
 from rtcf_shared.enums import word
 
@@ -335,8 +335,8 @@ class RunnerNode:
         assert self._client is not None
         try:
             result = self._client.start(self._runner)
-        except rtcf.RefusedError as refusal:
-            raise Ending(Code.REFUSED, f"the loop does not start: {refusal}") from None
+        except rtcf.RefusedError as error:
+            raise Ending(Code.REFUSED, f"the loop does not start: {error}") from None
         for note in result.notes:  # what is missing for real time is said when it runs
             self._screen.warn(note)
 

@@ -9,23 +9,23 @@ import rtcf
 from daemon_process import Daemon
 from fig_1 import mimo
 from pages import TREE
-from rtcf import refusals
+from rtcf import reasons
 from rtcf.v1 import control_pb2, control_pb2_grpc, errors_pb2
 
 
 def test_an_error_has_a_reason_and_suggests_a_name(client: rtcf.Client) -> None:
-    with pytest.raises(refusals.RunnerNotFoundError) as refused:
+    with pytest.raises(reasons.RunnerNotFoundError) as refused:
         client.start("rt_runer")
     assert refused.value.about == {"runner": "rt_runer", "suggestion": "rt_runner"}
-    with pytest.raises(refusals.TypeNotFoundError) as unknown:
+    with pytest.raises(reasons.TypeNotFoundError) as unknown:
         client.load(rtcf.component("rtcf_examples", "Minmo"))
     assert unknown.value.about["type"] == "Minmo"
     assert unknown.value.about["suggestion"] == "Mimo"
     client.load(mimo("A", {}))
-    with pytest.raises(refusals.ComponentExistsError) as taken:
+    with pytest.raises(reasons.ComponentExistsError) as taken:
         client.load(mimo("A", {}))
     assert taken.value.code == "ALREADY_EXISTS"
-    with pytest.raises(refusals.ComponentNotFoundError) as missing:
+    with pytest.raises(reasons.ComponentNotFoundError) as missing:
         client.get_component("B")
     assert missing.value.about["component"] == "B"
 

@@ -12,7 +12,7 @@ import rtcf
 from bystander import Bystander
 from daemon_process import Daemon, wait_for
 from pages import TREE
-from rtcf import refusals
+from rtcf import reasons
 from rtcf.v1 import graph_pb2, runner_pb2
 from values import port_value, state
 
@@ -71,7 +71,7 @@ def test_a_component_that_crashes_is_named_and_taken_out(
     assert client.get_order() == ["/a", "/z"]
     assert client.get_component("bad").state == graph_pb2.COMPONENT_STATE_LEFT_OUT
     # Without the culprit it runs if a user accepts that explicitly.
-    with pytest.raises(refusals.ComponentLeftOutError, match=r"left out of its loop: /bad \("):
+    with pytest.raises(reasons.ComponentLeftOutError, match=r"left out of its loop: /bad \("):
         client.start()
     client.start(without=["bad"])
     wait_for(lambda: state(client).iteration > 100, "100 cycles")
@@ -297,7 +297,7 @@ def test_a_taken_out_component_is_released_with_its_parameters(client: rtcf.Clie
     wait_for(lambda: state(client).iteration > before.iteration + 100, "100 cycles")
     assert port_value(client, "bad", "out") > 0, "the component is updated again"
     assert state(client).pid == before.pid
-    with pytest.raises(refusals.ComponentNotLeftOutError, match="it is in the loop"):
+    with pytest.raises(reasons.ComponentNotLeftOutError, match="it is in the loop"):
         client.release(["bad"])
 
 

@@ -19,7 +19,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from pages import TREE
-from rtcf import refusals
+from rtcf import reasons
 from rtcf.testing import Bench
 
 PATH = [BUILD_TREE / "lib" / "rtcf"]
@@ -104,7 +104,7 @@ def test_a_whole_graph_file_runs(tmp_path: Path, daemon: Daemon) -> None:
 def test_the_error_of_a_failing_component_is_raised() -> None:
     with Bench("rtcf_faults/Throws", path=PATH) as bench:
         for _ in range(2):
-            with pytest.raises(refusals.LoopFailedError, match="/Throws"):
+            with pytest.raises(reasons.LoopFailedError, match="/Throws"):
                 bench.run(steps=100)
 
 
@@ -133,9 +133,9 @@ def test_a_component_that_crashes_is_named() -> None:
 def test_unsuitable_inputs_are_rejected_and_the_bench_continues(
     mimo: Bench, inputs: dict[str, Any], steps: int | None, said: str
 ) -> None:
-    with pytest.raises(ValueError, match=".") as refusal:
+    with pytest.raises(ValueError, match=".") as error:
         mimo.run(inputs, steps)
-    assert said in str(refusal.value)
+    assert said in str(error.value)
     assert mimo.run(steps=1)["out1"].tolist() == [1.0]
 
 
@@ -158,9 +158,9 @@ def test_an_output_that_was_not_written_is_named(mimo: Bench) -> None:
 )
 def test_untestable_arguments_are_rejected(what: str, arguments: dict[str, Any], said: str) -> None:
     all_arguments: dict[str, Any] = {"path": PATH, **arguments}
-    with pytest.raises((ValueError, rtcf.RtcfError)) as refusal:
+    with pytest.raises((ValueError, rtcf.RtcfError)) as error:
         Bench(what, **all_arguments)
-    assert said in str(refusal.value)
+    assert said in str(error.value)
 
 
 def test_benches_of_the_plugin_end_with_their_test(tmp_path: Path) -> None:

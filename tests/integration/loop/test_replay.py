@@ -11,7 +11,7 @@ import rosbag
 import rospy
 import rtcf
 from daemon_process import Daemon, wait_for
-from rtcf import refusals
+from rtcf import reasons
 from rtcf.v1 import control_pb2, runner_pb2
 from std_msgs.msg import Float64, String
 
@@ -168,7 +168,7 @@ def test_a_replay_ends_with_its_client(daemon: Daemon) -> None:
     with rtcf.Client(daemon.socket) as client:
         with client.replay() as replay:
             replay.run(control_pb2.ReplayRequest(begin=True, start_ns=START_NS))
-            with pytest.raises(refusals.ReplayRunsError):
+            with pytest.raises(reasons.ReplayRunsError):
                 client.unload(["H1"])
         wait_for(lambda: _unloads(client, "H1"), "the end of the replay")
 
@@ -185,17 +185,17 @@ def test_a_client_leaving_a_stopped_replay_ends_no_other_loop(daemon: Daemon) ->
 
 def test_a_replay_starts_only_once_and_first(daemon: Daemon) -> None:
     with rtcf.Client(daemon.socket) as client:
-        with client.replay() as replay, pytest.raises(refusals.RequestMalformedError):
+        with client.replay() as replay, pytest.raises(reasons.RequestMalformedError):
             replay.run(control_pb2.ReplayRequest(until_ns=START_NS))
         with client.replay() as replay:
             replay.run(control_pb2.ReplayRequest(begin=True, start_ns=START_NS))
-            with pytest.raises(refusals.RequestMalformedError):
+            with pytest.raises(reasons.RequestMalformedError):
                 replay.run(control_pb2.ReplayRequest(begin=True, start_ns=START_NS))
 
 
 def _unloads(client: rtcf.Client, component: str) -> bool:
     try:
         client.unload([component])
-    except refusals.ReplayRunsError:
+    except reasons.ReplayRunsError:
         return False
     return True

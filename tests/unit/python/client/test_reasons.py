@@ -12,7 +12,7 @@ from hypothesis import given, seed, settings
 from hypothesis import strategies as st
 from pages import TREE
 from rtcf import errors, failures
-from rtcf.refusals import BY_REASON
+from rtcf.reasons import BY_REASON
 from rtcf.v1 import errors_pb2
 from rtcfd.common import errors as daemon_errors
 from rtcfd.common import status_codes
@@ -25,17 +25,17 @@ ON_STANDARD_ERROR = {"REASON_DAEMON_FAILED"}
 class _Failed(grpc.RpcError):  # type: ignore[misc]
     """gRPC's exception in a client."""
 
-    def __init__(self, refusal: RequestError) -> None:
-        self._refusal = refusal
+    def __init__(self, error: RequestError) -> None:
+        self._error = error
 
     def code(self) -> grpc.StatusCode:
-        return status_codes.status_code(self._refusal)
+        return status_codes.status_code(self._error)
 
     def details(self) -> str:
-        return status_codes.bounded(self._refusal)
+        return status_codes.bounded(self._error)
 
     def trailing_metadata(self) -> list[tuple[str, bytes]]:
-        return [(status_codes.DETAILS_KEY, status_codes.details(self._refusal))]
+        return [(status_codes.DETAILS_KEY, status_codes.details(self._error))]
 
 
 def test_each_reason_has_an_exception_documented_as_in_the_protocol() -> None:
@@ -54,10 +54,10 @@ def test_reason_numbers_are_dense() -> None:
 
 
 def test_a_client_gets_the_exception_of_the_reason_with_its_subject() -> None:
-    refusal = daemon_errors.NotFound(
+    error = daemon_errors.NotFound(
         "no runner", errors_pb2.REASON_RUNNER_NOT_FOUND, runner="arm", suggestion="arms", field=""
     )
-    found = failures.from_grpc(_Failed(refusal), "/nowhere")
+    found = failures.from_grpc(_Failed(error), "/nowhere")
     assert type(found) is BY_REASON["RUNNER_NOT_FOUND"]
     assert isinstance(found, errors.RefusedError)
     assert (str(found), found.code, found.reason) == ("no runner", "NOT_FOUND", "RUNNER_NOT_FOUND")
@@ -89,9 +89,9 @@ def test_damaged_details_keep_the_message(garbage: bytes, monkeypatch: pytest.Mo
     ),
 )
 def test_an_error_fits_into_any_clients_metadata(text: str, about: dict[str, str]) -> None:
-    refusal = daemon_errors.NotFound(text, errors_pb2.REASON_PORT_NOT_FOUND, **about)
-    line = quote(status_codes.bounded(refusal))
-    details = status_codes.details(refusal)
+    error = daemon_errors.NotFound(text, errors_pb2.REASON_PORT_NOT_FOUND, **about)
+    line = quote(status_codes.bounded(error))
+    details = status_codes.details(error)
     assert len(line) + (len(details) + 2) // 3 * 4 < 8 * 1024 - 512  # for other headers
     status = errors_pb2.ErrorStatus.FromString(details)
     assert quote(status.message) == line
@@ -133,11 +133,11 @@ def _googles_messages() -> Any:
 
 
 def test_googleapis_can_read_the_details_in_the_same_process() -> None:
-    refusal = daemon_errors.AlreadyExists(
+    error = daemon_errors.AlreadyExists(
         "there already", errors_pb2.REASON_COMPONENT_EXISTS, runner="arm", component="/pid"
     )
     status_type, info_type = _googles_messages()
-    status = status_type.FromString(status_codes.details(refusal))
+    status = status_type.FromString(status_codes.details(error))
     assert (status.code, status.message) == (6, "there already")
     (detail,) = status.details
     info = info_type()

@@ -8,7 +8,7 @@ import rtcf
 from daemon_process import is_gone, wait_for
 from daemon_under_test import DaemonUnderTest
 from flight_writer import FlightWriter
-from rtcf import refusals
+from rtcf import reasons
 from rtcf.v1 import graph_pb2, runner_pb2
 from rtcfd.executor.flight_recorder import FlightRecorder, Note
 from rtcfd.executor.process import End
@@ -59,7 +59,7 @@ def test_a_crash_in_an_update_is_named_and_its_component_quarantined(
     assert "/bad" in daemon.saved()["quarantined"]
     assert daemon.saved()["running"] is False
 
-    with pytest.raises(refusals.ComponentLeftOutError, match="left out of its loop: /bad"):
+    with pytest.raises(reasons.ComponentLeftOutError, match="left out of its loop: /bad"):
         running.start()
     assert running.start(without=["bad"]).order == ["/extra", "/good"]
     assert state(running).state == runner_pb2.RUNNER_STATE_RUNNING
