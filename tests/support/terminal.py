@@ -22,7 +22,7 @@ class _Cells:
 
     def __init__(self, columns: int, lines: int) -> None:
         self.resize(columns, lines)
-        self.picture = ""  # the last complete screen
+        self.screen = ""  # the last complete screen
 
     def resize(self, columns: int, lines: int) -> None:
         self._columns = columns
@@ -57,7 +57,7 @@ class _Cells:
 
     def _sequence(self, parameters: str, final: str) -> None:
         if (parameters, final) == ("?2026", "l"):
-            self.picture = self.text()
+            self.screen = self.text()
         elif final == "H":
             assert not parameters
             self._row = self._column = 0
@@ -105,10 +105,10 @@ class Terminal:
         deadline = time.monotonic() + DEADLINE_S
         while True:
             self._read()
-            if re.search(pattern, self._cells.picture, re.MULTILINE):
-                return self._cells.picture
+            if re.search(pattern, self._cells.screen, re.MULTILINE):
+                return self._cells.screen
             assert time.monotonic() < deadline, (
-                f"no {pattern} in\n{self._cells.picture}\nof {self.shown[-1000:]!r}"
+                f"no {pattern} in\n{self._cells.screen}\nof {self.shown[-1000:]!r}"
             )
 
     def press(self, keys: bytes) -> None:

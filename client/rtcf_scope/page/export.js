@@ -1,4 +1,4 @@
-// Exports the visible part: as a picture, a table, or a recording.
+// Exports the visible part as a PNG file, a table, or a recording.
 import { colour, ink } from "./drawing/palette.js";
 import { query, request } from "./server.js";
 

@@ -10,7 +10,7 @@ from rtcf.identification.models import StateSpace
 from rtcf.identification.result import estimated_response, fitted_response
 
 from rtcfctl.terminal import image_file
-from rtcfctl.terminal.pictures import drawn
+from rtcfctl.terminal.drawings import drawn
 
 if TYPE_CHECKING:
     from rtcf.identification.experiment import Recorded

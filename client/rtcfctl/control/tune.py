@@ -12,8 +12,8 @@ import rtcf
 from rtcf_shared.ports import numpy_module
 
 from rtcfctl.control import excited
+from rtcfctl.terminal.drawings import drawn
 from rtcfctl.terminal.output import Output
-from rtcfctl.terminal.pictures import drawn
 from rtcfctl.terminal.words import amount, figure
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ import rtcf
 from rtcf.v1 import runner_pb2
 
 from rtcfctl.terminal import image_file
-from rtcfctl.terminal.pictures import bar
+from rtcfctl.terminal.drawings import bar
 
 _FORMATS = (".svg", ".png", ".pdf")
 _LEAST_NS = 10.0  # shorter and negative times count as this

@@ -14,8 +14,8 @@ import rtcf
 from rtcf.v1 import runner_pb2
 
 from rtcfctl.loop.status import STYLES
+from rtcfctl.terminal.drawings import spark
 from rtcfctl.terminal.output import Output, coloured, styled
-from rtcfctl.terminal.pictures import spark
 from rtcfctl.terminal.plain import enumerator
 from rtcfctl.terminal.screen import Screen
 from rtcfctl.terminal.words import amount, counted, microseconds

@@ -14,8 +14,8 @@ from rtcf.streams.ports import PortStream
 from rtcf_shared.ports import PortBatch
 
 from rtcfctl.signals.idle_loop import say_if_idle
+from rtcfctl.terminal.drawings import Curves
 from rtcfctl.terminal.output import Output, coloured, styled
-from rtcfctl.terminal.pictures import Curves
 from rtcfctl.terminal.screen import Screen
 from rtcfctl.terminal.words import amount, figure
 

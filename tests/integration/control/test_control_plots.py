@@ -18,7 +18,7 @@ from daemon_process import Daemon
 from documentation_commands import typed
 from pages import TREE
 from rtcf.testing import Bench
-from rtcfctl.terminal import pictures
+from rtcfctl.terminal import drawings
 
 PAGES = TREE / "docs" / "control"
 WIDTH = 72
@@ -51,7 +51,7 @@ components:
 
 def drawn(title: str, values: Any, marks: Mapping[float, str]) -> str:
     """Return a curve from its first value on."""
-    return "\n".join(pictures.drawn(title, [values[np.isfinite(values)]], marks))
+    return "\n".join(drawings.drawn(title, [values[np.isfinite(values)]], marks))
 
 
 def _run(folder: Path, graph: str, inputs: Mapping[str, Any]) -> Any:

@@ -153,10 +153,10 @@ class Loaded:
 
     daemon: Daemon
     client: rtcf.Client
-    picture: list[Any]
+    state: list[Any]
 
 
-def picture(client: rtcf.Client) -> list[Any]:
+def state_of(client: rtcf.Client) -> list[Any]:
     """Return all state that an error must not change, as printed by `rtcfctl -o json`."""
     runners = client.get_status().runners
     for runner in runners:
@@ -184,7 +184,7 @@ def loaded(
     with rtcf.Client(daemon.socket) as client:
         if request.param == "running":
             client.start()
-        yield Loaded(daemon, client, picture(client))
+        yield Loaded(daemon, client, state_of(client))
     daemon.end()
 
 
@@ -196,7 +196,7 @@ def test_errors_are_one_line_and_change_nothing(loaded: Loaded, refusal: Refusal
     assert re.fullmatch(r"rtcfctl: [^\n]+\n", done.stderr), done.stderr
     for word in refusal.words:
         assert word in done.stderr
-    assert picture(loaded.client) == loaded.picture
+    assert state_of(loaded.client) == loaded.state
 
 
 def test_errors_do_not_stop_the_loop(loaded: Loaded) -> None:

@@ -163,7 +163,7 @@ def test_a_trace_has_an_axis_of_its_own(visit: Opener, axis: str) -> None:
     # The second one is drawn over the first one.
     assert found["one"] < 0.1
     assert found["other"] == 0
-    # A picture to keep has the same.
+    # An exported plot has the same inks.
     inks = page.ask(
         """(() => {
           const [pane] = scope.panes, { clientWidth: width, clientHeight: height } = pane.face;

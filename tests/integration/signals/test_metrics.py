@@ -142,13 +142,13 @@ def test_an_invalid_port_is_rejected(daemon: Daemon, place: str) -> None:
     [("loop.png", b"\x89PNG"), ("loop.svg", b"<?xml"), ("loop.pdf", b"%PDF")],
 )
 def test_a_plot_is_drawn(counted: Daemon, tmp_path: Path, name: str, begin: bytes) -> None:
-    pictures = tmp_path / "pictures"
-    pictures.mkdir()
-    (pictures / name).write_text("old")
-    done = counted.ctl("stats", "--plot", str(pictures / name))
+    plots = tmp_path / "plots"
+    plots.mkdir()
+    (plots / name).write_text("old")
+    done = counted.ctl("stats", "--plot", str(plots / name))
     assert done.returncode == 0, done.stderr
-    assert (pictures / name).read_bytes().startswith(begin)
-    assert [each.name for each in pictures.iterdir()] == [name]
+    assert (plots / name).read_bytes().startswith(begin)
+    assert [each.name for each in plots.iterdir()] == [name]
 
 
 @pytest.fixture
@@ -169,9 +169,9 @@ def test_a_plot_shows_an_outlier_and_the_others(
     outlier: Daemon, client: rtcf.Client, tmp_path: Path
 ) -> None:
     figures = client.get_statistics(buckets=True)
-    picture = tmp_path / "loop.svg"
-    assert outlier.ctl("stats", "--plot", str(picture)).returncode == 0
-    root = ElementTree.parse(picture).getroot()
+    plot = tmp_path / "loop.svg"
+    assert outlier.ctl("stats", "--plot", str(plot)).returncode == 0
+    root = ElementTree.parse(plot).getroot()
     texts = {each.text or "" for each in root.iter() if each.tag.endswith("text")}
     for panel, found in (("calculation", figures.duration), ("wake-up", figures.latency)):
         bars = ids(root, f"{panel} bar ")

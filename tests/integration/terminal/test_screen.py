@@ -25,16 +25,16 @@ def terminals() -> Iterator[list[Terminal]]:
         each.close()
 
 
-def rows(picture: str) -> list[str]:
+def rows(screen: str) -> list[str]:
     """Return the components on a screen of top."""
-    return [line.split()[0] for line in picture.split("\n") if line.startswith("/")]
+    return [line.split()[0] for line in screen.split("\n") if line.startswith("/")]
 
 
 def test_top_shows_the_durations_of_a_loop(running: Daemon, terminals: list[Terminal]) -> None:
     terminals.append(terminal := Terminal(running, "top", "--interval", "200ms"))
-    picture = terminal.see(r"/mimo +\d+\.\d\d")
-    assert picture.startswith("rt_runner  running  1000 Hz  cycle ")
-    assert rows(picture) == ["/mimo", "/wave"]
+    screen = terminal.see(r"/mimo +\d+\.\d\d")
+    assert screen.startswith("rt_runner  running  1000 Hz  cycle ")
+    assert rows(screen) == ["/mimo", "/wave"]
     terminal.press(b"s")  # by mean duration
     by_mean = terminal.see("▼MEAN").split("\n")
     means = [float(line.split()[1]) for line in by_mean if line.startswith("/")]
@@ -63,33 +63,33 @@ def test_the_whole_head_fits_the_terminal(
 ) -> None:
     terminal = Terminal(many, "top", "--interval", "200ms", columns=columns, lines=lines)
     terminals.append(terminal)
-    picture = terminal.see(r"/m000 ").split("\n")
-    assert len(picture) == lines
-    first = picture[0]
+    screen = terminal.see(r"/m000 ").split("\n")
+    assert len(screen) == lines
+    first = screen[0]
     assert re.fullmatch(r"rt_runner  running  1000 Hz  cycle \d+ +\d\d:\d\d:\d\d", first)
     assert len(first) == columns
-    (calculation,) = (each for each in picture if each.startswith("calculation"))
+    (calculation,) = (each for each in screen if each.startswith("calculation"))
     assert re.search(r"mean +\d+\.\d\d  p99 +\d+\.\d\d  max +\d+\.\d+ µs", calculation)
-    (counts,) = (each for each in picture if " missed" in each)
+    (counts,) = (each for each in screen if " missed" in each)
     assert re.fullmatch(r"\d+ overruns?, \d+ missed, \d+ page faults?", counts)
     # Missing real-time rights, as on machines that run tests, are wrapped, not cut.
-    assert not any("…" in each for each in picture)
-    (title,) = (each for each in picture if each.startswith("COMPONENT"))
+    assert not any("…" in each for each in screen)
+    (title,) = (each for each in screen if each.startswith("COMPONENT"))
     for word in ("MEAN", "P99", "MAX", "SHARE", "OVER"):
         assert word in title
-    assert picture[-1].startswith("q end ")
+    assert screen[-1].startswith("q end ")
 
 
 def test_all_components_can_be_scrolled_to(many: Daemon, terminals: list[Terminal]) -> None:
     terminals.append(terminal := Terminal(many, "top", "--interval", "60s"))
     names = [graphs.name(number) for number in range(_MANY)]
-    picture = terminal.see(r"^1 to \d+ of 200 components, in the order in which they run$")
-    room = len(rows(picture))
-    assert 5 < room < 24 and rows(picture) == names[:room]
+    screen = terminal.see(r"^1 to \d+ of 200 components, in the order in which they run$")
+    room = len(rows(screen))
+    assert 5 < room < 24 and rows(screen) == names[:room]
 
     def at(first: int) -> None:
-        picture = terminal.see(rf"^{first + 1} to {first + room} of 200 components")
-        assert rows(picture) == names[first : first + room]
+        screen = terminal.see(rf"^{first + 1} to {first + room} of 200 components")
+        assert rows(screen) == names[first : first + room]
 
     for keys, first in (
         (b"\x1b[B", 1), (b"j", 2), (b"\x1b[A", 1), (b"k", 0), (b"k", 0),
@@ -120,11 +120,11 @@ def test_a_new_size_is_drawn_immediately(many: Daemon, terminals: list[Terminal]
     terminal.see("to 200 of 200")
     for columns, lines in ((60, 10), (40, 5), (160, 60), (80, 24)):
         terminal.resize(columns, lines)
-        picture = terminal.see(rf"^(?=.{{{columns}}}$)rt_runner  running .*\d\d:\d\d:\d\d$")
-        assert len(picture.split("\n")) == lines
+        screen = terminal.see(rf"^(?=.{{{columns}}}$)rt_runner  running .*\d\d:\d\d:\d\d$")
+        assert len(screen.split("\n")) == lines
         terminal.press(b"\x1b[F")
-        picture = terminal.see(" to 200 of 200 components")
-        assert rows(picture)[-1] == graphs.name(_MANY - 1)
+        screen = terminal.see(" to 200 of 200 components")
+        assert rows(screen)[-1] == graphs.name(_MANY - 1)
 
 
 @pytest.mark.parametrize("words", [("top", "--interval", "100ms"), ("plot", "wave")])
@@ -178,8 +178,8 @@ def test_plot_draws_curves(running: Daemon, terminals: list[Terminal]) -> None:
     assert all(any("\u2800" < each <= "\u28ff" for each in line) for line in lines)
     assert (lines[0].split()[0], lines[-1].split()[0]) == ("1", "-1")
     terminals.append(terminal := Terminal(running, "plot", "wave", "--span", "500ms"))
-    picture = terminal.see("/wave.phase")
-    assert len(picture.split("\n")) == 24
+    screen = terminal.see("/wave.phase")
+    assert len(screen.split("\n")) == 24
     terminal.press(b"q")
     assert terminal.end() == 0
     assert terminal.shown.endswith(_LEFT)

@@ -37,7 +37,7 @@ export class Marks {
   }
 }
 
-// The same in a picture that is to be kept; `area` is that of the plot.
+// Draws a mark on the canvas of an export; `area` is that of the plot.
 export function drawMark(g, area, place, colour, paper, label) {
   if (place < 0 || place > area.width) return;
   g.fillStyle = colour;

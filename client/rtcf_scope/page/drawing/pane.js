@@ -309,7 +309,7 @@ export class Pane {
     }));
   }
 
-  // The same as a picture to keep, `ratio` pixels in one of CSS.
+  // Draws the pane on the canvas of an export, with `ratio` pixels per CSS pixel.
   paint(g, width, height, ratio) {
     const { scope } = this, besides = scope.hasRight ? LEFT : RIGHT;
     const area = { left: LEFT, top: TOP, width: width - LEFT - besides, height: height - TOP - BOTTOM };

@@ -1,5 +1,5 @@
 // Pixels of a stretch of a plot, drawn column by column. No column depends on another one, so that a
-// growing picture has the same pixels as one drawn at once.
+// growing plot has the same pixels as one drawn at once.
 export class Raster {
   constructor(width, height) { // pixels of the screen
     this.width = width;

@@ -33,7 +33,7 @@ export class Robot {
     this.joints = [];
     this.signals = [];
     this.picked = "";
-    this.drawn = ""; // the values of the picture
+    this.drawn = ""; // the values that are drawn
     this.description = ""; // of the robot and its signals, as it was received
     this.form = ""; // the part of it that is drawn
     this.frames = 0; // drawn so far

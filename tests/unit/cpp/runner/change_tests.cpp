@@ -371,7 +371,7 @@ TEST_F(Change, RingOfALargeTypeIsBoundedInBytes) {
     });
     load(definition("Camera", "B"));
     step(40);
-    const auto tap = bridge().tap("/picture");
+    const auto tap = bridge().tap("/image");
     ASSERT_NE(tap, nullptr);
     EXPECT_GE(tap->dropped(), 20U);
     EXPECT_TRUE(tap->pop([](const std::uint8_t*, std::uint32_t size, std::int64_t) {
@@ -387,7 +387,7 @@ TEST_F(Change, RingsAreBoundedInTotal) {
     });
     const auto camera = [](int number) {
         ComponentDefinition each = definition("Camera", "C" + std::to_string(number));
-        each.remaps = {{"picture", "picture_" + std::to_string(number)}};
+        each.remaps = {{"image", "image_" + std::to_string(number)}};
         return each;
     };
     for (int number = 1; number <= 32; ++number) load(camera(number));
@@ -401,10 +401,10 @@ TEST_F(Change, RingsAreBoundedInTotal) {
         EXPECT_EQ(text.find('\n'), std::string::npos) << text;
     }
     EXPECT_EQ(order().size(), 32U);
-    EXPECT_EQ(bridge().tap("/picture_33"), nullptr);
+    EXPECT_EQ(bridge().tap("/image_33"), nullptr);
     unload("/C1");
     load(camera(33));
-    EXPECT_NE(bridge().tap("/picture_33"), nullptr);
+    EXPECT_NE(bridge().tap("/image_33"), nullptr);
 }
 
 }  // namespace

@@ -38,10 +38,10 @@ def test_the_text_lists_order_and_connections(loaded: Daemon) -> None:
 
 
 def test_drawings_show_every_component(loaded: Daemon, tmp_path: Path) -> None:
-    picture = tmp_path / "fig_1.svg"
-    done = loaded.ctl("graph", "-o", str(picture))
-    assert (done.returncode, done.stdout) == (0, f"{picture}: 5 components\n"), done.stderr
-    titles = [each.text for each in ElementTree.parse(picture).iter() if each.tag.endswith("title")]
+    drawing = tmp_path / "fig_1.svg"
+    done = loaded.ctl("graph", "-o", str(drawing))
+    assert (done.returncode, done.stdout) == (0, f"{drawing}: 5 components\n"), done.stderr
+    titles = [each.text for each in ElementTree.parse(drawing).iter() if each.tag.endswith("title")]
     assert {"/H1", "/F1", "/R1", "/R2", "/R3"} <= set(titles)
     assert "/R3->/H1" in titles
     assert loaded.ctl("graph", "-o", str(tmp_path / "fig_1.png")).returncode == 0
@@ -67,10 +67,10 @@ def test_large_graphs_can_be_drawn(client: rtcf.Client, daemon: Daemon, tmp_path
             for i in range(_MANY)
         ]
     )  # fmt: skip
-    picture = tmp_path / "many.svg"
-    done = daemon.ctl("graph", "-o", str(picture))
+    drawing = tmp_path / "many.svg"
+    done = daemon.ctl("graph", "-o", str(drawing))
     assert done.returncode == 0, done.stderr
-    titles = {each.text for each in ElementTree.parse(picture).iter() if each.tag.endswith("title")}
+    titles = {each.text for each in ElementTree.parse(drawing).iter() if each.tag.endswith("title")}
     assert {f"/arm{i // 40}/m{i}" for i in range(_MANY)} <= titles
 
 
@@ -79,10 +79,10 @@ def test_long_and_wide_graphs_fit_a_screen(
     client: rtcf.Client, daemon: Daemon, tmp_path: Path, name: str
 ) -> None:
     client.apply(graphs.GRAPHS[name])
-    picture = tmp_path / "large.svg"
-    done = daemon.ctl("graph", "-o", str(picture))
+    drawing = tmp_path / "large.svg"
+    done = daemon.ctl("graph", "-o", str(drawing))
     assert done.returncode == 0, done.stderr
-    root = ElementTree.parse(picture).getroot()
+    root = ElementTree.parse(drawing).getroot()
     wide, high = (float(root.get(each, "").removesuffix("pt")) for each in ("width", "height"))
     assert 0.4 < wide / high < 4 and wide < 4000
     titles = [each.text for each in root.iter() if each.tag.endswith("title")]
@@ -122,9 +122,9 @@ def test_a_short_chain_is_drawn_from_left_to_right(
     client: rtcf.Client, daemon: Daemon, tmp_path: Path
 ) -> None:
     client.apply(graphs.chain(8, closed=True))
-    picture = tmp_path / "short.svg"
-    assert daemon.ctl("graph", "-o", str(picture)).returncode == 0
-    root = ElementTree.parse(picture).getroot()
+    drawing = tmp_path / "short.svg"
+    assert daemon.ctl("graph", "-o", str(drawing)).returncode == 0
+    root = ElementTree.parse(drawing).getroot()
     boxes = dict(boxes_in(root))
     across = [boxes[graphs.name(number)][0] for number in range(8)]
     assert across == sorted(across)

@@ -4,7 +4,7 @@ import math
 
 from hypothesis import given
 from hypothesis import strategies as st
-from rtcfctl.terminal.pictures import Curves, spark
+from rtcfctl.terminal.drawings import Curves, spark
 
 
 def test_a_row_of_blocks_begins_at_zero() -> None:
