@@ -40,7 +40,7 @@ class Holder:
 
         return wait_for(come, f"a message {kind}")[0]
 
-    def refusal(self) -> rtcf.RtcfError:
+    def wait_for_error(self) -> rtcf.RtcfError:
         """Return the error of the failed call."""
         error: rtcf.RtcfError = wait_for(lambda: self.error, "an error")
         return error

@@ -65,7 +65,7 @@ class Perf:
         self.preempted_by_own = 0
 
     @staticmethod
-    def refusal(thread: int) -> str:
+    def error(thread: int) -> str:
         """Return the reason why perf cannot count; empty if it can."""
         if shutil.which("perf") is None:
             return "there is no perf (package linux-perf)"

@@ -147,17 +147,17 @@ def untrusted(service: Service, make: str) -> str:
     ],
 )  # fmt: skip
 def test_writable_code_is_rejected(service: Service, make: str, said: str) -> None:
-    refusal = untrusted(service, make)
-    assert said in refusal
-    assert len(refusal.splitlines()) == 1
+    error = untrusted(service, make)
+    assert said in error
+    assert len(error.splitlines()) == 1
     # The advice must not widen rights, and must not touch /tmp or a home.
-    assert "chmod" not in refusal and "chown" not in refusal
+    assert "chmod" not in error and "chown" not in error
 
 
 def test_code_linked_to_trusted_folders_is_loaded(service: Service) -> None:
-    refusal = untrusted(service, "{ln} -Wl,-rpath,/srv/root -L/srv/root -lgood -lm")
+    error = untrusted(service, "{ln} -Wl,-rpath,/srv/root -L/srv/root -lgood -lm")
     # It has no components, but it was loaded.
-    assert "has no components" in refusal
+    assert "has no components" in error
 
 
 @pytest.mark.parametrize("name", ["../etc", "/etc", "..", "rtcf_examples/../x", "a b", "a\n"])

@@ -100,8 +100,8 @@ def test_a_start_requested_before_the_stop_starts_nothing(
         wait_for(lambda: _connections(daemon) > 1, "the early start")
         assert daemon.ctl("stop").returncode == 0
         os.kill(daemon.pid, signal.SIGCONT)
-        complaint = early.communicate(timeout=60)[1]
-    assert (early.returncode, "repeat the request" in complaint) == (1, True), complaint
+        error = early.communicate(timeout=60)[1]
+    assert (early.returncode, "repeat the request" in error) == (1, True), error
     assert not runs(client)
 
 

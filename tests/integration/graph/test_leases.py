@@ -151,14 +151,16 @@ def test_a_holder_gets_the_log_records_of_its_component_only(
 
 def test_a_rejected_load_leaves_nothing_behind(client: rtcf.Client, daemon: Daemon) -> None:
     client.load(counter("there"))
-    refusal = lease(client, counter("there")).refusal()
-    assert "/there exists already" in str(refusal)
-    refusal = lease(client, rtcf.component("rtcf_test", "FailingConfigure", name="bad")).refusal()
-    assert "configure" in str(refusal)
-    refusal = lease(client, rtcf.component("rtcf_examples", "Mino", name="x")).refusal()
-    assert 'did you mean "Mimo"' in str(refusal)
-    refusal = lease(client, counter("new"), hold="nobody's").refusal()
-    assert "the holder of runner rt_runner has ended" in str(refusal)
+    error = lease(client, counter("there")).wait_for_error()
+    assert "/there exists already" in str(error)
+    error = lease(
+        client, rtcf.component("rtcf_test", "FailingConfigure", name="bad")
+    ).wait_for_error()
+    assert "configure" in str(error)
+    error = lease(client, rtcf.component("rtcf_examples", "Mino", name="x")).wait_for_error()
+    assert 'did you mean "Mimo"' in str(error)
+    error = lease(client, counter("new"), hold="nobody's").wait_for_error()
+    assert "the holder of runner rt_runner has ended" in str(error)
     assert names(client) == ["/there"]
     assert saved(daemon)["leased"] == {}
 
@@ -180,8 +182,8 @@ def test_a_loop_outlives_rtcfd_and_returning_holders_keep_their_leases(
         assert iteration(again, "back") > before
         runner = held(again, "back", "1", attach=True)
         holder = leased(again, counter("comes_back"), runner="back", attach=True)
-        refusal = lease(again, counter("comes_back"), runner="back", attach=True).refusal()
-        assert "keeps no /comes_back" in str(refusal)
+        error = lease(again, counter("comes_back"), runner="back", attach=True).wait_for_error()
+        assert "keeps no /comes_back" in str(error)
         assert sorted(again.get_order("back")) == ["/comes_back", "/stays_away"]
         # After 10 s of waiting for the other lease holders.
         wait_for(lambda: again.get_order("back") == ["/comes_back"], "the unload of the component")
@@ -217,16 +219,16 @@ def test_a_leased_runner_gets_its_own_settings_back(client: rtcf.Client, daemon:
 
 def test_a_runner_in_use_cannot_be_leased(client: rtcf.Client) -> None:
     client.load(counter("own"))
-    assert "has components of its own (/own)" in str(hold(client).refusal())
+    assert "has components of its own (/own)" in str(hold(client).wait_for_error())
     client.unload(["own"])
     client.start()
-    assert "the loop of runner rt_runner runs" in str(hold(client).refusal())
+    assert "the loop of runner rt_runner runs" in str(hold(client).wait_for_error())
     client.stop()
     holder = held(client)
-    assert "is held by holder token" in str(hold(client, token="other").refusal())
+    assert "is held by holder token" in str(hold(client, token="other").wait_for_error())
     settings = runner_pb2.RunnerSettings(ros=runner_pb2.RosSettings(whitelist="*.ros.*"))
-    refusal = hold(client, "another", "other", settings).refusal()
-    assert "whitelist" in str(refusal) and "*.ros.*" in str(refusal)
+    error = hold(client, "another", "other", settings).wait_for_error()
+    assert "whitelist" in str(error) and "*.ros.*" in str(error)
     assert [each.runner for each in client.get_status().runners] == ["rt_runner"]
     holder.end()
 

@@ -82,7 +82,7 @@ class Soak:
     daemon: Daemon
     client: rtcf.Client
     changes: int = 0
-    refusals: int = 0
+    rejections: int = 0
     accepted: Counter[str] = field(default_factory=Counter)  # by kind
     resident_kb: list[int] = field(default_factory=list)  # of the executor, after each run
 
@@ -252,7 +252,7 @@ class GraphMachine(stateful.RuleBasedStateMachine):
         try:
             graph = expect()
         except model.Refused:
-            self.soak.refusals += 1
+            self.soak.rejections += 1
             before = self._generation()
             with pytest.raises(rtcf.RefusedError) as refused:
                 change()
@@ -349,12 +349,13 @@ def test_random_changes_leave_the_graph_of_the_model(soak: Soak, runs: int, chan
         ),
     )
     print(
-        f"{soak.changes} changes, {soak.refusals} of them refused; accepted: {dict(soak.accepted)}"
+        f"{soak.changes} changes, {soak.rejections} of them rejected; "
+        f"accepted: {dict(soak.accepted)}"
     )
     runs_at = {kb: run for run, kb in reversed(list(enumerate(soak.resident_kb)))}
     print(f"memory of the executor, KiB, and since which run: {runs_at}")
     assert soak.changes >= changes
-    assert soak.refusals > 0
+    assert soak.rejections > 0
     kinds = {"load", "unload", "replacement", "rewire", "breaks", "parameters", "apply"}
     assert soak.accepted.keys() == kinds, "each kind of change succeeded at least once"
     # All tables reach their size within some hundred changes.

@@ -80,9 +80,9 @@ def test_the_loop_has_no_page_fault_and_waits_once_per_cycle(mapped: Mapped) -> 
 
 
 def test_perf_counts_one_system_call_a_cycle(mapped: Mapped, tmp_path: Path) -> None:
-    if refusal := Perf.refusal(mapped.thread):
+    if error := Perf.error(mapped.thread):
         # The other tests of this file, which need no permission, must suffice.
-        warnings.warn(f"perf may not count here: {refusal}", stacklevel=1)
+        warnings.warn(f"perf may not count here: {error}", stacklevel=1)
         assert mapped.run(CYCLES) >= CYCLES
         return
     at_most = iteration(mapped.client)

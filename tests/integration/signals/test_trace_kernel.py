@@ -84,13 +84,13 @@ def test_a_thread_of_higher_priority_is_named(
         )  # fmt: skip
         assert hog.wait(60) == 0
         tracing.send_signal(signal.SIGINT)
-        said, complaint = tracing.communicate(timeout=60)
+        said, error = tracing.communicate(timeout=60)
     finally:
         tracing.kill()
         tracing.wait()
         busy.terminate()
         busy.wait()
-    assert tracing.returncode == 0, complaint
+    assert tracing.returncode == 0, error
     told = json.loads(said)
     assert len(told["kernel"]) == told["late"] > 0
     hogs = [each for each in told["kernel"] if "thread the hog (pid " in each["instead"]]

@@ -41,7 +41,7 @@ SESSION = [
 ]
 
 # Events in a loop with faults, and rejected commands; each fault is different.
-TROUBLE = [
+FAULTY_SESSION = [
     "load rtcf_faults NotFinite --name odd --param after:=3",
     "load rtcf_faults Throws --name jumps --param after:=3 --optional",
     "status",
@@ -104,7 +104,7 @@ def test_no_answer_repeats_a_line(tmp_path: Path) -> None:
     daemon.start()
     try:
         # `types` lists the same missing library several times.
-        for command in [each for each in SESSION[:-2] if each != "types"] + TROUBLE:
+        for command in [each for each in SESSION[:-2] if each != "types"] + FAULTY_SESSION:
             done = daemon.ctl("-v", *shlex.split(command))
             answer = f"{done.stdout}\n{done.stderr}"
             clauses = [each.strip(" !") for each in CLAUSES.split(answer)]

@@ -148,8 +148,8 @@ def traced(folder: Path) -> Iterator[list[dict[str, object]]]:
     found: list[dict[str, object]] = []
     yield found
     tracing.send_signal(signal.SIGINT)
-    said, complaint = tracing.communicate(timeout=600)
-    assert tracing.returncode == 0, complaint
+    said, error = tracing.communicate(timeout=600)
+    assert tracing.returncode == 0, error
     found += json.loads(said)["kernel"]
 
 

@@ -28,7 +28,7 @@ class Failing final : public Component {
 };
 
 TEST(Fail, HasTheGivenText) {
-    const auto refusal = [](int how) -> std::string {
+    const auto errorOf = [](int how) -> std::string {
         try {
             const Bench bench("Failing", {{"how", std::int64_t{how}}});
         } catch (const std::runtime_error& error) {
@@ -36,10 +36,10 @@ TEST(Fail, HasTheGivenText) {
         }
         return {};
     };
-    EXPECT_EQ(refusal(0), "");
-    EXPECT_EQ(refusal(1), "configure failed: nothing {but} a brace");
-    EXPECT_EQ(refusal(2), "configure failed: two {} of {}") << "the arguments are formatted";
-    EXPECT_EQ(refusal(3), "configure failed: no reply from drive in 0.2 s");
+    EXPECT_EQ(errorOf(0), "");
+    EXPECT_EQ(errorOf(1), "configure failed: nothing {but} a brace");
+    EXPECT_EQ(errorOf(2), "configure failed: two {} of {}") << "the arguments are formatted";
+    EXPECT_EQ(errorOf(3), "configure failed: no reply from drive in 0.2 s");
 }
 
 }  // namespace

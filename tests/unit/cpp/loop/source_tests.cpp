@@ -100,7 +100,7 @@ TEST_F(SourceTest, ClockPacesTheLoopWithoutIt) {
 
 TEST_F(SourceTest, TwoAreRejectedByName) {
     startSilent();
-    const std::string text = refusal([&] { load(device("E")); });
+    const std::string text = errorOf([&] { load(device("E")); });
     EXPECT_NE(text.find("/D and /E both pace the loop"), std::string::npos) << text;
     EXPECT_EQ(order(), std::vector<std::string>{"/D"});
     replace("/D", device("E"));

@@ -37,7 +37,7 @@ TEST(NamePattern, AcceptsThePapersWhitelist) {
 
 // An error names the setting, the expression and the reason.
 TEST(NamePattern, BadExpressionIsRejectedWithTheReason) {
-    const auto refusal = [](const std::string& expression) -> std::string {
+    const auto errorOf = [](const std::string& expression) -> std::string {
         try {
             const NamePattern pattern("ignore of /H1", expression);
             return {};
@@ -46,12 +46,12 @@ TEST(NamePattern, BadExpressionIsRejectedWithTheReason) {
         }
     };
     for (const char* expression : {"*R3", "(a", "[a", "a{2", "a\\"}) {
-        const std::string text = refusal(expression);
+        const std::string text = errorOf(expression);
         EXPECT_NE(text.find("ignore of /H1"), std::string::npos) << expression;
         EXPECT_NE(text.find(std::string("'") + expression + "'"), std::string::npos) << text;
     }
-    EXPECT_NE(refusal("*R3").find("nothing before it"), std::string::npos);
-    EXPECT_NE(refusal("(a").find("not closed"), std::string::npos);
+    EXPECT_NE(errorOf("*R3").find("nothing before it"), std::string::npos);
+    EXPECT_NE(errorOf("(a").find("not closed"), std::string::npos);
 }
 
 // libstdc++ would recurse once per character, or try all alternatives; the executor's threads have

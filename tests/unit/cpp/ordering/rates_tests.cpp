@@ -109,19 +109,19 @@ TEST_F(Rates, IncompatibleRateIsRejectedWithTheNearestCompatibleOne) {
     load(watch("A", 4));
     load(watch("B", 12));
     const std::vector<std::string> before = order();
-    const std::string text = refusal([&] { load(watch("C", 5)); });
+    const std::string text = errorOf([&] { load(watch("C", 5)); });
     EXPECT_NE(text.find("/C runs every 5 cycles"), std::string::npos) << text;
     EXPECT_NE(text.find("--every 4 or 12"), std::string::npos) << text;
     EXPECT_EQ(order(), before);
-    EXPECT_EQ(refusal([&] { load(watch("C", 4)); }), "");
-    EXPECT_EQ(refusal([&] { load(watch("D", 12)); }), "");
-    EXPECT_EQ(refusal([&] { load(watch("E", 1)); }), "");
+    EXPECT_EQ(errorOf([&] { load(watch("C", 4)); }), "");
+    EXPECT_EQ(errorOf([&] { load(watch("D", 12)); }), "");
+    EXPECT_EQ(errorOf([&] { load(watch("E", 1)); }), "");
 }
 
 TEST_F(Rates, ErrorNamesTheReplacementNotTheOthers) {
     load(watch("A", 2));
     load(watch("B", 6));
-    const std::string text = refusal([&] { replace("/A", watch("A", 4)); });
+    const std::string text = errorOf([&] { replace("/A", watch("A", 4)); });
     EXPECT_NE(text.find("/A runs every 4 cycles"), std::string::npos) << text;
     EXPECT_NE(text.find("--every 3 or 6"), std::string::npos) << text;
 }
@@ -131,7 +131,7 @@ TEST_F(Rates, AdviceOfAnErrorIsAccepted) {
     for (std::uint32_t first = 2; first <= 24; first += 2) {
         load(watch("A", first));
         for (std::uint32_t second = 2; second <= 24; ++second) {
-            const std::string text = refusal([&] { load(watch("B", second)); });
+            const std::string text = errorOf([&] { load(watch("B", second)); });
             const bool harmonic = first % second == 0 || second % first == 0;
             ASSERT_EQ(text.empty(), harmonic) << first << " and " << second << ": " << text;
             if (harmonic) {
@@ -140,7 +140,7 @@ TEST_F(Rates, AdviceOfAnErrorIsAccepted) {
             }
             const std::size_t at = text.find("--every ") + std::string("--every ").size();
             const auto advised = static_cast<std::uint32_t>(std::stoul(text.substr(at)));
-            ASSERT_EQ(refusal([&] { load(watch("B", advised)); }), "") << text;
+            ASSERT_EQ(errorOf([&] { load(watch("B", advised)); }), "") << text;
             unload("/B");
         }
         unload("/A");

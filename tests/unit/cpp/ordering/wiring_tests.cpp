@@ -63,7 +63,7 @@ TEST_F(WiringTest, BlacklistOverridesTheWhitelist) {
 }
 
 TEST_F(WiringTest, TwoWritersOfAReadNameAreRejectedByName) {
-    const std::string text = refusalOf(graphOf(
+    const std::string text = errorOf(graphOf(
         {mimo("A", {{"out1", "x"}, {"out2", "a2"}}), mimo("B", {{"out1", "b1"}, {"out2", "x"}}),
          mimo("C", {{"in1", "x"}, {"out1", "c1"}, {"out2", "c2"}})}));
     for (const char* part : {"/x has two writers", "/A.out1", "/B.out2", "/C.in1"}) {
@@ -84,9 +84,9 @@ TEST_F(WiringTest, SeveralMayWriteAnUnreadNameWithANoteForATopic) {
 }
 
 TEST_F(WiringTest, DifferentTypesAreRejectedWithBothPortsAndTypes) {
-    const std::string text = refusalOf(
-        graphOf({make(kUnitComponents, "VectorSource", "V", {{"out", "x"}}),
-                 mimo("M", {{"in1", "x"}, {"in2", "i2"}, {"in3", "i3"}, {"in4", "i4"}})}));
+    const std::string text =
+        errorOf(graphOf({make(kUnitComponents, "VectorSource", "V", {{"out", "x"}}),
+                         mimo("M", {{"in1", "x"}, {"in2", "i2"}, {"in3", "i3"}, {"in4", "i4"}})}));
     for (const char* part : {"/x", "/V.out is Eigen::Vector3d", "/M.in1 is std_msgs/Float64"}) {
         EXPECT_NE(text.find(part), std::string::npos) << text;
     }
@@ -95,7 +95,7 @@ TEST_F(WiringTest, DifferentTypesAreRejectedWithBothPortsAndTypes) {
 TEST_F(WiringTest, LoopIsRejectedPortByPortWithCommandsThatBreakIt) {
     auto instances = fig1();
     instances[0] = mimo("H1", {{"in1", "R3_G2H1"}, {"out1", "H1_F1"}, {"out2", "H1_R1R2"}});
-    const std::string text = refusalOf(graphOf(instances));
+    const std::string text = errorOf(graphOf(instances));
     EXPECT_NE(text.find("the connections form a loop: /"), std::string::npos) << text;
     EXPECT_NE(text.find("/R3.out1 → /H1.in1"), std::string::npos) << text;
     EXPECT_NE(text.find("`rtcfctl break"), std::string::npos) << text;
@@ -104,9 +104,9 @@ TEST_F(WiringTest, LoopIsRejectedPortByPortWithCommandsThatBreakIt) {
 
 TEST_F(WiringTest, LoopThroughAComponentBeingLoadedNamesItsOption) {
     const std::string text =
-        refusalOf(graphOf({mimo("A", {{"in1", "b"}, {"out1", "a"}, {"out2", "a2"}}),
-                           mimo("B", {{"in1", "a"}, {"out1", "b"}, {"out2", "b2"}})}),
-                  "/B");
+        errorOf(graphOf({mimo("A", {{"in1", "b"}, {"out1", "a"}, {"out2", "a2"}}),
+                         mimo("B", {{"in1", "a"}, {"out1", "b"}, {"out2", "b2"}})}),
+                "/B");
     EXPECT_NE(text.find("loading B with `--break in1`"), std::string::npos) << text;
     EXPECT_NE(text.find("`rtcfctl break A.in1`"), std::string::npos) << text;
 }
@@ -122,16 +122,16 @@ TEST_F(WiringTest, IgnoredConnectionIsALoopBreak) {
 TEST_F(WiringTest, BreakOfOneInputIsALoopBreak) {
     Graph graph = graphOf({mimo("A", {{"in1", "b"}, {"out1", "a"}, {"out2", "a2"}}),
                            mimo("B", {{"in1", "a"}, {"out1", "b"}, {"out2", "b2"}})});
-    EXPECT_NE(refusalOf(graph), "");
+    EXPECT_NE(errorOf(graph), "");
     graph.setBreak("/B", "in1", true);
     EXPECT_EQ(orderOf(graph), (std::vector<std::string>{"/B", "/A"}));
     graph.setBreak("/B", "in1", false);
-    EXPECT_NE(refusalOf(graph), "");
+    EXPECT_NE(errorOf(graph), "");
 }
 
 TEST_F(WiringTest, ConnectionOfAComponentToItselfIsALoop) {
     Graph graph = graphOf({mimo("A", {{"in1", "x"}, {"out1", "x"}})});
-    EXPECT_NE(refusalOf(graph).find("/A.out1 → /A.in1"), std::string::npos);
+    EXPECT_NE(errorOf(graph).find("/A.out1 → /A.in1"), std::string::npos);
     graph.setBreak("/A", "in1", true);
     EXPECT_EQ(orderOf(graph), std::vector<std::string>{"/A"});
 }

@@ -16,7 +16,7 @@ using namespace executor;
 
 const std::string kFolder = RTCF_UNIT_COMPONENTS "/";
 
-std::string refusalOf(const std::string& path) {
+std::string errorOf(const std::string& path) {
     try {
         LibraryStore().open(path);
         return {};
@@ -44,15 +44,15 @@ TEST(Library, ListsItsTypesByName) {
 }
 
 TEST(Library, MissingFileIsNamed) {
-    EXPECT_EQ(refusalOf("/nowhere/x.so"), "library /nowhere/x.so: No such file or directory");
+    EXPECT_EQ(errorOf("/nowhere/x.so"), "library /nowhere/x.so: No such file or directory");
 }
 
 TEST(Library, FolderIsRejected) {
-    EXPECT_NE(refusalOf("/tmp").find("not a regular file"), std::string::npos);
+    EXPECT_NE(errorOf("/tmp").find("not a regular file"), std::string::npos);
 }
 
 TEST(Library, MissingSymbolIsNamed) {
-    const std::string text = refusalOf(kFolder + "missing_symbol.so");
+    const std::string text = errorOf(kFolder + "missing_symbol.so");
     EXPECT_NE(text.find("missing_symbol.so: does not load"), std::string::npos) << text;
     EXPECT_NE(text.find("undefined symbol: rtcf_unit_test_undefined_function"), std::string::npos)
         << text;
@@ -61,13 +61,13 @@ TEST(Library, MissingSymbolIsNamed) {
 }
 
 TEST(Library, WithoutEntryPointIsRejected) {
-    const std::string text = refusalOf(kFolder + "no_entry_point.so");
+    const std::string text = errorOf(kFolder + "no_entry_point.so");
     EXPECT_NE(text.find("has no components"), std::string::npos) << text;
     EXPECT_NE(text.find("rtcf_add_components()"), std::string::npos) << text;
 }
 
 TEST(Library, OfAnotherAbiIsRejectedWithBothNumbers) {
-    const std::string text = refusalOf(kFolder + "wrong_abi.so");
+    const std::string text = errorOf(kFolder + "wrong_abi.so");
     for (const std::string& part :
          {"ABI " + std::to_string(AbiProbe::fingerprint(4711)),
           "this executor has " + std::to_string(AbiProbe::fingerprint(RTCF_ABI_VERSION))})
@@ -76,19 +76,19 @@ TEST(Library, OfAnotherAbiIsRejectedWithBothNumbers) {
 
 // The same headers and ABI number; only the compiler options differ.
 TEST(Library, OfAnotherLayoutIsRejected) {
-    const std::string text = refusalOf(kFolder + "other_layout.so");
+    const std::string text = errorOf(kFolder + "other_layout.so");
     EXPECT_NE(text.find("was built for component ABI"), std::string::npos) << text;
 }
 
 TEST(Library, WithThreadLocalsThatAllocateInTheCycleIsRejected) {
-    const std::string text = refusalOf(kFolder + "thread_local_lazy.so");
+    const std::string text = errorOf(kFolder + "thread_local_lazy.so");
     EXPECT_NE(text.find("thread_local"), std::string::npos) << text;
     EXPECT_NE(text.find("-ftls-model=initial-exec"), std::string::npos) << text;
-    EXPECT_EQ(refusalOf(kFolder + "thread_local_static.so"), "");
+    EXPECT_EQ(errorOf(kFolder + "thread_local_static.so"), "");
 }
 
 TEST(Library, InvalidLibraryIsRejected) {
-    const std::string text = refusalOf("/etc/passwd");
+    const std::string text = errorOf("/etc/passwd");
     EXPECT_NE(text.find("does not load"), std::string::npos) << text;
 }
 
@@ -107,8 +107,8 @@ TEST(Library, RejectedLibraryLeavesNothingOpen) {
         return count;
     };
     const auto before = open_files();
-    EXPECT_NE(refusalOf(kFolder + "no_entry_point.so"), "");
-    EXPECT_NE(refusalOf(kFolder + "missing_symbol.so"), "");
+    EXPECT_NE(errorOf(kFolder + "no_entry_point.so"), "");
+    EXPECT_NE(errorOf(kFolder + "missing_symbol.so"), "");
     EXPECT_EQ(open_files(), before);
     EXPECT_EQ(mapped(), 0);
 }

@@ -56,13 +56,13 @@ TEST_F(RttCompat, PortsOfConstructorAndConfigureHookExist) {
 
 TEST_F(RttCompat, PortsAreFrozenAfterConfigureHook) {
     loadOld("TooLate", "L");
-    EXPECT_EQ(refusal([this] { start(); }),
+    EXPECT_EQ(errorOf([this] { start(); }),
               "/L (rtcf_unit_test/TooLate): start failed: it threw: port 'late' declared after "
               "configure()");
 }
 
 TEST_F(RttCompat, PortAddedTwiceIsRejected) {
-    EXPECT_EQ(refusal([this] { loadOld("Twice", "T"); }),
+    EXPECT_EQ(errorOf([this] { loadOld("Twice", "T"); }),
               "/T (rtcf_unit_test/Twice): configure failed: it threw: port 'port' is added twice");
 }
 
@@ -181,14 +181,14 @@ TEST_F(RttCompat, MessagesThatFitTheSampleAreWritten) {
 }
 
 TEST_F(RttCompat, ExtensionInAConstructorIsRejected) {
-    EXPECT_EQ(refusal([this] { loadOld("TooEarly", "E"); }),
+    EXPECT_EQ(errorOf([this] { loadOld("TooEarly", "E"); }),
               "/E (rtcf_unit_test/TooEarly): constructor failed: it threw: RtcfExtension does not "
               "work in a constructor: use it from configureHook() on, in a component that "
               "ORO_CREATE_COMPONENT registers");
 }
 
 TEST_F(RttCompat, NodeHandleWithoutANodeIsRejected) {
-    const std::string why = refusal([this] { loadOld("NeedsRos", "N"); });
+    const std::string why = errorOf([this] { loadOld("NeedsRos", "N"); });
     EXPECT_NE(why.find("configure failed"), std::string::npos) << why;
     EXPECT_NE(why.find("nodeHandle()"), std::string::npos) << why;
 }
@@ -221,7 +221,7 @@ TEST_F(RttCompat, LogsOfEachKindArriveIncludingConstructors) {
 }
 
 TEST_F(RttCompat, LogOfAFailingConstructorArrives) {
-    EXPECT_NE(refusal([this] { loadApi("Unlucky", "U"); }).find("no luck"), std::string::npos);
+    EXPECT_NE(errorOf([this] { loadApi("Unlucky", "U"); }).find("no luck"), std::string::npos);
     EXPECT_TRUE(hasSaid("/U", "about to fail"));
 }
 
@@ -265,7 +265,7 @@ TEST_F(RttCompat, PropertiesAreParametersThatSetTheirVariables) {
 }
 
 TEST_F(RttCompat, PropertiesAfterTheConstructorAreRejected) {
-    EXPECT_EQ(refusal([this] { loadApi("LateProperty", "L"); }),
+    EXPECT_EQ(errorOf([this] { loadApi("LateProperty", "L"); }),
               "/L (rtcf_unit_test/LateProperty): configure failed: it threw: property 'late' is "
               "added too late: add it in the constructor");
 }

@@ -62,7 +62,7 @@ TEST_F(Change, TypesThatAllocateWhenPublishedAreRejected) {
     startWithA();
     const auto order_before = order();
     const auto generation_before = generation();
-    EXPECT_EQ(refusal([&] { load(definition("Tracer", "T")); }),
+    EXPECT_EQ(errorOf([&] { load(definition("Tracer", "T")); }),
               "/T.trace cannot be published as /trace: values of rtcf_unit_test/Trace own memory, "
               "and so do messages of std_msgs/Float64MultiArray, which would be allocated in the "
               "cycle; exclude /trace from the whitelist, or store the values in a std::array");
@@ -72,7 +72,7 @@ TEST_F(Change, TypesThatAllocateWhenPublishedAreRejected) {
     load(elsewhere);
     EXPECT_TRUE(runs());
     const std::string why =
-        refusal([&] { configure([](RunnerSettings& settings) { settings.whitelist = "/kept"; }); });
+        errorOf([&] { configure([](RunnerSettings& settings) { settings.whitelist = "/kept"; }); });
     EXPECT_NE(why.find("/T.trace cannot be published as /kept"), std::string::npos) << why;
     EXPECT_TRUE(runs());
 }
@@ -138,7 +138,7 @@ TEST_F(Change, RejectedReplacementLeavesTheOldOneRunning) {
     const auto before = generation();
     ComponentDefinition bad = recorder("A");
     bad.parameters = {{"refuses", std::string("start")}};
-    EXPECT_NE(refusal([&] { replace("/A", bad); }), "");
+    EXPECT_NE(errorOf([&] { replace("/A", bad); }), "");
     expectUnchanged({"/A"}, before);
     EXPECT_EQ(journal().count("/A takeOver"), 0U);
     EXPECT_EQ(journal().count("/A cleanup"), 1U) << "of the new component";
@@ -150,7 +150,7 @@ TEST_F(Change, FailingConfigureIsReportedAndUndone) {
     const auto before = generation();
     ComponentDefinition bad = recorder("B");
     bad.parameters = {{"refuses", std::string("configure")}};
-    EXPECT_EQ(refusal([&] { load(bad); }),
+    EXPECT_EQ(errorOf([&] { load(bad); }),
               "/B (rtcf_unit_test/Recorder): configure failed: told to refuse configure");
     expectUnchanged({"/A"}, before);
     EXPECT_EQ(journal().count("/B cleanup"), 1U);
@@ -162,7 +162,7 @@ TEST_F(Change, ThrowingConfigureIsReportedAndUndone) {
     const auto before = generation();
     ComponentDefinition bad = recorder("B");
     bad.parameters = {{"throws", std::string("configure")}};
-    EXPECT_EQ(refusal([&] { load(bad); }),
+    EXPECT_EQ(errorOf([&] { load(bad); }),
               "/B (rtcf_unit_test/Recorder): configure failed: it threw: as told");
     expectUnchanged({"/A"}, before);
     EXPECT_EQ(journal().count("/B cleanup"), 1U);
@@ -173,7 +173,7 @@ TEST_F(Change, FailingStartIsReportedAndUndone) {
     const auto before = generation();
     ComponentDefinition bad = recorder("B");
     bad.parameters = {{"refuses", std::string("start")}};
-    EXPECT_NE(refusal([&] { load(bad); }).find("start failed"), std::string::npos);
+    EXPECT_NE(errorOf([&] { load(bad); }).find("start failed"), std::string::npos);
     expectUnchanged({"/A"}, before);
     EXPECT_EQ(journal().count("/B cleanup"), 1U);
     EXPECT_EQ(journal().count("/B stop"), 0U) << "it was not started";
@@ -185,7 +185,7 @@ TEST_F(Change, LoopOfConnectionsIsRejectedAndTheNewComponentCleanedUpOnce) {
     const auto before = generation();
     ComponentDefinition closing = recorder("B");
     closing.remaps = {{"in", "A_out"}, {"out", "A_in"}};
-    const std::string text = refusal([&] { load(closing); });
+    const std::string text = errorOf([&] { load(closing); });
     EXPECT_NE(text.find("the connections form a loop"), std::string::npos) << text;
     expectUnchanged({"/A"}, before);
     EXPECT_EQ(journal().count("/B configure"), 1U);
@@ -201,7 +201,7 @@ TEST_F(Change, UnbreakThatWouldCloseALoopIsRejected) {
     load(closing);
     EXPECT_EQ(order(), (std::vector<std::string>{"/B", "/A"}));
     const auto before = generation();
-    EXPECT_NE(refusal([&] { setBreak("/B", "in", false); }), "");
+    EXPECT_NE(errorOf([&] { setBreak("/B", "in", false); }), "");
     expectUnchanged({"/B", "/A"}, before);
 }
 
@@ -222,14 +222,14 @@ TEST_F(Change, BreaksChangeTheOrderOfARunningLoop) {
 TEST_F(Change, TakenNameIsRejectedBeforeConstruction) {
     startWithA();
     const auto before = generation();
-    const std::string text = refusal([&] { load(recorder("A")); });
+    const std::string text = errorOf([&] { load(recorder("A")); });
     EXPECT_NE(text.find("/A is loaded already"), std::string::npos) << text;
     EXPECT_EQ(journal().count("/A configure"), 1U);
     expectUnchanged({"/A"}, before);
 }
 
 TEST_F(Change, UnknownTypeIsRejectedWithTheExistingTypes) {
-    const std::string text = refusal([&] { load(definition("Nothing", "N")); });
+    const std::string text = errorOf([&] { load(definition("Nothing", "N")); });
     EXPECT_NE(text.find("no component type Nothing; it has"), std::string::npos) << text;
     EXPECT_NE(text.find("Recorder"), std::string::npos) << text;
 }
@@ -238,7 +238,7 @@ TEST_F(Change, BadLoadTimeParameterIsRejectedBeforeConfigure) {
     startWithA();
     ComponentDefinition bad = recorder("B");
     bad.parameters = {{"gain", 11.0}};
-    EXPECT_EQ(refusal([&] { load(bad); }), "/B: parameter gain = 11 is above its maximum 10 ");
+    EXPECT_EQ(errorOf([&] { load(bad); }), "/B: parameter gain = 11 is above its maximum 10 ");
     EXPECT_EQ(journal().count("/B configure"), 0U);
 }
 
@@ -264,10 +264,10 @@ TEST_F(Change, ValuesOfParametersNeedNoNewSchedule) {
 TEST_F(Change, BatchWithABadValueSetsNothing) {
     startWithA();
     const std::string text =
-        refusal([&] { setParameters("/A", {{"gain", 2.0}, {"throws_at", 1.5}}); });
+        errorOf([&] { setParameters("/A", {{"gain", 2.0}, {"throws_at", 1.5}}); });
     EXPECT_NE(text.find("throws_at"), std::string::npos) << text;
     EXPECT_NE(
-        refusal([&] { setParameters("/A", {{"gain", 3.0}, {"nonsense", 1.0}}); }).find("nonsense"),
+        errorOf([&] { setParameters("/A", {{"gain", 3.0}, {"nonsense", 1.0}}); }).find("nonsense"),
         std::string::npos);
     ASSERT_TRUE(runs());
     stop();
@@ -311,10 +311,10 @@ TEST_F(Change, AFrequencyChangedBetweenStepsAppliesToTheNextOne) {
 
 TEST_F(Change, BadSettingsAreRejectedAndTheOldOnesStay) {
     startWithA();
-    EXPECT_NE(refusal([&] { configure([](RunnerSettings& s) { s.frequency_hz = std::nan(""); }); }),
+    EXPECT_NE(errorOf([&] { configure([](RunnerSettings& s) { s.frequency_hz = std::nan(""); }); }),
               "");
-    EXPECT_NE(refusal([&] { configure([](RunnerSettings& s) { s.whitelist = "("; }); }), "");
-    EXPECT_NE(refusal([&] { configure([](RunnerSettings& s) { s.loop.realtime.priority = 99; }); }),
+    EXPECT_NE(errorOf([&] { configure([](RunnerSettings& s) { s.whitelist = "("; }); }), "");
+    EXPECT_NE(errorOf([&] { configure([](RunnerSettings& s) { s.loop.realtime.priority = 99; }); }),
               "");
     EXPECT_EQ(runner().status().settings.frequency_hz, 1000.0);
     EXPECT_TRUE(runs());

@@ -84,7 +84,7 @@ TEST_F(Lifecycle, StartAndSafeFollowTheScheduleAndStopReversesIt) {
 TEST_F(Lifecycle, FailedStartStopsTheStartedComponents) {
     loadChain();
     setParameters("/A", {{"refuses", std::string("start")}});
-    const std::string text = refusal([this] { start(); });
+    const std::string text = errorOf([this] { start(); });
     EXPECT_NE(text.find("/A (rtcf_unit_test/Recorder): start failed: told to refuse start"),
               std::string::npos)
         << text;
@@ -185,7 +185,7 @@ TEST_F(Lifecycle, StopWhileStartHooksRunIsFinal) {
     ASSERT_TRUE(eventually([this] { return journal().count("/B start") == 1; }));
     runner().requestStop();
     journal().gate_open = true;
-    const std::string text = refusal([&] { starting.get(); });
+    const std::string text = errorOf([&] { starting.get(); });
     EXPECT_NE(text.find("a stop was requested after the start"), std::string::npos) << text;
     EXPECT_EQ(state(), RunnerState::Stopped);
     EXPECT_EQ(journal().count("/A update"), 0U);
@@ -207,8 +207,8 @@ TEST_F(Lifecycle, StopCancelsQueuedStartsAndSteps) {
     auto last = begin([this] { return runner().start([](const std::string&) {}); });
     journal().gate_open = true;
     loading.get();
-    EXPECT_NE(refusal([&] { starting.get(); }), "");
-    EXPECT_NE(refusal([&] { stepping.get(); }), "");
+    EXPECT_NE(errorOf([&] { starting.get(); }), "");
+    EXPECT_NE(errorOf([&] { stepping.get(); }), "");
     stopping.get();
     EXPECT_EQ(journal().count("/A safe"), 0U) << "no cycle had run";
     last.get();
@@ -237,7 +237,7 @@ TEST_F(Lifecycle, LogRecordsOfHooksHaveTheComponentsName) {
 TEST_F(Lifecycle, LogRecordsOfARejectedComponentAreNotLost) {
     ComponentDefinition chatter = definition("Chatter", "A");
     chatter.parameters = {{"refuses", true}};
-    EXPECT_NE(refusal([&] { load(chatter); }), "");
+    EXPECT_NE(errorOf([&] { load(chatter); }), "");
     std::vector<std::string> messages;
     for (const LogEntry& entry : logged()) {
         EXPECT_EQ(entry.component, "/A");

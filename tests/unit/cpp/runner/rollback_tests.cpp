@@ -41,7 +41,7 @@ class Rollback : public RunnerFixture {
 TEST_F(Rollback, LogRecordsOfARejectedComponentAreForwarded) {
     ComponentDefinition refused = definition("Recorder", "A");
     refused.parameters = {{"refuses", std::string("prepare")}};
-    EXPECT_NE(refusal([&] { load(refused); }).find("told to refuse prepare"), std::string::npos);
+    EXPECT_NE(errorOf([&] { load(refused); }).find("told to refuse prepare"), std::string::npos);
     const auto entries = handedOn();
     const auto said = std::find_if(entries.begin(), entries.end(), [](const LogEntry& entry) {
         return entry.message == "refuses to prepare";
@@ -69,9 +69,9 @@ TEST_F(Rollback, ParameterGoesBackToItsInfiniteDefault) {
 TEST_F(Rollback, OtherInfiniteValuesAreRejected) {
     load(definition("Recorder", "A"));
     const double infinity = std::numeric_limits<double>::infinity();
-    EXPECT_EQ(refusal([&] { setParameters("/A", {{"gain", infinity}}); }),
+    EXPECT_EQ(errorOf([&] { setParameters("/A", {{"gain", infinity}}); }),
               "/A: parameter gain must be finite");
-    EXPECT_EQ(refusal([&] { setParameters("/A", {{"limit", -infinity}}); }),
+    EXPECT_EQ(errorOf([&] { setParameters("/A", {{"limit", -infinity}}); }),
               "/A: parameter limit must be finite");
 }
 
@@ -79,7 +79,7 @@ TEST_F(Rollback, ReplayOfAGraphWithInfiniteDefaultStarts) {
     load(definition("Recorder", "A"));
     ReplayChunk chunk;
     chunk.begin = true;
-    EXPECT_EQ(refusal([&] {
+    EXPECT_EQ(errorOf([&] {
                   onGraphThread([&] { return runner().replay(chunk, [](const std::string&) {}); });
               }),
               "");

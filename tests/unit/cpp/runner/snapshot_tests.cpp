@@ -85,7 +85,7 @@ class Snapshots : public RunnerFixture {
     // Checks that it is rejected with these words, and changes nothing.
     void expectRefused(const Snapshot& snapshot, const std::string& words) {
         const std::string before = now();
-        const std::string text = refusal([&] { restore(snapshot); });
+        const std::string text = errorOf([&] { restore(snapshot); });
         EXPECT_NE(text.find(words), std::string::npos) << text;
         EXPECT_EQ(now(), before);
     }
@@ -328,7 +328,7 @@ TEST_F(Snapshots, OfAnotherBuildFitsByNameAndType) {
     const Snapshot snapshot = take();
     unload("/A");
     loadVersion(2);
-    const std::string text = refusal([&] { restore(snapshot); });
+    const std::string text = errorOf([&] { restore(snapshot); });
     for (const char* words :
          {"state /A.fresh is not in the snapshot", "state /A.gain was float and is double",
           "the graph has no state /A.old_name"})
@@ -347,7 +347,7 @@ TEST_F(Snapshots, TooLargeForACycleIsRejectedWithTheLimit) {
     ASSERT_TRUE(runs());
     for (const auto& work :
          std::vector<std::function<void()>>{[&] { take(); }, [&] { restore(snapshot); }}) {
-        const std::string text = refusal(work);
+        const std::string text = errorOf(work);
         EXPECT_NE(text.find("touches 2097"), std::string::npos) << text;
         EXPECT_NE(text.find("limit is 131072 at 1000 Hz"), std::string::npos) << text;
     }
@@ -363,7 +363,7 @@ TEST_F(Snapshots, LargerThanReservedIsRejectedInTheCycle) {
         std::string(8, '\0') + '\x9' + std::string(3, '\0') + std::string(72, '\1');
     start();
     ASSERT_TRUE(runs());
-    const std::string text = refusal([&] { restore(snapshot); });
+    const std::string text = errorOf([&] { restore(snapshot); });
     EXPECT_NE(text.find("the value of /P.listed has 84 bytes, its component has reserved 44"),
               std::string::npos)
         << text;
@@ -380,8 +380,8 @@ TEST_F(Snapshots, OfATakenOutComponentIsRejected) {
     load(throwing);
     const Snapshot sound = take();
     step(10);
-    EXPECT_NE(refusal([&] { take(); }).find("/C was taken out after a fault"), std::string::npos);
-    EXPECT_NE(refusal([&] { restore(sound); }).find("/C was taken out after a fault"),
+    EXPECT_NE(errorOf([&] { take(); }).find("/C was taken out after a fault"), std::string::npos);
+    EXPECT_NE(errorOf([&] { restore(sound); }).find("/C was taken out after a fault"),
               std::string::npos);
     unload("/C");
     restore(before);
@@ -497,7 +497,7 @@ TEST_F(Snapshots, RejectedOneStartsNothing) {
         if (name == "gain") value = 50.0;  // above its maximum
     }
     const std::uint32_t before = runner().numberedState().number;
-    EXPECT_NE(refusal([&] { restore(snapshot); }), "");
+    EXPECT_NE(errorOf([&] { restore(snapshot); }), "");
     EXPECT_EQ(runner().numberedState().number, before) << "it must not be started";
 }
 
@@ -506,7 +506,7 @@ TEST_F(Snapshots, AlteredFileIsRejected) {
     step(5);
     const std::string file = snapshotToFile(take());
     const auto told = [&](const std::string& bytes) {
-        return refusal([&] { snapshotFromFile(bytes); });
+        return errorOf([&] { snapshotFromFile(bytes); });
     };
     EXPECT_EQ(told(file), "");
     for (const std::string& none : {std::string(), std::string("RTCF"), std::string(100, 'x')})

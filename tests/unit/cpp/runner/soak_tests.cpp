@@ -54,7 +54,7 @@ class Soak : public RunnerFixture {
         const ComponentDefinition component = randomComponent(name);
         const std::vector<std::string> order_before = order();
         const std::uint64_t generation_before = generation();
-        const std::string why = refusal([&] {
+        const std::string why = errorOf([&] {
             switch (chance(8)) {
                 case 0:
                     unload("/" + name);
@@ -88,7 +88,7 @@ class Soak : public RunnerFixture {
             }
         });
         if (!why.empty()) {
-            ++refusals_;
+            ++rejections_;
             ASSERT_EQ(order(), order_before) << why;
             ASSERT_EQ(generation(), generation_before) << why;
             return;
@@ -169,7 +169,7 @@ class Soak : public RunnerFixture {
 
     std::mt19937 random_{7};
     Wanted wanted_;
-    int refusals_ = 0;
+    int rejections_ = 0;
     std::atomic<int> taken_{0};
 
    private:
@@ -192,8 +192,8 @@ TEST_F(Soak, RandomChangesCauseNoRace) {
     stop();
     EXPECT_EQ(value("/A", "out"), static_cast<double>(iteration()))
         << "unchanged components are updated in each cycle";
-    EXPECT_GT(refusals_, kChanges / 20);
-    EXPECT_LT(refusals_, kChanges * 3 / 4);
+    EXPECT_GT(rejections_, kChanges / 20);
+    EXPECT_LT(rejections_, kChanges * 3 / 4);
 }
 
 }  // namespace

@@ -110,16 +110,16 @@ TEST_F(DeclaredState, IsResetAtABoundaryOfARunningLoop) {
 
 TEST_F(DeclaredState, WithoutDeclarationCannotBeReset) {
     load(definition("Camera", "B"));
-    EXPECT_EQ(refusal([&] { onGraphThread([&] { return runner().reset("/B"); }); }),
+    EXPECT_EQ(errorOf([&] { onGraphThread([&] { return runner().reset("/B"); }); }),
               "/B declares no state (rtcf::State) to reset");
-    EXPECT_NE(refusal([&] { onGraphThread([&] { return runner().reset("/C"); }); }), "");
+    EXPECT_NE(errorOf([&] { onGraphThread([&] { return runner().reset("/C"); }); }), "");
 }
 
 TEST_F(DeclaredState, IsSetExactlyOrNotAtAll) {
     loadVersion(1);
     step(3);
     const auto set = [&](const std::string& name, const ParameterValue& value) {
-        return refusal([&] {
+        return errorOf([&] {
             onGraphThread(
                 [&] { return runner().setStates("/A", {{"old_name", 1.25}, {name, value}}); });
         });

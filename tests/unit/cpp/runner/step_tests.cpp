@@ -128,7 +128,7 @@ TEST_F(Stepping, CallsTheHooksOnceAndSafeAtItsEnd) {
 TEST_F(Stepping, IsRejectedWhileTheLoopRuns) {
     load(definition("Ticker", "T"));
     start();
-    const std::string text = refusal([this] { step(1); });
+    const std::string text = errorOf([this] { step(1); });
     EXPECT_NE(text.find("rtcfctl -r rt_runner stop"), std::string::npos) << text;
     EXPECT_TRUE(runs());
 }

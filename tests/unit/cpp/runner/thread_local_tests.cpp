@@ -75,7 +75,7 @@ TEST_F(ThreadLocals, NewToTheLoopAreRejectedUntilItIsStopped) {
     const auto before = order();
     const auto generation_before = generation();
     for (int round = 0; round < 2; ++round) {
-        const std::string text = refusal([this] { loadLinked("A", kLate); });
+        const std::string text = errorOf([this] { loadLinked("A", kLate); });
         for (const std::string& part :
              {"library " + kLate + ": ", std::string("libthread_locals_late.so"),
               std::string("thread_local"), std::string("rtcfctl -r rt_runner stop")})
@@ -119,7 +119,7 @@ TEST_F(ThreadLocals, InStaticTlsLoadWhileTheLoopRuns) {
 TEST_F(ThreadLocals, AreAllowedWithoutRealTime) {
     load(definition("Ticker", "T"));
     step(1);
-    EXPECT_EQ(refusal([this] { loadLinked("A", kLate); }), "");
+    EXPECT_EQ(errorOf([this] { loadLinked("A", kLate); }), "");
 }
 
 // Its module number would be reused for the next library, which would seem to be known.

@@ -84,7 +84,7 @@ class GraphFixture : public ::testing::Test {
         return graph;
     }
 
-    static std::string refusalOf(const executor::Graph& graph, const std::string& loading = {}) {
+    static std::string errorOf(const executor::Graph& graph, const std::string& loading = {}) {
         try {
             executor::wire(graph, {}, loading);
             return {};

@@ -43,7 +43,7 @@ ComponentDefinition definition(const std::string& type, const std::string& name)
 template <typename Result>
 struct Answer {
     std::optional<Result> result;
-    std::optional<std::pair<executor::ErrorKind, std::string>> refusal;
+    std::optional<std::pair<executor::ErrorKind, std::string>> error;
 };
 
 /// Work on the graph thread that may still be running.
@@ -54,7 +54,7 @@ class Pending {
     /// Waits. @throws Error
     Result get() {
         Answer<Result> answer = answer_.get();
-        if (answer.refusal) throw Error(answer.refusal->first, answer.refusal->second);
+        if (answer.error) throw Error(answer.error->first, answer.error->second);
         return std::move(*answer.result);
     }
 
@@ -96,7 +96,7 @@ class RunnerFixture : public ::testing::Test {
 
     /// The error text of `work`; empty if it succeeds.
     template <typename Work>
-    std::string refusal(Work&& work);
+    std::string errorOf(Work&& work);
 
     /// Newest value of a port with a std_msgs number. @return NaN without a value
     double value(const std::string& component, const std::string& port);
@@ -142,7 +142,7 @@ auto RunnerFixture::begin(Work work) -> Pending<decltype(work())> {
         try {
             answer.result = work();
         } catch (const Error& refused) {
-            answer.refusal.emplace(refused.kind(), refused.what());
+            answer.error.emplace(refused.kind(), refused.what());
         }
         promise->set_value(std::move(answer));
     });
@@ -155,7 +155,7 @@ auto RunnerFixture::onGraphThread(Work work) -> decltype(work()) {
 }
 
 template <typename Work>
-std::string RunnerFixture::refusal(Work&& work) {
+std::string RunnerFixture::errorOf(Work&& work) {
     try {
         work();
         return {};

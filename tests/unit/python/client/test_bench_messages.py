@@ -78,10 +78,10 @@ def test_messages_written_by_ros_are_read() -> None:
     ],
 )
 def test_unsuitable_columns_are_rejected(kind: Any, columns: dict[str, Any], said: str) -> None:
-    with pytest.raises(ValueError, match=".") as refusal:
+    with pytest.raises(ValueError, match=".") as error:
         pack(_text(kind), columns)
-    assert said in str(refusal.value)
-    assert "\n" not in str(refusal.value)
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
 
 
 def test_messages_of_different_lengths_are_rejected() -> None:

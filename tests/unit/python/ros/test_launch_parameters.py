@@ -12,7 +12,7 @@ from rtcf_launch.component_choice import ComponentChoice
 from rtcf_launch.runner_node import runner_name
 
 
-def refusal_of(values: dict[str, Any]) -> str:
+def error_of(values: dict[str, Any]) -> str:
     with pytest.raises(Ending) as found:
         runner_parameters.read(values)
     assert found.value.code == Code.USAGE
@@ -203,7 +203,7 @@ def test_numbers_are_converted_as_in_roscpp() -> None:
 def test_a_wrong_parameter_of_a_runner_is_one_clear_line(
     values: dict[str, Any], message: str
 ) -> None:
-    assert message in refusal_of(values)
+    assert message in error_of(values)
 
 
 def test_an_unknown_parameter_is_a_warning_with_a_suggestion() -> None:

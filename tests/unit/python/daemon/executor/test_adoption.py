@@ -187,17 +187,17 @@ def test_an_executor_of_a_foreign_protocol_is_left_running_and_can_be_replaced(
     pid = loop_left_behind(stopped_daemon)
     stopped_daemon.environment = {}
     stopped_daemon.start()
-    refusal = (
+    error = (
         f"executor of rt_runner (pid {pid}) is of rtcf 7.8 and speaks protocol {number}, which "
         f"rtcfd {VERSION} with protocol {PROTOCOL} does not: its loop goes on as it is; "
         "`rtcfctl -r rt_runner stop` ends it, "
         "`rtcfctl runner restart rt_runner` starts one of this version"
     )
-    assert refusal in stopped_daemon.log()
+    assert error in stopped_daemon.log()
     with stopped_daemon.client() as client:
         status = client.get_status().runners[0]
         assert status.pid == pid
-        assert status.status == refusal
+        assert status.status == error
         with pytest.raises(rtcf.RefusedError, match="speaks protocol"):
             client.start()
         with pytest.raises(rtcf.RefusedError, match="speaks protocol"):

@@ -48,7 +48,7 @@ class Call(threading.Thread):
     def __init__(self, daemon: DaemonUnderTest, do: Callable[[rtcf.Client], Any]) -> None:
         super().__init__()
         self._daemon, self._do = daemon, do
-        self.refusal = ""
+        self.error = ""
         self.start()
 
     def run(self) -> None:
@@ -56,12 +56,12 @@ class Call(threading.Thread):
             try:
                 self._do(client)
             except rtcf.RtcfError as error:
-                self.refusal = str(error)
+                self.error = str(error)
 
     def end(self) -> str:
         self.join(DEADLINE_S)
         assert not self.is_alive()
-        return self.refusal
+        return self.error
 
 
 @pytest.fixture
@@ -171,9 +171,9 @@ def test_calls_cut_off_by_the_end_of_an_executor_get_its_reason(
             wait_for(held.waits(kind), f"the {kind}")
             with pytest.raises(rtcf.RefusedError):
                 client.set_parameters("/a", [rtcf.parse_parameter("die:=SIGSEGV")])
-            refusal = call.end()
-    assert (refusal == "") == (kind == "stop")
-    known = refusal or "\n".join(notes)
+            error = call.end()
+    assert (error == "") == (kind == "stop")
+    known = error or "\n".join(notes)
     assert "runner rt_runner: its executor" in known
     assert "was killed by SIGSEGV" in known
     assert "while /a.update was running" in known

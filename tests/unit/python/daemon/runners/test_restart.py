@@ -184,8 +184,8 @@ def test_a_new_executor_frees_a_runner_with_a_hanging_change(service: DaemonUnde
     slow = SlowLoad(service, service.folder / "never")
     done = service.ctl("runner", "restart", "rt_runner")
     assert done.stdout.startswith("runner rt_runner restarted"), done.stderr
-    (refusal,) = slow.outcome()
-    assert refusal == "runner rt_runner: its executor is being restarted"
+    (error,) = slow.outcome()
+    assert error == "runner rt_runner: its executor is being restarted"
     with service.client() as client:
         status = client.get_status().runners[0]
         assert status.pid not in (0, pid)

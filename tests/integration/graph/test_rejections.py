@@ -23,7 +23,7 @@ NEW = f"load {MIMO} --name new"
 
 
 @dataclass(frozen=True)
-class Refusal:
+class Rejection:
     """A command, and the words that its error line must contain, in any order."""
 
     command: str
@@ -37,111 +37,115 @@ GRAPH = [
     f"load {TEST} Knobs --name knobs --param rate:=2.5",
 ]
 
-REFUSALS = {
-    "unknown package": Refusal(
+REJECTIONS = {
+    "unknown package": Rejection(
         "load rtcf_exampels Mimo", ['"rtcf_exampels"', 'did you mean "rtcf_examples"']
     ),
-    "unknown type": Refusal("load rtcf_examples Minmo", ['"Minmo"', '"Mimo"?', "Identity"]),
-    "malformed package": Refusal("load ../etc Mimo", ['"../etc"', "letters"]),
-    "library that does not load": Refusal(
+    "unknown type": Rejection("load rtcf_examples Minmo", ['"Minmo"', '"Mimo"?', "Identity"]),
+    "malformed package": Rejection("load ../etc Mimo", ['"../etc"', "letters"]),
+    "library that does not load": Rejection(
         f"load {TEST} Unresolved",
         ["rtcf_test_unresolved.so", "rtcf_test_symbol_that_nobody_has", "build it again"],
     ),
-    "library of another ABI": Refusal(
+    "library of another ABI": Rejection(
         f"load {TEST} OtherAbi", ["rtcf_test_other_abi.so", "ABI 4711", "build it again"]
     ),
-    "constructor that throws": Refusal(
+    "constructor that throws": Rejection(
         f"load {TEST} ThrowingConstructor",
         ["ThrowingConstructor", "constructor", "no constructor should do this"],
     ),
-    "configure that says why it fails": Refusal(
+    "configure that says why it fails": Rejection(
         f"load {TEST} FailingConfigure --name grip",
         ["/grip", "configure", "/dev/gripper does not answer: is it plugged in?"],
     ),
-    "configure that returns false": Refusal(
+    "configure that returns false": Rejection(
         f"load {TEST} SilentConfigure", ["/SilentConfigure", "configure", "returned false"]
     ),
-    "configure that throws": Refusal(
+    "configure that throws": Rejection(
         f"load {TEST} ThrowingConfigure",
         ["/ThrowingConfigure", "configure", "threw", "the calibration is from yesterday"],
     ),
-    "configure that throws no std::exception": Refusal(
+    "configure that throws no std::exception": Rejection(
         f"load {TEST} OddlyThrowingConfigure", ["/OddlyThrowingConfigure", "configure", "threw"]
     ),
-    "replacement that fails to configure": Refusal(
+    "replacement that fails to configure": Rejection(
         f"replace a {TEST} FailingConfigure", ["/a", "configure", "/dev/gripper"]
     ),
-    "duplicate name": Refusal(f"load {MIMO} --name a", ["/a", "loaded already", "--name"]),
-    "duplicate name in a namespace": Refusal(f"load {MIMO} --name b --ns arm", ["/arm/b"]),
-    "illegal name": Refusal(f"load {MIMO} --name a/b", ["'a/b'", "--ns"]),
-    "illegal remap": Refusal(f"{NEW} --remap in1:=1x", ["in1:=1x", "'1x'"]),
-    "type mismatch at an input": Refusal(
+    "duplicate name": Rejection(f"load {MIMO} --name a", ["/a", "loaded already", "--name"]),
+    "duplicate name in a namespace": Rejection(f"load {MIMO} --name b --ns arm", ["/arm/b"]),
+    "illegal name": Rejection(f"load {MIMO} --name a/b", ["'a/b'", "--ns"]),
+    "illegal remap": Rejection(f"{NEW} --remap in1:=1x", ["in1:=1x", "'1x'"]),
+    "type mismatch at an input": Rejection(
         f"load {TEST} Counter --name count --remap in:=/x",
         ["/x", "/a.out1", "std_msgs/Float64", "/count.in", "int32", "remap"],
     ),
-    "type mismatch at an output": Refusal(
+    "type mismatch at an output": Rejection(
         "load rtcf_examples PaperExample --name paper --remap out_port:=/arm/in2",
         ["/arm/in2", "/arm/b.in2", "std_msgs/Float64", "/paper.out_port", "std_msgs/Float32"],
     ),
-    "second writer": Refusal(
+    "second writer": Rejection(
         f"{NEW} --remap out2:=/x", ["/x", "two writers", "/a.out1", "/new.out2", "--remap"]
     ),
-    "a loop": Refusal(
+    "a loop": Rejection(
         f"load {IDENTITY} --name new --remap in:=/y --remap out:=/in1",
         ["/a.out1 → /arm/b.in1", "/arm/b.out1 → /new.in", "/new.out → /a.in1",
          "rtcfctl break a.in1", "rtcfctl break /arm/b.in1", "--break in"],
     ),
-    "a loop of one": Refusal(
+    "a loop of one": Rejection(
         f"load {IDENTITY} --name new --remap in:=/z --remap out:=/z",
         ["/new.out → /new.in", "--break in"],
     ),
-    "unknown component": Refusal("unload nobody", ["/nobody", "/a", "/arm/b"]),
-    "unknown component to set": Refusal("set nobody rate:=1.0", ["/nobody"]),
-    "unknown component to replace": Refusal(f"replace nobody {MIMO}", ["/nobody"]),
-    "unknown component to look at": Refusal("info nobody", ["/nobody"]),
-    "one unknown component of two": Refusal("unload a nobody", ["/nobody"]),
-    "unknown input to break": Refusal("break a.out1", ["/a", "out1", "in1, in2"]),
-    "one unknown input of two": Refusal("break a.in1 a.in9", ["/a", "in9"]),
-    "unknown input to load with a break": Refusal(f"{NEW} --break in9", ["/new", "in9"]),
-    "unknown runner": Refusal("-r rt_runer start", ['"rt_runer"', "rt_runner"]),
-    "unknown runner to load into": Refusal(f"-r arm {NEW}", ['"arm"', "rt_runner"]),
-    "unknown runner to set": Refusal("runner set arm --frequency 5", ['"arm"', "rt_runner"]),
-    "unknown runner to remove": Refusal("runner remove arm", ['"arm"', "rt_runner"]),
-    "runner that is there already": Refusal("runner add rt_runner", ["rt_runner", "already"]),
-    "illegal name of a runner": Refusal("runner add ../x", ['"../x"', "letters"]),
-    "frequency of 0": Refusal("runner set --frequency 0", ["0 Hz", "0.1 to 50000 Hz"]),
-    "frequency too high": Refusal("runner set --frequency 50001", ["50001 Hz", "0.1 to 50000"]),
-    "negative frequency": Refusal("runner set --frequency=-5", ["-5 Hz", "0.1 to 50000"]),
-    "frequency that is no number": Refusal("runner set --frequency nan", ["nan Hz", "0.1 to"]),
-    "new runner with a bad frequency": Refusal("runner add arm --frequency 1e9", ["0.1 to 50000"]),
-    "CPU that is not there": Refusal("runner set --cpu 4000", ["CPU 4000", "-1"]),
-    "priority out of range": Refusal("runner set --priority 99", ["priority of 99", "1 to 98"]),
-    "bad expression to ignore": Refusal(f"{NEW} --ignore '['", ["ignore", "/new", "'['"]),
-    "bad whitelist": Refusal("runner set --whitelist '(a'", ["whitelist", "'(a'"]),
-    "bad blacklist": Refusal("runner set --blacklist '*x'", ["blacklist", "'*x'"]),
-    "value below its minimum": Refusal(
+    "unknown component": Rejection("unload nobody", ["/nobody", "/a", "/arm/b"]),
+    "unknown component to set": Rejection("set nobody rate:=1.0", ["/nobody"]),
+    "unknown component to replace": Rejection(f"replace nobody {MIMO}", ["/nobody"]),
+    "unknown component to look at": Rejection("info nobody", ["/nobody"]),
+    "one unknown component of two": Rejection("unload a nobody", ["/nobody"]),
+    "unknown input to break": Rejection("break a.out1", ["/a", "out1", "in1, in2"]),
+    "one unknown input of two": Rejection("break a.in1 a.in9", ["/a", "in9"]),
+    "unknown input to load with a break": Rejection(f"{NEW} --break in9", ["/new", "in9"]),
+    "unknown runner": Rejection("-r rt_runer start", ['"rt_runer"', "rt_runner"]),
+    "unknown runner to load into": Rejection(f"-r arm {NEW}", ['"arm"', "rt_runner"]),
+    "unknown runner to set": Rejection("runner set arm --frequency 5", ['"arm"', "rt_runner"]),
+    "unknown runner to remove": Rejection("runner remove arm", ['"arm"', "rt_runner"]),
+    "runner that is there already": Rejection("runner add rt_runner", ["rt_runner", "already"]),
+    "illegal name of a runner": Rejection("runner add ../x", ['"../x"', "letters"]),
+    "frequency of 0": Rejection("runner set --frequency 0", ["0 Hz", "0.1 to 50000 Hz"]),
+    "frequency too high": Rejection("runner set --frequency 50001", ["50001 Hz", "0.1 to 50000"]),
+    "negative frequency": Rejection("runner set --frequency=-5", ["-5 Hz", "0.1 to 50000"]),
+    "frequency that is no number": Rejection("runner set --frequency nan", ["nan Hz", "0.1 to"]),
+    "new runner with a bad frequency": Rejection(
+        "runner add arm --frequency 1e9", ["0.1 to 50000"]
+    ),
+    "CPU that is not there": Rejection("runner set --cpu 4000", ["CPU 4000", "-1"]),
+    "priority out of range": Rejection("runner set --priority 99", ["priority of 99", "1 to 98"]),
+    "bad expression to ignore": Rejection(f"{NEW} --ignore '['", ["ignore", "/new", "'['"]),
+    "bad whitelist": Rejection("runner set --whitelist '(a'", ["whitelist", "'(a'"]),
+    "bad blacklist": Rejection("runner set --blacklist '*x'", ["blacklist", "'*x'"]),
+    "value below its minimum": Rejection(
         "set knobs rate:=-1.5", ["/knobs", "rate", "-1.5", "minimum", "-1 m/s"]
     ),
-    "value above its maximum": Refusal("set knobs count:=11", ["/knobs", "count", "11", "10"]),
-    "value of another type": Refusal("set knobs count:=1.5", ["count", "an int", "a double"]),
-    "text for a bool": Refusal(
+    "value above its maximum": Rejection("set knobs count:=11", ["/knobs", "count", "11", "10"]),
+    "value of another type": Rejection("set knobs count:=1.5", ["count", "an int", "a double"]),
+    "text for a bool": Rejection(
         "set knobs enabled:=perhaps", ["enabled", "a bool", 'the text "perhaps"']
     ),
-    "a number that is none, as text": Refusal("set knobs rate:=nan", ["rate", 'the text "nan"']),
-    "one parameter twice": Refusal("set knobs count:=1 count:=2", ["count", "twice"]),
-    "one parameter twice at a load": Refusal(
+    "a number that is none, as text": Rejection("set knobs rate:=nan", ["rate", 'the text "nan"']),
+    "one parameter twice": Rejection("set knobs count:=1 count:=2", ["count", "twice"]),
+    "one parameter twice at a load": Rejection(
         f"load {TEST} Knobs --name k --param count:=1 --param count:=2", ["count", "twice"]
     ),
-    "graph file without an end": Refusal("apply /dev/zero", ["/dev/zero", "more than 16 MiB"]),
-    "snapshot without an end": Refusal("restore /dev/zero", ["/dev/zero", "more than 16 MiB"]),
-    "number for a string": Refusal("set knobs label:=5", ["label", "a string", "an int"]),
-    "not a number": Refusal("set knobs rate:=.nan", ["rate", "finite"]),
-    "unknown enumerator": Refusal("set knobs mode:=walk", ["mode", "walk", "idle, run"]),
-    "unknown parameter": Refusal("set knobs speed:=1.0", ["/knobs", "speed", "rate"]),
-    "one bad value of two": Refusal("set knobs count:=3 rate:=1e6", ["rate", "1000 m/s"]),
-    "bad value at load": Refusal(f"load {TEST} Knobs --name k --param count:=-1", ["/k", "count"]),
-    "bad type at load": Refusal(f"load {TEST} Knobs --name k --param rate:=fast", ["/k", "rate"]),
-    "unknown parameter at load": Refusal(
+    "graph file without an end": Rejection("apply /dev/zero", ["/dev/zero", "more than 16 MiB"]),
+    "snapshot without an end": Rejection("restore /dev/zero", ["/dev/zero", "more than 16 MiB"]),
+    "number for a string": Rejection("set knobs label:=5", ["label", "a string", "an int"]),
+    "not a number": Rejection("set knobs rate:=.nan", ["rate", "finite"]),
+    "unknown enumerator": Rejection("set knobs mode:=walk", ["mode", "walk", "idle, run"]),
+    "unknown parameter": Rejection("set knobs speed:=1.0", ["/knobs", "speed", "rate"]),
+    "one bad value of two": Rejection("set knobs count:=3 rate:=1e6", ["rate", "1000 m/s"]),
+    "bad value at load": Rejection(
+        f"load {TEST} Knobs --name k --param count:=-1", ["/k", "count"]
+    ),
+    "bad type at load": Rejection(f"load {TEST} Knobs --name k --param rate:=fast", ["/k", "rate"]),
+    "unknown parameter at load": Rejection(
         f"load {TEST} Knobs --name k --param speed:=1.0", ["/k", "speed", "enabled"]
     ),
 }  # fmt: skip
@@ -176,7 +180,7 @@ def state_of(client: rtcf.Client) -> list[Any]:
 def loaded(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> Iterator[Loaded]:
-    daemon = Daemon(tmp_path_factory.mktemp("refusals"))
+    daemon = Daemon(tmp_path_factory.mktemp("rejections"))
     daemon.start()
     for command in GRAPH:
         done = daemon.ctl(*shlex.split(command))
@@ -188,13 +192,13 @@ def loaded(
     daemon.end()
 
 
-@pytest.mark.parametrize("refusal", REFUSALS.values(), ids=REFUSALS)
-def test_errors_are_one_line_and_change_nothing(loaded: Loaded, refusal: Refusal) -> None:
-    done = loaded.daemon.ctl(*shlex.split(refusal.command))
+@pytest.mark.parametrize("rejection", REJECTIONS.values(), ids=REJECTIONS)
+def test_errors_are_one_line_and_change_nothing(loaded: Loaded, rejection: Rejection) -> None:
+    done = loaded.daemon.ctl(*shlex.split(rejection.command))
     assert done.returncode == 1, done
     assert done.stdout == ""
     assert re.fullmatch(r"rtcfctl: [^\n]+\n", done.stderr), done.stderr
-    for word in refusal.words:
+    for word in rejection.words:
         assert word in done.stderr
     assert state_of(loaded.client) == loaded.state
 
