@@ -368,12 +368,12 @@ class Peer:
         )
 
     async def get_statistics(self, _: wire.GetStatistics, __: int) -> wire.Response:
-        figures = runner_pb2.Distribution(count=10, min_ns=1000.0, mean_ns=1500.0, max_ns=2e3)
+        distribution = runner_pb2.Distribution(count=10, min_ns=1000.0, mean_ns=1500.0, max_ns=2e3)
         return wire.Response(
             statistics=runner_pb2.RunnerStatistics(
                 iterations=10,
-                duration=figures,
-                latency=figures,
+                duration=distribution,
+                latency=distribution,
                 overruns=1,
                 components=[
                     runner_pb2.ComponentStatistics(component=name, duration=self.SLOW, overruns=10)

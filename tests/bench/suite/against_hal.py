@@ -1,8 +1,8 @@
 """Fig. 1 of the paper at 2 kHz: rtcf alternating with LinuxCNC HAL."""
 
-from figures import median_of, summary
 from paper_graph import HAL_SUM, hal_components, run_hal, run_rtcf
 from processes import Failed, missing
+from quantiles import median_of, summary
 from result import Budget, Result
 from setting import FREQUENCY_HZ, Setting
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from figures import median
+from quantiles import median
 
 _LOOP = "rtcf-loop"
 

@@ -1,7 +1,7 @@
 """The highest frequency at which Fig. 1 runs without missing cycles."""
 
-from figures import median
 from paper_graph import run_rtcf
+from quantiles import median
 from result import Result
 from setting import Setting
 

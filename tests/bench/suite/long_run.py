@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from figures import summary
 from paper_graph import PaperRun, run_rtcf
 from processes import load, missing
+from quantiles import summary
 from result import Result
 from setting import FREQUENCY_HZ, Setting
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from figures import Samples
 from processes import Failed, output_of
+from quantiles import Samples
 from setting import FREQUENCY_HZ, PRIORITY, Setting
 
 _HAL = Path(__file__).resolve().parent.parent / "hal"

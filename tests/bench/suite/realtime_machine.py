@@ -6,10 +6,10 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from figures import Samples, median_of, summary
 from instructions import FIG_1_INSTRUCTIONS
 from paper_graph import HAL_COMPONENTS, hal_components
 from processes import Failed, missing, output_of
+from quantiles import Samples, median_of, summary
 from result import Budget, Cell, Result
 from setting import Setting
 

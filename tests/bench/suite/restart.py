@@ -4,8 +4,8 @@ import os
 import signal
 import time
 
-from figures import median
 from graphs import paper
+from quantiles import median
 from result import Budget, Result
 from setting import Setting
 

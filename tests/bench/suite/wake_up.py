@@ -1,9 +1,9 @@
 """Wake-up latency: rtcf's loop against cyclictest, idle and under load."""
 
 import numpy as np
-from figures import Samples, median_of, summary
 from paper_graph import run_rtcf
 from processes import Failed, load, missing, output_of
+from quantiles import Samples, median_of, summary
 from result import Result
 from setting import FREQUENCY_HZ, PRIORITY, Setting
 

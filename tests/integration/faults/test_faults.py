@@ -417,8 +417,8 @@ def test_a_slow_component_shows_in_the_statistics(
     client.start()
 
     def longest() -> tuple[float, float]:
-        figures = {each.component: each.duration for each in client.get_statistics().components}
-        return figures["/bad"].p50_ns, figures["/a"].p50_ns
+        durations = {each.component: each.duration for each in client.get_statistics().components}
+        return durations["/bad"].p50_ns, durations["/a"].p50_ns
 
     wait_for(lambda: longest()[0] > 5e4 > longest()[1] > 0, "the statistics")
 

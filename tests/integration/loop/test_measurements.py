@@ -126,12 +126,12 @@ def cells(line: str) -> list[str]:
 
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="the counter is for x86-64")
 def test_instructions_of_a_cycle_match_the_docs(tmp_path: Path) -> None:
-    figures = stated()
+    documented = stated()
     found = measured(tmp_path)
-    assert figures.keys() == {each["text"] for each in found}
+    assert documented.keys() == {each["text"] for each in found}
     for each in found:
-        figure, verdict = figures[each["text"]]
-        assert each["measured"] == pytest.approx(figure, rel=TOLERANCE), each["text"]
+        count, verdict = documented[each["text"]]
+        assert each["measured"] == pytest.approx(count, rel=TOLERANCE), each["text"]
         word = "kept" if each["kept"] else "over"
         assert verdict == f"{each['limit']:.0f}: {word}", each["text"]
 

@@ -25,11 +25,11 @@ def test_each_cycle_is_counted_once_in_all_statistics(client: rtcf.Client) -> No
     client.start()
     wait_for(lambda: iteration(client) > 200, "200 cycles")
     client.stop()
-    figures = client.get_statistics()
+    statistics = client.get_statistics()
     cycles = iteration(client) - 7
-    assert figures.iterations == cycles
-    assert figures.duration.count == figures.latency.count == cycles
-    (counter,) = figures.components
+    assert statistics.iterations == cycles
+    assert statistics.duration.count == statistics.latency.count == cycles
+    (counter,) = statistics.components
     assert (counter.component, counter.duration.count) == ("/Counter", cycles)
     assert 0 < counter.duration.min_ns <= counter.duration.p50_ns <= counter.duration.p99_ns
     assert counter.duration.p99_ns <= counter.duration.p999_ns <= counter.duration.max_ns
@@ -41,9 +41,9 @@ def test_a_reset_clears_the_statistics_and_affects_no_loop(client: rtcf.Client) 
     wait_for(lambda: client.get_statistics().iterations > 1000, "1000 cycles")
     before = iteration(client)
     client.reset_statistics()
-    figures = client.get_statistics()
-    assert figures.iterations <= iteration(client) - before + 1
-    assert figures.components[0].duration.count <= figures.iterations + 1
+    statistics = client.get_statistics()
+    assert statistics.iterations <= iteration(client) - before + 1
+    assert statistics.components[0].duration.count <= statistics.iterations + 1
     wait_for(lambda: client.get_statistics().iterations > 100, "more cycles")
     assert client.get_status("rt_runner").runners[0].state == runner_pb2.RUNNER_STATE_RUNNING
 
@@ -53,10 +53,10 @@ def test_the_time_with_devices_is_counted(client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_test", "Device"))
     client.load(rtcf.component("rtcf_test", "Counter"))
     client.step(20)
-    figures = {each.component: each for each in client.get_statistics().components}
-    assert figures["/Device"].device_calls == 20
-    assert 0 < figures["/Device"].device_mean_ns <= figures["/Device"].duration.mean_ns
-    assert (figures["/Counter"].device_calls, figures["/Counter"].device_mean_ns) == (0, 0)
+    statistics = {each.component: each for each in client.get_statistics().components}
+    assert statistics["/Device"].device_calls == 20
+    assert 0 < statistics["/Device"].device_mean_ns <= statistics["/Device"].duration.mean_ns
+    assert (statistics["/Counter"].device_calls, statistics["/Counter"].device_mean_ns) == (0, 0)
     client.reset_statistics()
     client.step(3)
     (device,) = [each for each in client.get_statistics().components if each.device_calls]
@@ -69,8 +69,8 @@ def test_a_start_clears_the_statistics(client: rtcf.Client) -> None:
         client.start()
         wait_for(lambda: iteration(client) > 100, "100 cycles")
         client.stop()
-        figures = client.get_statistics()
-        assert figures.iterations == iteration(client) - 10  # the default warm-up
+        statistics = client.get_statistics()
+        assert statistics.iterations == iteration(client) - 10  # the default warm-up
 
 
 def test_overruns_are_counted_for_the_component_that_was_running(
@@ -86,14 +86,14 @@ def test_overruns_are_counted_for_the_component_that_was_running(
 
     wait_for(lambda: overruns()["/slow"] > 100, "overruns")
     assert overruns()["/quick"] < overruns()["/slow"] / 2
-    figures = client.get_statistics()
-    assert figures.missed >= figures.overruns - 1
+    statistics = client.get_statistics()
+    assert statistics.missed >= statistics.overruns - 1
     status = client.get_status("rt_runner").runners[0]
-    assert status.overruns >= figures.overruns
+    assert status.overruns >= statistics.overruns
     # Hardly any more from here on, however long the next lines take.
     client.set_runner(runner_pb2.RunnerSettings(frequency_hz=10.0))
     client.reset_statistics()
-    assert client.get_statistics().overruns < figures.overruns
+    assert client.get_statistics().overruns < statistics.overruns
 
 
 @pytest.mark.parametrize(
@@ -118,20 +118,20 @@ def test_a_reset_of_a_late_loop_affects_all_statistics_at_one_instant(
         assert more.iteration >= total, "cycle numbers continue"
     wait_for(lambda: client.get_statistics().overruns > 20, "overruns")
     client.stop()
-    status, figures = state(client), client.get_statistics()
-    assert (status.overruns, status.missed) == (figures.overruns, figures.missed)
+    status, statistics = state(client), client.get_statistics()
+    assert (status.overruns, status.missed) == (statistics.overruns, statistics.missed)
     # Catching up drops cycles only after a hundred late ones in a row.
-    assert figures.missed > 0 or policy == runner_pb2.OVERRUN_POLICY_CATCH_UP
+    assert statistics.missed > 0 or policy == runner_pb2.OVERRUN_POLICY_CATCH_UP
     causes = (
-        figures.late_wake_ups
-        + figures.exchange_overruns
-        + figures.frame_overruns
-        + figures.catching_up
+        statistics.late_wake_ups
+        + statistics.exchange_overruns
+        + statistics.frame_overruns
+        + statistics.catching_up
     )
-    assert causes + sum(each.overruns for each in figures.components) == figures.overruns
-    counts = [each.duration.count for each in figures.components]
-    assert counts == [figures.iterations] * 4
-    assert 0 < figures.overruns <= figures.iterations == figures.latency.count
+    assert causes + sum(each.overruns for each in statistics.components) == statistics.overruns
+    counts = [each.duration.count for each in statistics.components]
+    assert counts == [statistics.iterations] * 4
+    assert 0 < statistics.overruns <= statistics.iterations == statistics.latency.count
 
 
 def test_stats_status_and_list_count_from_the_same_moment(
@@ -200,9 +200,9 @@ def test_cycles_of_a_stopped_loop_are_the_same_in_status_and_statistics(
     client.reset_statistics()
     assert client.get_statistics().iterations == 0
     client.step(30)
-    figures = client.get_statistics()
-    assert iteration(client) - before == figures.iterations == 30
-    assert figures.components[0].duration.count == 30
+    statistics = client.get_statistics()
+    assert iteration(client) - before == statistics.iterations == 30
+    assert statistics.components[0].duration.count == 30
 
 
 def test_statistics_can_be_watched(daemon: Daemon, client: rtcf.Client) -> None:
@@ -258,12 +258,12 @@ def test_the_overrun_policy_changes_while_the_loop_runs(
     wait_for(lambda: iteration(client) > 20, "some cycles")
     client.reset_statistics()
     wait_for(lambda: client.get_statistics().overruns > 50, "overruns")
-    figures = client.get_statistics()
+    statistics = client.get_statistics()
     if policy == runner_pb2.OVERRUN_POLICY_CATCH_UP:
         # It falls behind, and drops cycles only after a hundred late ones in a row.
-        assert figures.latency.max_ns > 100_000
+        assert statistics.latency.max_ns > 100_000
     else:
-        assert (figures.missed > 0) == (policy == runner_pb2.OVERRUN_POLICY_SKIP)
+        assert (statistics.missed > 0) == (policy == runner_pb2.OVERRUN_POLICY_SKIP)
 
 
 def test_incompatible_rates_are_rejected_with_a_compatible_one(

@@ -51,36 +51,38 @@ def test_all_metrics_match_the_loop(counted: Daemon, client: rtcf.Client) -> Non
     done = counted.ctl("metrics")
     assert done.returncode == 0, done.stderr
     found = samples(done.stdout)
-    figures = client.get_statistics(buckets=True)
+    statistics = client.get_statistics(buckets=True)
     ours = labels(runner="rt_runner")
     assert found["rtcf_up", labels()] == 1
-    assert found["rtcf_cycles_total", ours] == figures.iterations
+    assert found["rtcf_cycles_total", ours] == statistics.iterations
     assert found["rtcf_runner_state", labels(runner="rt_runner", state="stopped")] == 1
     assert found["rtcf_runner_state", labels(runner="rt_runner", state="running")] == 0
-    assert found["rtcf_cycle_duration_seconds_count", ours] == figures.duration.count
-    mean_s = found["rtcf_cycle_duration_seconds_sum", ours] / figures.duration.count
-    assert mean_s == pytest.approx(figures.duration.mean_ns / 1e9)
+    assert found["rtcf_cycle_duration_seconds_count", ours] == statistics.duration.count
+    mean_s = found["rtcf_cycle_duration_seconds_sum", ours] / statistics.duration.count
+    assert mean_s == pytest.approx(statistics.duration.mean_ns / 1e9)
     steps = sorted(
         (float(dict(names)["le"]), value)
         for (name, names), value in found.items()
         if name == "rtcf_wake_up_latency_seconds_bucket"
     )
     assert [value for _, value in steps] == sorted(value for _, value in steps)
-    assert steps[-1] == (float("inf"), figures.latency.count)
+    assert steps[-1] == (float("inf"), statistics.latency.count)
     for bound, value in steps[:-1]:
-        below = sum(each.count for each in figures.latency_buckets if each.upper_ns <= bound * 1e9)
+        below = sum(
+            each.count for each in statistics.latency_buckets if each.upper_ns <= bound * 1e9
+        )
         assert value == below
     component = {"runner": "rt_runner", "component": "/Counter"}
     longest = found["rtcf_component_update_seconds", labels(**component, quantile="1")]
-    assert longest == pytest.approx(figures.components[0].duration.max_ns / 1e9)
+    assert longest == pytest.approx(statistics.components[0].duration.max_ns / 1e9)
     assert found["rtcf_component_faults_total", labels(**component)] == 0
 
 
 def test_buckets_match_the_values(counted: Daemon, client: rtcf.Client) -> None:
-    figures = client.get_statistics(buckets=True)
+    statistics = client.get_statistics(buckets=True)
     for buckets, all_of_it in (
-        (figures.duration_buckets, figures.duration),
-        (figures.latency_buckets, figures.latency),
+        (statistics.duration_buckets, statistics.duration),
+        (statistics.latency_buckets, statistics.latency),
     ):
         ends = [each.upper_ns for each in buckets]
         assert ends == sorted(set(ends))
@@ -168,12 +170,12 @@ def outlier(daemon: Daemon, client: rtcf.Client) -> Daemon:
 def test_a_plot_shows_an_outlier_and_the_others(
     outlier: Daemon, client: rtcf.Client, tmp_path: Path
 ) -> None:
-    figures = client.get_statistics(buckets=True)
+    statistics = client.get_statistics(buckets=True)
     plot = tmp_path / "loop.svg"
     assert outlier.ctl("stats", "--plot", str(plot)).returncode == 0
     root = ElementTree.parse(plot).getroot()
     texts = {each.text or "" for each in root.iter() if each.tag.endswith("text")}
-    for panel, found in (("calculation", figures.duration), ("wake-up", figures.latency)):
+    for panel, found in (("calculation", statistics.duration), ("wake-up", statistics.latency)):
         bars = ids(root, f"{panel} bar ")
         assert sum(int(each.get("id", "").split()[-1]) for each in bars) == found.count
         # On a linear axis all but one cycle are in the first bar.
@@ -210,12 +212,12 @@ def across(part: Element) -> list[float]:
 def test_bars_in_the_terminal_show_an_outlier_and_the_others(
     outlier: Daemon, client: rtcf.Client
 ) -> None:
-    figures = client.get_statistics()
+    statistics = client.get_statistics()
     done = outlier.ctl("stats", "--plot")
     assert done.returncode == 0, done.stderr
     assert all(len(line) <= 80 for line in done.stdout.split("\n\n", 2)[2].splitlines())
     for title, found in (
-        ("calculation duration", figures.duration), ("wake-up latency", figures.latency),
+        ("calculation duration", statistics.duration), ("wake-up latency", statistics.latency),
     ):  # fmt: skip
         after = done.stdout.partition(f"\n{title} (µs), ")[2]
         assert after.startswith(f"{found.count} cycles, logarithmic bars\n")

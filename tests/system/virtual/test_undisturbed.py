@@ -80,9 +80,9 @@ def test_a_wall_clock_set_back_and_forward_by_a_year(loop: Loop) -> None:
                 state = client.get_component("held").state
                 assert state == graph_pb2.COMPONENT_STATE_RUNNING
                 # Statistics count durations, independent of the wall clock.
-                figures = client.get_statistics()
-                assert 0 < figures.duration.max_ns < 1e9
-                assert figures.latency.max_ns < 1e9
+                statistics = client.get_statistics()
+                assert 0 < statistics.duration.max_ns < 1e9
+                assert statistics.latency.max_ns < 1e9
                 assert client.get_status().uptime_ns < 3600e9
         held.end()
         assert [each.why for each in held.ended] == [control_pb2.LeaseEnded.WHY_ASKED]

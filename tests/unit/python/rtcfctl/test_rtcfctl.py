@@ -296,8 +296,8 @@ def test_plain_has_numbers_short_words_and_nulls() -> None:
 
 
 def test_statistics_can_be_watched_as_text(daemon: DaemonUnderTest, client: rtcf.Client) -> None:
-    figures = client.watch_statistics(interval_s=0.1)
-    assert [next(figures).iterations for _ in range(3)] == [10, 10, 10]
+    watched = client.watch_statistics(interval_s=0.1)
+    assert [next(watched).iterations for _ in range(3)] == [10, 10, 10]
     with pytest.raises(rtcf.RefusedError, match='no runner "nobody"'):
         next(client.watch_statistics("nobody"))
     assert daemon.ctl("stats", "--watch", "0").returncode == 2
