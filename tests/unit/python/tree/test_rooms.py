@@ -14,15 +14,15 @@ def check(*arguments: Path) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.fixture
-def house(tmp_path: Path) -> Path:
+def stack(tmp_path: Path) -> Path:
     """A package of two correct layers."""
-    (tmp_path / "rooms").write_text("house.attic\nhouse.cellar\nhouse\n")
-    for room in ("attic", "cellar"):
-        (tmp_path / "src" / "house" / room).mkdir(parents=True)
-        (tmp_path / "src" / "house" / room / "__init__.py").touch()
-    (tmp_path / "src" / "house" / "__init__.py").touch()
-    (tmp_path / "src" / "house" / "attic" / "box.py").write_text("from house.cellar import wine\n")
-    (tmp_path / "src" / "house" / "cellar" / "wine.py").touch()
+    (tmp_path / "rooms").write_text("stack.upper\nstack.lower\nstack\n")
+    for room in ("upper", "lower"):
+        (tmp_path / "src" / "stack" / room).mkdir(parents=True)
+        (tmp_path / "src" / "stack" / room / "__init__.py").touch()
+    (tmp_path / "src" / "stack" / "__init__.py").touch()
+    (tmp_path / "src" / "stack" / "upper" / "user.py").write_text("from stack.lower import item\n")
+    (tmp_path / "src" / "stack" / "lower" / "item.py").touch()
     return tmp_path
 
 
@@ -35,40 +35,40 @@ def test_lint_checks_them() -> None:
     assert "tools/check-arrows" in (TREE / "tools" / "lint").read_text()
 
 
-def test_an_import_of_a_lower_layer_is_accepted(house: Path) -> None:
-    assert check(house / "rooms", house).returncode == 0
+def test_an_import_of_a_lower_layer_is_accepted(stack: Path) -> None:
+    assert check(stack / "rooms", stack).returncode == 0
 
 
 @pytest.mark.parametrize(
     "text",
     [
-        "from house.attic.box import box",
-        "def late():\n    import house.attic.box",
-        "import typing\nif typing.TYPE_CHECKING:\n    from house.attic import box",
+        "from stack.upper.user import user",
+        "def late():\n    import stack.upper.user",
+        "import typing\nif typing.TYPE_CHECKING:\n    from stack.upper import user",
     ],
 )
-def test_an_import_of_a_higher_layer_is_rejected(house: Path, text: str) -> None:
-    (house / "src" / "house" / "attic" / "box.py").touch()
-    (house / "src" / "house" / "cellar" / "wine.py").write_text(text)
-    found = check(house / "rooms", house)
+def test_an_import_of_a_higher_layer_is_rejected(stack: Path, text: str) -> None:
+    (stack / "src" / "stack" / "upper" / "user.py").touch()
+    (stack / "src" / "stack" / "lower" / "item.py").write_text(text)
+    found = check(stack / "rooms", stack)
     assert found.returncode == 1
-    assert "house.cellar must not import house.attic" in found.stderr
+    assert "stack.lower must not import stack.upper" in found.stderr
 
 
-def test_a_circle_within_a_package_is_rejected(house: Path) -> None:
-    cellar = house / "src" / "house" / "cellar"
-    (cellar / "wine.py").write_text("from house.cellar.rack import Rack")
-    (cellar / "rack.py").write_text(
-        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import house.cellar.wine"
+def test_a_circle_within_a_package_is_rejected(stack: Path) -> None:
+    lower = stack / "src" / "stack" / "lower"
+    (lower / "item.py").write_text("from stack.lower.shelf import Shelf")
+    (lower / "shelf.py").write_text(
+        "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import stack.lower.item"
     )
-    found = check(house / "rooms", house)
+    found = check(stack / "rooms", stack)
     assert found.returncode == 1
     assert "in a circle" in found.stderr
 
 
-def test_a_module_without_a_layer_is_rejected(house: Path) -> None:
-    (house / "rooms").write_text("house.attic\nhouse.cellar\n")
-    assert "has no package for it" in check(house / "rooms", house).stderr
+def test_a_module_without_a_layer_is_rejected(stack: Path) -> None:
+    (stack / "rooms").write_text("stack.upper\nstack.lower\n")
+    assert "has no package for it" in check(stack / "rooms", stack).stderr
 
 
 @pytest.fixture
