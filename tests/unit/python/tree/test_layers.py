@@ -16,7 +16,7 @@ def check(*arguments: Path) -> subprocess.CompletedProcess[str]:
 @pytest.fixture
 def stack(tmp_path: Path) -> Path:
     """A package of two correct layers."""
-    (tmp_path / "rooms").write_text("stack.upper\nstack.lower\nstack\n")
+    (tmp_path / "layers").write_text("stack.upper\nstack.lower\nstack\n")
     for room in ("upper", "lower"):
         (tmp_path / "src" / "stack" / room).mkdir(parents=True)
         (tmp_path / "src" / "stack" / room / "__init__.py").touch()
@@ -36,7 +36,7 @@ def test_lint_checks_them() -> None:
 
 
 def test_an_import_of_a_lower_layer_is_accepted(stack: Path) -> None:
-    assert check(stack / "rooms", stack).returncode == 0
+    assert check(stack / "layers", stack).returncode == 0
 
 
 @pytest.mark.parametrize(
@@ -50,7 +50,7 @@ def test_an_import_of_a_lower_layer_is_accepted(stack: Path) -> None:
 def test_an_import_of_a_higher_layer_is_rejected(stack: Path, text: str) -> None:
     (stack / "src" / "stack" / "upper" / "user.py").touch()
     (stack / "src" / "stack" / "lower" / "item.py").write_text(text)
-    found = check(stack / "rooms", stack)
+    found = check(stack / "layers", stack)
     assert found.returncode == 1
     assert "stack.lower must not import stack.upper" in found.stderr
 
@@ -61,20 +61,20 @@ def test_a_circle_within_a_package_is_rejected(stack: Path) -> None:
     (lower / "shelf.py").write_text(
         "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    import stack.lower.item"
     )
-    found = check(stack / "rooms", stack)
+    found = check(stack / "layers", stack)
     assert found.returncode == 1
     assert "in a circle" in found.stderr
 
 
 def test_a_module_without_a_layer_is_rejected(stack: Path) -> None:
-    (stack / "rooms").write_text("stack.upper\nstack.lower\n")
-    assert "has no package for it" in check(stack / "rooms", stack).stderr
+    (stack / "layers").write_text("stack.upper\nstack.lower\n")
+    assert "has no package for it" in check(stack / "layers", stack).stderr
 
 
 @pytest.fixture
 def hall(tmp_path: Path) -> Path:
     """A C++ package of two correct layers."""
-    (tmp_path / "rooms").write_text("hall.main\nhall.gallery\nhall.vault\n")
+    (tmp_path / "layers").write_text("hall.main\nhall.gallery\nhall.vault\n")
     for room in ("gallery", "vault"):
         (tmp_path / "src" / "hall" / room).mkdir(parents=True)
     (tmp_path / "src" / "hall" / "CMakeLists.txt").touch()
@@ -89,7 +89,7 @@ def hall(tmp_path: Path) -> Path:
 
 
 def test_includes_of_a_lower_layer_are_accepted(hall: Path) -> None:
-    found = check(hall / "rooms", hall)
+    found = check(hall / "layers", hall)
     assert (found.returncode, found.stderr) == (0, "")
 
 
@@ -99,7 +99,7 @@ def test_includes_of_a_lower_layer_are_accepted(hall: Path) -> None:
 )
 def test_an_include_of_a_higher_layer_is_rejected(hall: Path, file: str, text: str) -> None:
     (hall / "src" / "hall" / "vault" / file).write_text(f"#pragma once\n{text}\n")
-    found = check(hall / "rooms", hall)
+    found = check(hall / "layers", hall)
     assert found.returncode == 1
     assert f"vault/{file}:2: hall.vault must not import hall.gallery" in found.stderr
 
@@ -109,7 +109,7 @@ def test_a_circle_of_includes_within_a_package_is_rejected(hall: Path) -> None:
     (vault / "coin.hpp").write_text('#include "vault/bar.hpp"\n')
     (vault / "bar.hpp").touch()
     (vault / "bar.cpp").write_text('#include "vault/bar.hpp"\n#include "vault/coin.hpp"\n')
-    found = check(hall / "rooms", hall)
+    found = check(hall / "layers", hall)
     assert found.returncode == 1
     assert "in a circle" in found.stderr
 
@@ -117,4 +117,4 @@ def test_a_circle_of_includes_within_a_package_is_rejected(hall: Path) -> None:
 def test_a_folder_without_a_layer_is_rejected(hall: Path) -> None:
     (hall / "src" / "hall" / "attic").mkdir()
     (hall / "src" / "hall" / "attic" / "box.hpp").touch()
-    assert "attic/box.hpp: tools/rooms has no package for it" in check(hall / "rooms", hall).stderr
+    assert "attic/box.hpp: tools/layers has no package for it" in check(hall / "layers", hall).stderr
