@@ -114,6 +114,9 @@ class Pid final : public rtcf::Component {
         }
     };
 
+    // 1 / Tt, 1/s; NaN without kp and ki, and then not used.
+    rtcf::Derived<double> tracking_rate_{this};
+
     rtcf::State<double> integral_{this, "integral", 0.0,
                                   rtcf::Doc("integral term, part of effort")};
     rtcf::State<double> setpoint_slope_{this, "setpoint_slope", 0.0, rtcf::Unit("1/s"),
@@ -140,6 +143,8 @@ class Pid final : public rtcf::Component {
             return fail(
                 "setpoint_tracking needs a finite setpoint_rate: in automatic mode, the "
                 "followed setpoint returns to its input at this rate");
+        tracking_rate_.stage(proposed[tracking_time] > 0.0 ? 1.0 / proposed[tracking_time]
+                                                           : std::abs(proposed[ki] / proposed[kp]));
         return true;
     }
 
@@ -187,7 +192,8 @@ class Pid final : public rtcf::Component {
             }
             return;
         }
-        follow(r, y, by_hand && setpoint_tracking);
+        const double step = dt();
+        follow(r, y, by_hand && setpoint_tracking, step);
         adoptGains(schedule);
         const double rest = terms(gains_) + forward;
         if (!std::isfinite(rest)) {
@@ -205,15 +211,15 @@ class Pid final : public rtcf::Component {
             effort.write(wanted);  // rejected, as above
             return;
         }
-        const double limited = limit(wanted);
+        const double limited = limit(wanted, step);
         if (by_hand) {
             // Ready for automatic mode: the same effort in the next cycle.
             if (ki != 0.0) integral_ = limited - rest;
         } else {
             // `actual` is the measured effort of the last cycle, at best.
             const double lost = has_actual ? effort_ - actual.value() : 0.0;
-            integrate(schedule * ki * withoutBand(setpoint_ - y, dead_band), wanted - limited,
-                      lost);
+            integrate(schedule * ki * withoutBand(setpoint_ - y, dead_band), wanted - limited, lost,
+                      step);
         }
         effort_ = limited;
         effort.write(limited);
@@ -235,13 +241,13 @@ class Pid final : public rtcf::Component {
             effort.write(wanted);  // rejected by the check
             return;
         }
-        effort_ = limit(wanted);
+        effort_ = limit(wanted, dt());
         effort.write(effort_);
         saturated.write(effort_ != wanted);
     }
 
     // Moves the followed setpoint and the filtered slopes by one cycle.
-    void follow(double r, double y, bool track) {
+    void follow(double r, double y, bool track, double elapsed) {
         if (!begun_) {
             setpoint_ = track ? y : r;
             measured_ = y;
@@ -252,12 +258,11 @@ class Pid final : public rtcf::Component {
             return;
         }
         const double before = setpoint_;
-        const double largest = setpoint_rate * dt();
+        const double largest = setpoint_rate * elapsed;
         setpoint_ = track ? y : std::clamp(r, before - largest, before + largest);
-        const double step = gap_ + dt();
-        setpoint_slope_ =
-            (filter_time * setpoint_slope_ + setpoint_ - before) / (filter_time + step);
-        measured_slope_ = (filter_time * measured_slope_ + y - measured_) / (filter_time + step);
+        const double inverse = 1.0 / (filter_time + gap_ + elapsed);
+        setpoint_slope_ = (filter_time * setpoint_slope_ + setpoint_ - before) * inverse;
+        measured_slope_ = (filter_time * measured_slope_ + y - measured_) * inverse;
         measured_ = y;
         gap_ = 0.0;
     }
@@ -283,8 +288,8 @@ class Pid final : public rtcf::Component {
 
     static double withoutBand(double e, double band) { return e - std::clamp(e, -band, band); }
 
-    double limit(double wanted) const {
-        const double step = rate * dt();
+    double limit(double wanted, double elapsed) const {
+        const double step = rate * elapsed;
         const double slow = std::clamp(wanted, effort_ - step, effort_ + step);
         // Limits that have become narrower hold at once.
         return std::clamp(slow, lower.value(), upper.value());
@@ -292,14 +297,12 @@ class Pid final : public rtcf::Component {
 
     // Moves the integral by one cycle. `excess` is the effort beyond the limits, `lost` the effort
     // that the actuator has not applied.
-    void integrate(double slope, double excess, double lost) {
-        const double step = dt();
+    void integrate(double slope, double excess, double lost, double step) {
         switch (anti_windup.value()) {
             case AntiWindup::BackCalculation: {
                 if (ki == 0.0) return;
-                const double time = tracking_time > 0.0 ? tracking_time.value() : std::abs(kp / ki);
-                const double share = time > step ? step / time : 1.0;
-                integral_ += slope * step - share * (excess + lost);
+                integral_ +=
+                    slope * step - std::min(1.0, step * tracking_rate_.value()) * (excess + lost);
                 return;
             }
             case AntiWindup::Clamping:
