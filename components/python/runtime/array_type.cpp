@@ -111,6 +111,7 @@ Described describe(const TypeTable& type) {
     info.fixed_size = true;
     info.flat = true;
     info.builds_message = false;
+    info.is_double = false;
     info.make_slot = type.make_slot;
     info.copy = type.copy;
     info.exchange = type.exchange;

@@ -91,13 +91,26 @@ struct AbiProbe {
              offsetof(QueueBase::Ring, sample),
              offsetof(QueueBase::Ring, port)});
         add({sizeof(SlotHeader), offsetof(SlotHeader, stamp), offsetof(Slot<double>, value)});
-        add({sizeof(TypeInfo), offsetof(TypeInfo, name), offsetof(TypeInfo, size),
-             offsetof(TypeInfo, ros_type), offsetof(TypeInfo, fixed_size), offsetof(TypeInfo, flat),
-             offsetof(TypeInfo, builds_message), offsetof(TypeInfo, plain),
-             offsetof(TypeInfo, make_slot), offsetof(TypeInfo, copy), offsetof(TypeInfo, exchange),
-             offsetof(TypeInfo, length), offsetof(TypeInfo, serialize),
-             offsetof(TypeInfo, deserialize), offsetof(TypeInfo, print), offsetof(TypeInfo, finite),
-             offsetof(TypeInfo, sample), offsetof(TypeInfo, copies), sizeof(ByteCopy)});
+        add({sizeof(TypeInfo),
+             offsetof(TypeInfo, name),
+             offsetof(TypeInfo, size),
+             offsetof(TypeInfo, ros_type),
+             offsetof(TypeInfo, fixed_size),
+             offsetof(TypeInfo, flat),
+             offsetof(TypeInfo, builds_message),
+             offsetof(TypeInfo, is_double),
+             offsetof(TypeInfo, plain),
+             offsetof(TypeInfo, make_slot),
+             offsetof(TypeInfo, copy),
+             offsetof(TypeInfo, exchange),
+             offsetof(TypeInfo, length),
+             offsetof(TypeInfo, serialize),
+             offsetof(TypeInfo, deserialize),
+             offsetof(TypeInfo, print),
+             offsetof(TypeInfo, finite),
+             offsetof(TypeInfo, sample),
+             offsetof(TypeInfo, copies),
+             sizeof(ByteCopy)});
         using Declaration = ParameterDeclaration;
         add({sizeof(ParameterBase), sizeof(ParameterValue), sizeof(Declaration),
              offsetof(Declaration, name), offsetof(Declaration, type),

@@ -4,6 +4,7 @@
 /// writer's value: there is no copy.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -276,6 +277,16 @@ class OutputBase {
     bool commit() {
         Rest& rest = *rest_;
         if (rest.staged->stamp == rest.slot->stamp) return true;
+        if (type().is_double) {
+            const double value = static_cast<const Slot<double>&>(*rest.staged).value;
+            if (rest.checked && !std::isfinite(value)) {
+                discard();
+                return false;
+            }
+            static_cast<Slot<double>&>(*rest.slot).value = value;
+            rest.slot->stamp = rest.staged->stamp;
+            return true;
+        }
         if (rest.checked && !type().finite(*rest.staged)) {
             discard();
             return false;

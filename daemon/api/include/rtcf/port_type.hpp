@@ -59,6 +59,9 @@ struct TypeInfo {
     bool flat;
     /// length() and serialize() build a message of variable size first, so they may allocate.
     bool builds_message;
+    /// The value is one double: `double` or std_msgs/Float64. The executor handles most values
+    /// without calls by this.
+    bool is_double;
 
     /// Makes a slot, with a copy of the sample's value unless `sample` is null. Not real-time safe.
     std::shared_ptr<SlotHeader> (*make_slot)(const SlotHeader* sample);
@@ -223,27 +226,29 @@ std::string printSlot(const SlotHeader& slot) {
 /// The description of T. Not real-time safe at the first call.
 template <typename T>
 const TypeInfo& typeInfo() {
-    static const TypeInfo info{PortType<T>::name(),
-                               PortType<T>::md5(),
-                               sizeof(T),
-                               alignof(T),
-                               PortType<T>::rosType(),
-                               PortType<T>::rosMd5(),
-                               PortType<T>::rosDefinition(),
-                               detail::IsPlain<T>::value,
-                               PortType<T>::kFixedSize,
-                               detail::kIsFlat<T>,
-                               detail::BuildsMessage<T>::value,
-                               &detail::makeSlot<T>,
-                               &detail::copySlot<T>,
-                               &detail::exchangeSlots<T>,
-                               &detail::slotLength<T>,
-                               &detail::serializeSlot<T>,
-                               &detail::deserializeSlot<T>,
-                               &detail::printSlot<T>,
-                               &detail::finiteSlot<T>,
-                               &detail::sampleOf<T>,
-                               &detail::copiesOf<T>};
+    static const TypeInfo info{
+        PortType<T>::name(),
+        PortType<T>::md5(),
+        sizeof(T),
+        alignof(T),
+        PortType<T>::rosType(),
+        PortType<T>::rosMd5(),
+        PortType<T>::rosDefinition(),
+        detail::IsPlain<T>::value,
+        PortType<T>::kFixedSize,
+        detail::kIsFlat<T>,
+        detail::BuildsMessage<T>::value,
+        detail::IsPlain<T>::value && std::string_view(PortType<T>::rosType()) == "std_msgs/Float64",
+        &detail::makeSlot<T>,
+        &detail::copySlot<T>,
+        &detail::exchangeSlots<T>,
+        &detail::slotLength<T>,
+        &detail::serializeSlot<T>,
+        &detail::deserializeSlot<T>,
+        &detail::printSlot<T>,
+        &detail::finiteSlot<T>,
+        &detail::sampleOf<T>,
+        &detail::copiesOf<T>};
     return info;
 }
 

@@ -165,6 +165,7 @@ TYPED_TEST(PythonArray, EqualsTheTypeOfCpp) {
     EXPECT_EQ(this->ours_.fixed_size, this->real_.fixed_size);
     EXPECT_EQ(this->ours_.flat, this->real_.flat);
     EXPECT_EQ(this->ours_.builds_message, this->real_.builds_message);
+    EXPECT_EQ(this->ours_.is_double, this->real_.is_double);
     EXPECT_EQ(this->ours_.sample(), this->real_.sample());
     EXPECT_EQ(this->ours_.copies(), this->real_.copies());
     EXPECT_TRUE(sameType(this->ours_, this->real_));
