@@ -71,7 +71,7 @@ def _run(processes: Processes, seconds: float) -> Outcome:
             order=client.get_order(),
             status=status,
             statistics=client.get_statistics(),
-            answers=next(p for p in client.get_component("R2").ports if p.name == "in4").count,
+            answer=next(p for p in client.get_component("R2").ports if p.name == "in4"),
             g1=g1.newest,
             g2=g2.newest,
         )

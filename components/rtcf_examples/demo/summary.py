@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import figure
-from rtcf.v1 import runner_pb2
+from rtcf.v1 import graph_pb2, runner_pb2
 
 _STATISTICS = ("min_ns", "mean_ns", "p50_ns", "p99_ns", "p999_ns", "max_ns")
 _COLUMNS = ("min", "mean", "p50", "p99", "p99.9", "max")
@@ -20,7 +20,7 @@ class Outcome:
     order: list[str]
     status: runner_pb2.RunnerStatus
     statistics: runner_pb2.RunnerStatistics
-    answers: int  # values of G2 that R2 read
+    answer: graph_pb2.PortInfo  # the input of R2 that reads G2's values
     g1: dict[str, Any]
     g2: dict[str, Any]
 
@@ -47,7 +47,8 @@ def show(outcome: Outcome, errors: list[str]) -> int:
     print(f"\n  G1          received {_of(g1, status)} of /R1_H1R2, last value {g1['newest']}")
     print(f"  G2          received {_of(g2, status)} of /R3_G2H1, last value {g2['newest']};")
     print(
-        f"              published {g2['sent']} values on /G2_R2, of which R2 read {outcome.answers}"
+        f"              published {g2['sent']} values on /G2_R2, last value in R2 "
+        f"{outcome.answer.value.removeprefix('data: ')}"
     )
     _show_realtime(status)
     errors = _errors(outcome) + errors
@@ -87,7 +88,7 @@ def _errors(outcome: Outcome) -> list[str]:
             found.append(f"{name} received values outside the range of the sums")
     if status.tap_dropped:
         found.append(f"{status.tap_dropped} values were dropped between the loop and ROS")
-    if outcome.answers == 0:
+    if not outcome.answer.HasField("value"):
         found.append("R2 read no value from G2")
     if status.state != runner_pb2.RUNNER_STATE_STOPPED:
         found.append(f"the loop did not stop in order: {status.status}")
