@@ -124,8 +124,9 @@ def test_the_papers_evaluation_runs_and_the_tools_find_it(
     with launching.client() as (client, runner):
         # G2 works: its value has arrived in the loop.
         wait_for(
-            lambda: next(p for p in client.get_component("R2", runner).ports if p.name == "in4")
-            .count > 0,
+            lambda: next(
+                p for p in client.get_component("R2", runner).ports if p.name == "in4"
+            ).HasField("value"),
             "an answer of G2",
         )  # fmt: skip
     press_ctrl_c(launch)

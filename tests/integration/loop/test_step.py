@@ -74,7 +74,7 @@ def test_time_advances_by_a_period_each_cycle(client: rtcf.Client) -> None:
     client.unload(["source"])
     client.step(10)
     (out,) = (port for port in client.get_component("sink").ports if port.name == "out")
-    assert (out.count, out.age_ns) == (10, 1_000_000_000)
+    assert out.age_ns == 1_000_000_000
 
 
 def test_the_highest_frequency_can_be_stepped_and_run(client: rtcf.Client) -> None:
@@ -87,7 +87,7 @@ def test_the_highest_frequency_can_be_stepped_and_run(client: rtcf.Client) -> No
     client.step(10)
     assert iteration(client) == 1010
     (out,) = (port for port in client.get_component("sink").ports if port.name == "out")
-    assert (out.count, out.age_ns) == (1000, 10 * 20_000)
+    assert out.age_ns == 10 * 20_000
     client.start()
     wait_until_after(client, 1000)
     client.stop()

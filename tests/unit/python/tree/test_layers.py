@@ -117,4 +117,5 @@ def test_a_circle_of_includes_within_a_package_is_rejected(hall: Path) -> None:
 def test_a_folder_without_a_layer_is_rejected(hall: Path) -> None:
     (hall / "src" / "hall" / "attic").mkdir()
     (hall / "src" / "hall" / "attic" / "box.hpp").touch()
-    assert "attic/box.hpp: tools/layers has no package for it" in check(hall / "layers", hall).stderr
+    found = check(hall / "layers", hall)
+    assert "attic/box.hpp: tools/layers has no package for it" in found.stderr
