@@ -54,9 +54,8 @@ struct Model {
         const Written& source = reader.broken && !reader.early ? latched : slot;
         if (writer) connect(reader, source);
         const Written& found = reader.held ? *reader.held : source;
-        reader.status = found.number != reader.read ? DataStatus::New
-                        : found.number != 0         ? DataStatus::Old
-                                                    : DataStatus::None;
+        reader.status = found.number != 0 ? DataStatus::Old : DataStatus::None;
+        if (found.number != reader.read) reader.status = DataStatus::New;
         reader.read = found.number;
         reader.out = found.value + 1.0;
     }
