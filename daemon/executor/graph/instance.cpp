@@ -189,8 +189,8 @@ void Instance::callLastHook(Hook hook, const std::function<void()>& call) noexce
     log_.write(LogLevel::Error, context_.full_name, fmt::format("{}: {}", hookName(hook), why));
 }
 
-// What a hook writes is later than the last cycle's values and those of earlier hooks, and earlier
-// than the next cycle's. What a constructor writes has the stamp 1.
+// Stamps of a hook's writes: later than those of the last cycle and of earlier hooks, and earlier
+// than those of the next cycle. A constructor's writes have the stamp 1.
 void Instance::setHookTime() noexcept {
     component_->setTime(
         std::max<std::int64_t>(context_.clock->time_ns + 2, component_->time() + 1));

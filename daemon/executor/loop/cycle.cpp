@@ -70,7 +70,7 @@ void Cycle::begin(std::int64_t period_ns, std::uint64_t warmup_cycles, std::int6
     active_ = true;
 }
 
-// Stamps must be earlier than the next cycle, so that what it writes is new to each reader.
+// Stamps must be earlier than the next cycle, so that its writes are new to each reader.
 void Cycle::moveTime(std::int64_t by_ns) {
     std::set<const SlotHeader*> moved;  // several inputs may read one slot
     const auto move = [&](const SlotHeader* slot) {
@@ -434,7 +434,7 @@ void Cycle::changeComponents(Adoption& adoption) noexcept {
         hand_over.skipped = hand_over.previous->context().disabled;
         if (hand_over.skipped) continue;
         for (const StateCopy& state : hand_over.states) state.copy();
-        // What it writes is later than its hooks' values, and earlier than the first cycle's.
+        // Its writes here are later than those of its hooks, and earlier than the first cycle's.
         Component& successor = *hand_over.successor;
         successor.setTime(active_ ? boundary_time_ns_ - 1 : successor.time() + 1);
         const HookNote note(notes_, successor, Hook::TakeOver);

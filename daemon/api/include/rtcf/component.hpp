@@ -152,7 +152,7 @@ class Component {
     /// @{
     /// Sets the context. Before configure(); not real-time.
     void attach(ComponentContext& context) noexcept { context_ = &context; }
-    /// Sets the loop time of the next hook, > 0, which stamps what the hook writes. Real-time safe.
+    /// Sets the loop time of the next hook, > 0, the stamp of its writes. Real-time safe.
     void setTime(std::int64_t time_ns) noexcept RTCF_NONBLOCKING { now_ = time_ns; }
     /// Rejects further declarations. After configure(); not real-time.
     void freeze() noexcept { rest_->frozen = true; }
