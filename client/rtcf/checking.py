@@ -23,12 +23,13 @@ from rtcf.sanitizer import Violation, violations
 INSTALLED = Path("/usr/lib/rtcf/rtcf-executor-rtsan")
 CONFIGURATION = Path("/etc/rtcfd/rtcfd.toml")
 _DESCRIBE_TIMEOUT_S = 30.0
-# The sanitizer selects the protocol by the program's name. rtcf-check depends on the last one; the
-# others are faster, but belong to LLVM packages.
+# The sanitizer selects the protocol by the program's name. rtcf-check depends on the package of the
+# last program; the others are faster, but belong to LLVM packages.
 _SYMBOLIZERS = ("llvm-symbolizer-22", "llvm-symbolizer", "addr2line")
-# For one hook or some updates; a longer one would stop a real loop.
+# Longest time without output, for one hook or some updates. The stall monitor of a loop is stricter
+# by default.
 _HANG_S = 10.0
-# Within a report: looking up its source lines can take long.
+# Longest time without output within a report: the look-up of source lines can be slow.
 _REPORT_S = 120.0
 _POLL_S = 0.05
 _BEGIN, _END = "==ERROR: RealtimeSanitizer: ", "SUMMARY: "

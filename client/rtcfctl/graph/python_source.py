@@ -53,18 +53,18 @@ def compiled(
     file = Path(source).resolve()
     if not file.is_file():
         raise NotCompiledError(f"{source}: no such file")
-    place = hashlib.sha256(os.fsencode(file)).hexdigest()[:8]
-    package = f"{_ros_name(file.stem)}_{place}"
+    path_hash = hashlib.sha256(os.fsencode(file)).hexdigest()[:8]
+    package = f"{_ros_name(file.stem)}_{path_hash}"
     library = compiled_folder() / package / f"{file.stem}.so"
-    # The fingerprint is beside the package: its folder has only libraries.
-    known = compiled_folder() / f".{package}"
-    print_of_it = fingerprint(file)
-    kept = known.read_text() if library.is_file() and known.is_file() else ""
-    if kept == print_of_it + _VERIFIED or (kept == print_of_it and not verify):
+    # The file of the fingerprint is beside the package's folder, which has only libraries.
+    saved_file = compiled_folder() / f".{package}"
+    current = fingerprint(file)
+    saved = saved_file.read_text() if library.is_file() and saved_file.is_file() else ""
+    if saved == current + _VERIFIED or (saved == current and not verify):
         return package
     progress(f"compiling {source}")
     options = ["--verify", _VERIFY] if verify else []
-    if kept != print_of_it:
+    if saved != current:
         options += ["-o", str(library)]
     done = subprocess.run(
         [_compiler(build_tree), source, *options], capture_output=True, text=True, check=False
@@ -78,7 +78,7 @@ def compiled(
     # permit more.
     for each in (library, library.parent, library.parents[1]):
         each.chmod(0o755)
-    known.write_text(print_of_it + (_VERIFIED if verify else ""))
+    saved_file.write_text(current + (_VERIFIED if verify else ""))
     return package
 
 
@@ -108,7 +108,7 @@ def fingerprint(source: Path) -> str:
     """Return a hash of everything that the compiled library depends on: the Python files in the
     source's folder, the compiler, and the runtime that is linked into each library.
     """
-    # The names of its shared libraries depend on the release of Debian.
+    # A compiled library links shared libraries whose names depend on the release of Debian.
     digest = hashlib.sha256(f"{rtcf.__version__} {_release()}\n".encode())
     compiler = importlib.util.find_spec("rtcf_compile")
     files = sorted(source.parent.glob("*.py"))

@@ -108,7 +108,7 @@ def _kernel(
         yield LateCycles(trace, kernel)
 
 
-class _Beside:
+class _Queries:
     """Queries rtcfd for events, log records and statistics, and adds them to the trace."""
 
     def __init__(self, client: rtcf.Client, runner: str, trace: Trace) -> None:
@@ -142,28 +142,28 @@ def _follow(
     output: Output,
 ) -> rtcf.RtcfError | None:
     """Trace the loop.  Return the error that ended it; raise the error if there are no cycles."""
-    beside = _Beside(client, args.runner or "rt_runner", trace)
+    queries = _Queries(client, args.runner or "rt_runner", trace)
     try:
-        _follow_cycles(stream, beside, trace, late, args, output)
+        _follow_cycles(stream, queries, trace, late, args, output)
         time.sleep(_SETTLE_S)
-        beside.ask()
+        queries.ask()
     except rtcf.RtcfError as error:
         if not trace.cycles:
             raise
         # The executor has died: complete the trace, and wait for the fault event.
         until = time.monotonic() + _FAULT_S
         with contextlib.suppress(rtcf.RtcfError):
-            beside.ask()
+            queries.ask()
             while not trace.faults and time.monotonic() < until:
                 time.sleep(_SETTLE_S)
-                beside.ask()
+                queries.ask()
         return error
     return None
 
 
 def _follow_cycles(
     stream: PortStream,
-    beside: _Beside,
+    queries: _Queries,
     trace: Trace,
     late: "LateCycles | None",
     args: argparse.Namespace,
@@ -179,7 +179,7 @@ def _follow_cycles(
             return
         say_if_ended(batch, args.runner, output)
         if time.monotonic() >= due:
-            beside.ask()
+            queries.ask()
             if late is not None:
                 late.ask()
             due = time.monotonic() + _EVERY_S
@@ -189,17 +189,17 @@ def _tell(
     trace: Trace, late: "LateCycles | None", args: argparse.Namespace, output: Output
 ) -> None:
     if not output.for_people:
-        told: dict[str, Any] = {
+        result: dict[str, Any] = {
             "file": str(args.file), "cycles": trace.cycles, "late": trace.late,
             "lost": trace.lost, "events": trace.events, "records": trace.records,
         }  # fmt: skip
         if late is not None:
-            told["kernel"] = [
+            result["kernel"] = [
                 {"cycle": cycle, "kind": culprit.kind.value, "instead": culprit.words,
                  "us": culprit.taken_ns / 1e3}
                 for cycle, culprit in late.found
             ]  # fmt: skip
-        output.data(told)
+        output.data(result)
         return
     lost = f"{counted(trace.lost, 'cycle')} lost" if trace.lost else "none lost"
     output.line(

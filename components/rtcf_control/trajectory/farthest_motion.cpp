@@ -122,8 +122,9 @@ double FarthestMotion::durationOfRise(double acceleration) const noexcept {
 
 double FarthestMotion::flattest() const noexcept {
     if (!dips_) return fastest_;
-    // The slope rises in a for a >= 0. For a < 0, its derivative has the sign of A + 4 a with a
-    // phase at the largest deceleration, and of m² + 4 a m + a² without.
+    // See the header for a, m and A. The slope grows with a for a >= 0. For a < 0, the derivative
+    // of the slope with respect to a has the sign of A + 4 a if the motion has a phase at the
+    // largest deceleration, and else the sign of m² + 4 a m + a².
     const double largest = limits_.acceleration;
     const double c = difference_;
     double rise = -largest / 4.0;
