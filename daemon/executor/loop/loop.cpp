@@ -58,7 +58,8 @@ class ProbeWork final : public BoundaryWork {
 
 // Cycles on time that remove one overrun from the bucket.
 constexpr std::uint64_t kBucketLeak = 1000;
-// Most cycles to catch up in a row; after a freeze of the machine there are many.
+// Largest number of cycles in a row that CatchUp catches up: a freeze of the machine may have
+// delayed many more.
 constexpr std::uint32_t kMostCaughtUp = 100;
 
 }  // namespace
@@ -286,7 +287,7 @@ std::uint64_t Loop::step(std::uint64_t cycles, const std::atomic<bool>* given_up
     for (; done < cycles && goesOn() && wanted(); ++done) {
         const Counting::Turn turn(cycle_.statistics().counting);
         if (!cycle_.run(nextStep(), 0)) break;
-        // Also after a snapshot with another elapsed time, and after a change of the period.
+        // A snapshot may have restored another elapsed time, and the period may have changed.
         cycle_.setElapsed(cycle_.clock().period_ns);
     }
     Log::setRealtimeThread(false);
@@ -304,8 +305,8 @@ std::int64_t Loop::nextStep() const noexcept {
     return cycle_.clock().time_ns + cycle_.clock().period_ns;
 }
 
-// Loop time rises strictly, even if a coarse clock shows the same time twice. By 2 ns, as hooks at
-// a boundary write 1 ns before its cycle.
+// Loop time rises strictly, even if a coarse clock shows the same time twice. It rises by at least
+// 2 ns, because takeOver() at a boundary writes with a stamp 1 ns before that of the cycle.
 std::int64_t Loop::afterLastCycle(std::int64_t time_ns) const noexcept {
     return std::max(time_ns, cycle_.clock().time_ns + 2);
 }
@@ -377,7 +378,7 @@ void Loop::followClock() noexcept {
 
 // Waits for the device that begins the cycles. The deadlines of its wait() are short, so that the
 // loop adopts changes and sees a stop between them. A beat is expected a period after the last one;
-// a beat that comes n periods later has missed n - 1.
+// if it comes n periods after the last one, n - 1 beats were missed.
 Loop::WakeUp Loop::waitForSource(Source& device) noexcept {
     constexpr std::int64_t kPatience = 10'000'000;
     const FlightRecorder::RealtimeNotes notes = recorder_.realtimeNotes();
@@ -463,10 +464,10 @@ std::int64_t Loop::nextDeadline(std::int64_t deadline_ns, std::int64_t end_ns) n
             break;
     }
     caught_up_ = 0;
-    const std::int64_t dropped = (end_ns - next) / period + 1;
-    noteMissed(dropped);
-    cycle_.setElapsed((dropped + 1) * period);
-    return next + dropped * period;
+    const std::int64_t missed = (end_ns - next) / period + 1;
+    noteMissed(missed);
+    cycle_.setElapsed((missed + 1) * period);
+    return next + missed * period;
 }
 
 }  // namespace rtcf::executor
