@@ -91,10 +91,11 @@ class FrameRing {
     /// Offset of a source's value among a frame's values, bytes.
     std::size_t offset(std::size_t source) const noexcept { return copy_.offset(source); }
     std::size_t capacity() const noexcept { return mask_ + 1; }
-    /// Size of a frame, words; size of its values, which come last, words; and the block of the
-    /// ring; null = in the process's own memory.
+    /// Size of a frame, words.
     std::size_t wordsOfFrame() const noexcept { return stride_; }
+    /// Size of a frame's values, which follow its header, words.
     std::size_t wordsOfValues() const noexcept { return copy_.words(); }
+    /// The memory of the ring; null = the process's own memory.
     const std::shared_ptr<FrameBlock>& block() const noexcept { return block_; }
     /// Capacity of a ring of these sources, frames.
     static std::size_t capacityFor(const std::vector<Source>& sources, std::size_t frames);
@@ -126,11 +127,11 @@ class FrameRing {
     std::size_t mask_;    // capacity minus 1
     std::shared_ptr<FrameBlock> block_;
     std::unique_ptr<Word[]> own_;  // NOLINT(modernize-avoid-c-arrays): if there is no block
-    // Values of setBase(); of the writer.
+    // Values of setBase(); for the writer only.
     std::unique_ptr<Word[]> base_;  // NOLINT(modernize-avoid-c-arrays)
     std::uint64_t base_end_ = 0;    // end_ at the last setBase()
     Word* words_ = nullptr;
-    Word* writing_;  // of the writer: the next frame
+    Word* writing_;  // the next frame; for the writer only
     std::atomic<std::uint64_t> end_{0};
     std::atomic<std::uint64_t> taken_{UINT64_MAX};
 };

@@ -16,7 +16,7 @@ namespace rtcf::executor {
 
 class ComponentTurns {
    public:
-    /// No watch takes the times.
+    /// No times, because no watch requests them.
     ComponentTurns() = default;
     /// @param first index of the first source of the ring that appendSources() has added
     ComponentTurns(const Schedule& schedule, const CycleCounter& counter, const FrameRing& ring,

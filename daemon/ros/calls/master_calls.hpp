@@ -39,7 +39,7 @@ class MasterCalls {
     /// The registrations at the master.
     Registrar& registrar() noexcept { return registrar_; }
 
-    /// @name Of the calling thread
+    /// @name Calls of the calling thread
     /// @{
     /// Begins to note calls without an answer.
     static void beginNote() noexcept;

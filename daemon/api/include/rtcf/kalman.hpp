@@ -42,7 +42,8 @@ struct KalmanSignal {
 
 namespace detail {
 
-/// Replaces a symmetric matrix by its Cholesky factor L, of L L'. Real-time safe.
+/// Computes the Cholesky factor L of a symmetric matrix S = L L', in place: L replaces the lower
+/// triangle of S. Real-time safe.
 /// @return false if the matrix is not positive definite
 template <typename Matrix>
 bool choleskyInPlace(Matrix& s) noexcept {
@@ -99,7 +100,7 @@ struct KalmanCorrection {
 /// @param x           estimate
 /// @param covariance  its covariance
 /// @param innovation  measured minus expected values
-/// @param observation derivative of the measurements by the states
+/// @param observation d(measurements) / d(states)
 /// @param noise       covariance of the measurements, positive definite
 /// @param present     bit i is set if measurement i is present
 template <typename State, typename Covariance, typename Measurement, typename Observation,
@@ -110,7 +111,7 @@ KalmanCorrection correctEstimate(State& x, Covariance& covariance, const Measure
     constexpr int kStates = State::MaxRowsAtCompileTime;
     constexpr int kMeasured = Measurement::MaxRowsAtCompileTime;
     static_assert(kStates > 0 && kMeasured > 0, "the sizes have an upper bound");
-    // As Eigen requires it of a matrix of one row or one column.
+    // Eigen requires column-major order of a column, and row-major order of a row.
     constexpr int kOrder = kStates == 1 ? Eigen::ColMajor : Eigen::RowMajor;
     using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, kOrder, kMeasured, kStates>;
     using Square = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMeasured, kMeasured>;
@@ -161,8 +162,8 @@ KalmanCorrection correctEstimate(State& x, Covariance& covariance, const Measure
 ///  - the parameters STATE_initial and STATE_deviation (of the first estimate), STATE_noise and
 ///    MEASUREMENT_noise.
 ///
-/// In each cycle, the filter moves its estimate by the time since the last cycle, and corrects it
-/// by the measurements that are new. A measurement without a new value, or that is not finite, is
+/// In each cycle, the filter advances its estimate by the time since the last cycle, and corrects
+/// it by the new measurements. A measurement without a new value, or that is not finite, is
 /// missing. The filter begins at the first measurement.
 template <int States, int Inputs, int Measurements>
 class ExtendedKalmanFilter : public Component {
@@ -183,7 +184,7 @@ class ExtendedKalmanFilter : public Component {
         return true;
     }
     void update() override;
-    /// In the last cycle as in any other.
+    /// Updates the estimate in the last cycle, too.
     void safe() noexcept override { update(); }
 
    protected:
@@ -193,17 +194,18 @@ class ExtendedKalmanFilter : public Component {
     ExtendedKalmanFilter(const Signals<States>& states, const Signals<Inputs>& inputs,
                          const Signals<Measurements>& measurements);
 
-    /// Moves the states by a time. Real-time.
-    /// @param x        states; the function replaces them by those after the time
-    /// @param u        inputs, constant during the time
+    /// Advances the states by `dt`. Real-time.
+    /// @param x        states; the function replaces them by those after `dt`
+    /// @param u        inputs, constant during `dt`
     /// @param dt       s
-    /// @param jacobian 0; the function fills in the derivative of the new states by the old ones
+    /// @param jacobian 0; the function fills in d(new states) / d(old states)
     virtual void predict(State& x, const Input& u, double dt, StateMatrix& jacobian) const = 0;
-    /// Computes the measurements that are expected. Real-time.
+    /// Computes the expected measurements. Real-time.
     /// @param y        the function fills in the expected measurements
-    /// @param jacobian 0; the function fills in the derivative of the measurements by the states
+    /// @param jacobian 0; the function fills in d(measurements) / d(states)
     virtual void measure(const State& x, Measurement& y, MeasurementMatrix& jacobian) const = 0;
-    /// Difference of measured and expected values, e.g. of angles without turns. Real-time.
+    /// Returns the measured minus the expected values. Override it for angles, to remove whole
+    /// turns from their differences. Real-time.
     virtual Measurement innovation(const Measurement& measured, const Measurement& expected) const {
         return measured - expected;
     }
@@ -339,7 +341,7 @@ void ExtendedKalmanFilter<States, Inputs, Measurements>::update() {
     age.write(age_);
 }
 
-// Inputs that are not finite keep their last values; false then.
+// Reads the inputs. An input that is not finite keeps its last value; the result is false then.
 template <int States, int Inputs, int Measurements>
 bool ExtendedKalmanFilter<States, Inputs, Measurements>::readInputs(Input& u) {
     bool usable = true;
@@ -353,7 +355,7 @@ bool ExtendedKalmanFilter<States, Inputs, Measurements>::readInputs(Input& u) {
     return usable;
 }
 
-// Rejected by the check: readers keep the last estimate.
+// Writes values that the check of Finite outputs rejects, so that readers keep the last estimate.
 template <int States, int Inputs, int Measurements>
 void ExtendedKalmanFilter<States, Inputs, Measurements>::reject() {
     for (const std::unique_ptr<Output<double>>& output : outputs_)

@@ -41,15 +41,15 @@ class MailboxBase {
 
     /// @name For the executor; not real-time
     /// @{
-    /// Accepts calls from here on. Before the component's first cycle.
+    /// Accepts calls from now on. Called before the component's first cycle.
     void open() {
         const std::lock_guard lock(mutex_);
         state_.store(State::Free, std::memory_order_relaxed);
         open_ = true;
         ++run_;
     }
-    /// Ends waiting calls with MailStatus::Ended and rejects new ones. After the component's last
-    /// cycle.
+    /// Ends waiting calls with MailStatus::Ended and rejects new ones. Called after the component's
+    /// last cycle.
     void close() {
         const std::lock_guard lock(mutex_);
         open_ = false;
@@ -61,7 +61,8 @@ class MailboxBase {
     explicit MailboxBase(Component* owner);
     ~MailboxBase() = default;
 
-    /// Waits for the end of all calls. By the destructor, while request and reply still exist.
+    /// Waits for the end of all calls. The destructor of the derived class calls it, while request
+    /// and reply still exist.
     void finish() {
         std::unique_lock lock(mutex_);
         open_ = false;
@@ -74,8 +75,8 @@ class MailboxBase {
     // request or a reply while the other reads it.
     enum class State { Free, Asked, Answered, Abandoned };
 
-    /// Calls update() and waits for the reply. One call is active at a time; others wait, and their
-    /// timeout includes that wait.
+    /// Hands a request to update() and waits for the reply. One call is active at a time; others
+    /// wait, and their timeout includes that wait.
     /// @param ask writes the request; called with the lock held
     /// @param take reads the reply; called with the lock held
     template <typename Ask, typename Take>
@@ -91,7 +92,7 @@ class MailboxBase {
             while (!ended() && !done()) {
                 const auto now = std::chrono::steady_clock::now();
                 if (now >= until) return false;
-                changed_.wait_until(lock, std::min(until, now + kLook));
+                changed_.wait_until(lock, std::min(until, now + kPollPeriod));
             }
             return true;
         };
@@ -117,7 +118,7 @@ class MailboxBase {
 
    private:
     friend struct AbiProbe;
-    static constexpr std::chrono::milliseconds kLook{1};
+    static constexpr std::chrono::milliseconds kPollPeriod{1};
     static constexpr std::chrono::hours kLongest{24 * 365};
 
     struct Caller {
@@ -145,7 +146,7 @@ class MailboxBase {
     std::condition_variable changed_;
     bool open_ = false;
     bool asking_ = false;
-    unsigned run_ = 0;  // runs of the loop so far
+    unsigned run_ = 0;  // number of calls of open()
     unsigned callers_ = 0;
 };
 

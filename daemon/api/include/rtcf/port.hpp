@@ -29,8 +29,8 @@ enum class DataStatus {
     New,   ///< written since this input's last read
 };
 
-/// Base class of inputs of all types: what each cycle touches, and no more. An InputPort holds the
-/// rest.
+/// Base class of inputs of all types. It has only the members that each cycle touches; an InputPort
+/// has the others.
 class InputBase {
    public:
     /// Declares the input to its owner.
@@ -248,8 +248,8 @@ class OutputBase {
     /// The slot that the component writes: slot(), or the staged one. For the executor. Real-time
     /// safe.
     SlotHeader* written() const noexcept RTCF_NONBLOCKING { return raw_; }
-    /// A slot with the capacity set by reserve(), to make copies of the output's values from. For
-    /// the executor; not real-time.
+    /// A slot with the capacity set by reserve(), as the argument of TypeInfo::make_slot(). For the
+    /// executor; not real-time.
     const SlotHeader* sample() const noexcept {
         return rest_->sample != nullptr ? rest_->sample.get() : rest_->slot.get();
     }
@@ -263,8 +263,8 @@ class OutputBase {
     /// Stages the output. Only before it has readers. Not real-time safe.
     void stage() {
         if (rest_->staged != nullptr) return;
-        // The component may hold a reference to its value, so it keeps the object; readers get a
-        // new one.
+        // The component may hold a reference to its value, so it keeps its slot; readers get a new
+        // one.
         std::shared_ptr<SlotHeader> seen = type().make_slot(sample());
         type().copy(*seen, *rest_->slot);
         rest_->staged = std::exchange(rest_->slot, std::move(seen));
