@@ -11,7 +11,7 @@
 
 namespace rtcf::ros1 {
 
-/// Owned by Subjects; watch thread.
+/// Owned by RosInterface; watch thread.
 class Claim {
    public:
     /// The namespace to use now: the configured one, unless a live node uses its names; otherwise

@@ -14,8 +14,8 @@ constexpr auto kResolving = std::chrono::milliseconds(500);
 
 }  // namespace
 
-// Answers of a master to one check.
-struct MasterLink::Sight {
+// The answers of a master to check().
+struct MasterLink::CheckResult {
     bool silent = true;
     std::string node_uri;  // URI of the node with our name; empty = none
     std::optional<int> pid;
@@ -73,7 +73,7 @@ MasterLink::State MasterLink::look(const executor::BridgeSettings& settings) {
     // Read before the check, so that the master's answers are newer.
     const bool told = node_.registrar().hasTold();
     const bool asked_to_go = takeShutdownRequest();
-    const Sight found = sight();
+    const CheckResult found = check();
     if (asked_to_go) obeyShutdownRequest(found);
     if (found.silent) {
         hosts_.doubt(host_);
@@ -201,8 +201,8 @@ bool MasterLink::start(const std::string& uri, const MasterAddress& address,
     return true;
 }
 
-// Chooses the configured name, else the runner's own, or the first free name after it: a second
-// node of a name would end the first one.
+// Chooses the first name that no other node has: the configured one, the runner's own, or the
+// runner's own with a number. A master ends the first of two nodes with the same name.
 // @return false if the master does not answer
 bool MasterLink::chooseName(ParallelCalls& master) {
     constexpr int kMost = 9;
@@ -248,27 +248,27 @@ void MasterLink::useAddress(const MasterAddress& address) {
     looks_ = std::make_unique<ParallelCalls>(address, hurry_);
 }
 
-MasterLink::Sight MasterLink::sight() {
+MasterLink::CheckResult MasterLink::check() {
     const std::string caller = node_.name().full();
     const std::vector<MasterCall> calls{{"lookupNode", texts({caller, caller})},
                                         {"getPid", texts({caller})},
                                         {"getParam", texts({caller, "/use_sim_time"})}};
     std::vector<MasterAnswer> answers =
         looks_->run(calls, kCallTimeout, Clock::now() + kCallTimeout);
-    Sight sight;
+    CheckResult result;
     MasterAnswer& node = answers[0];
     MasterAnswer& pid = answers[1];
     MasterAnswer& time = answers[2];
-    sight.silent = node.silent() || pid.silent();
-    if (node) sight.node_uri = node.text();
+    result.silent = node.silent() || pid.silent();
+    if (node) result.node_uri = node.text();
     if (pid && pid.value.getType() == XmlRpc::XmlRpcValue::TypeInt)
-        sight.pid = static_cast<int&>(pid.value);
+        result.pid = static_cast<int&>(pid.value);
     // Queried again each time, because it may be set at any time before a loop starts.
     if (!time.silent()) {
-        sight.simulated = time && time.value.getType() == XmlRpc::XmlRpcValue::TypeBoolean &&
-                          static_cast<bool&>(time.value);
+        result.simulated = time && time.value.getType() == XmlRpc::XmlRpcValue::TypeBoolean &&
+                           static_cast<bool&>(time.value);
     }
-    return sight;
+    return result;
 }
 
 bool MasterLink::lives(const std::string& node) {
@@ -307,13 +307,13 @@ bool MasterLink::takeShutdownRequest() {
 
 // Switches the node off. The roscpp node itself stays, because roscpp cannot be started twice. The
 // master requests a shutdown when another node takes the name; others do by `rosnode kill`.
-void MasterLink::obeyShutdownRequest(const Sight& sight) {
-    if (sight.silent) {  // the reason is found at the next check
+void MasterLink::obeyShutdownRequest(const CheckResult& found) {
+    if (found.silent) {  // the reason is found at the next check
         const std::lock_guard lock(mutex_);
         shutdown_request_ = true;
         return;
     }
-    const bool taken = !sight.node_uri.empty() && sight.node_uri != node_.uri();
+    const bool taken = !found.node_uri.empty() && found.node_uri != node_.uri();
     off_ = taken ? Why::NameTaken : Why::Killed;
     say_(whyOff());
 }
@@ -328,17 +328,18 @@ std::string MasterLink::whyOff() const {
            " runs at this ROS master: rename its host or runner";
 }
 
-// True if another node has our name and we must not take it back: before the master's shutdown
-// request, or afterwards while that node answers.
-bool MasterLink::nameIsTaken(const Sight& sight) {
+// True while another node has our name and may keep it. After the master's shutdown request, that
+// node keeps the name while it answers. Otherwise, this node takes it back at the third check in a
+// row.
+bool MasterLink::nameIsTaken(const CheckResult& found) {
     constexpr int kPatience = 3;  // checks
-    if (sight.node_uri.empty() || sight.node_uri == node_.uri()) {
+    if (found.node_uri.empty() || found.node_uri == node_.uri()) {
         taken_ = 0;
         off_ = Why::No;
         return false;
     }
     bool here = false;
-    const bool alive = answers(sight.node_uri, here);
+    const bool alive = answers(found.node_uri, here);
     taken_ = off_ == Why::NameTaken && alive ? 0 : taken_ + 1;
     if (taken_ < kPatience) return true;
     taken_ = 0;

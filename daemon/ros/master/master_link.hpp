@@ -89,7 +89,7 @@ class MasterLink {
 
    private:
     enum class Why { No, NameTaken, Killed };
-    struct Sight;
+    struct CheckResult;
 
     bool mayFollow(const std::string& uri, const MasterAddress& address, executor::Right needed);
     bool locate(const std::string& uri, MasterAddress& address);
@@ -98,12 +98,12 @@ class MasterLink {
     bool chooseName(ParallelCalls& master);
     void moveTo(const std::string& uri, const MasterAddress& address);
     void useAddress(const MasterAddress& address);
-    Sight sight();
+    CheckResult check();
     bool takeShutdownRequest();
     bool answers(const std::string& node_uri, bool& here);
     bool mayLive(const std::string& node_uri);
-    void obeyShutdownRequest(const Sight& sight);
-    bool nameIsTaken(const Sight& sight);
+    void obeyShutdownRequest(const CheckResult& found);
+    bool nameIsTaken(const CheckResult& found);
     std::string whyOff() const;
     State away(const std::string& problem);
 

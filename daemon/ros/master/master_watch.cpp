@@ -23,19 +23,19 @@ MasterWatch::MasterWatch(NodeName name, const executor::Access& access,
           std::move(name), access, [this](const std::string& message) { say(message); },
           [this] { wake(); },
           [this](const std::string& key) {
-              subjects_.noteParameterWritten(key);
+              interface_.noteParameterWritten(key);
               wake();
           }),
-      subjects_(rosout, log) {
+      interface_(rosout, log) {
     status_.node = link_.name().full();
 }
 
 void MasterWatch::attach(executor::RunnerView& runner, const executor::AskSupervisor& ask) {
-    subjects_.attach(runner, ask);
+    interface_.attach(runner, ask);
 }
 
 void MasterWatch::configure(const executor::BridgeSettings& settings) {
-    subjects_.configure(settings);
+    interface_.configure(settings);
     {
         const std::lock_guard lock(mutex_);
         if (!settings_ || settings_->master_uri != settings.master_uri)
@@ -49,12 +49,12 @@ void MasterWatch::configure(const executor::BridgeSettings& settings) {
 }
 
 void MasterWatch::setTable(const executor::BridgeTable& table) {
-    subjects_.setTable(table);
+    interface_.setTable(table);
     wake();
 }
 
 void MasterWatch::setClock(std::shared_ptr<executor::SimulatedClock> clock) {
-    subjects_.setClock(std::move(clock));
+    interface_.setClock(std::move(clock));
     wake();
 }
 
@@ -64,17 +64,17 @@ executor::BridgeStatus MasterWatch::status() const {
         const std::lock_guard lock(mutex_);
         status = status_;
     }
-    subjects_.show(status);
+    interface_.show(status);
     return status;
 }
 
 void MasterWatch::serveParameters(executor::ParameterRequest request) {
-    subjects_.serveParameters(std::move(request));
+    interface_.serveParameters(std::move(request));
 }
 
 void MasterWatch::stop() {
     stop_ = true;
-    subjects_.end();
+    interface_.end();
     link_.hurry();
     wake();
 }
@@ -146,7 +146,7 @@ void MasterWatch::step() {
         const std::lock_guard lock(mutex_);
         settings = *settings_;
     }
-    subjects_.tidy();
+    interface_.tidy();
     if (!settings.enabled) {
         if (link_.up()) say("ROS node " + link_.name().full() + " is off");
         leave();
@@ -164,7 +164,7 @@ void MasterWatch::step() {
         return;
     }
     if (state == MasterLink::State::Off) leave();
-    if (state == MasterLink::State::Silent) subjects_.reconcileWithoutMaster(link_);
+    if (state == MasterLink::State::Silent) interface_.reconcileWithoutMaster(link_);
     setProblem(link_.problem());
 }
 
@@ -179,11 +179,11 @@ void MasterWatch::serve(const executor::BridgeSettings& looked) {
         const bool operates = settings.peers >= executor::Right::Operate;
         status_.simulated_time = operates ? link_.simulated() : std::optional<bool>(false);
     }
-    const Reconciled result = subjects_.reconcile(link_, settings);
+    const Reconciled result = interface_.reconcile(link_, settings);
     link_.tell();
     setConnected();
     if (result == Reconciled::Again) wake();
-    for (const std::string& rejection : subjects_.newRejections()) say(rejection);
+    for (const std::string& rejection : interface_.newRejections()) say(rejection);
 }
 
 // Closes all topics and withdraws all registrations. The node stays, because roscpp cannot be
@@ -191,16 +191,16 @@ void MasterWatch::serve(const executor::BridgeSettings& looked) {
 void MasterWatch::leave() {
     if (!link_.up()) return;
     const auto deadline = MasterLink::Clock::now() + kLeaving;
-    subjects_.closeAll(link_, deadline);
+    interface_.closeAll(link_, deadline);
     sayLeft(link_.leave(deadline));
 }
 
 void MasterWatch::end() {
     const auto deadline = MasterLink::Clock::now() + kLeaving;
-    subjects_.drop();
-    subjects_.closeAll(link_, deadline);
+    interface_.drop();
+    interface_.closeAll(link_, deadline);
     sayLeft(link_.end(deadline));
-    subjects_.detach();
+    interface_.detach();
 }
 
 void MasterWatch::setProblem(const std::string& problem) {
@@ -215,7 +215,7 @@ void MasterWatch::setConnected() {
     const std::lock_guard lock(mutex_);
     status_.connected = true;
     status_.killed = false;
-    status_.problem = subjects_.notice();
+    status_.problem = interface_.notice();
 }
 
 void MasterWatch::say(const std::string& message) {

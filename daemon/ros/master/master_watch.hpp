@@ -15,7 +15,7 @@
 #include "ros/logging/console_backend.hpp"
 #include "ros/logging/rosout.hpp"
 #include "ros/master/master_link.hpp"
-#include "ros/master/subjects.hpp"
+#include "ros/master/ros_interface.hpp"
 #include "ros/roscpp/hooks.hpp"
 
 namespace rtcf::ros1 {
@@ -37,7 +37,7 @@ class MasterWatch {
     void setTable(const executor::BridgeTable& table);
     void setClock(std::shared_ptr<executor::SimulatedClock> clock);
     executor::BridgeStatus status() const;
-    bool feeds(const executor::Injector& injector) const { return subjects_.feeds(injector); }
+    bool feeds(const executor::Injector& injector) const { return interface_.feeds(injector); }
     void serveParameters(executor::ParameterRequest request);
     /// Ends run() soon, even if the master hangs.
     void stop();
@@ -81,7 +81,7 @@ class MasterWatch {
     // Watch thread only, except for thread-safe functions.
     const ConsoleBackend console_;
     MasterLink link_;
-    Subjects subjects_;
+    RosInterface interface_;
     std::string said_;
 };
 

@@ -24,8 +24,8 @@ enum class RunnerState;
 
 namespace rtcf::ros1 {
 
-/// Owned by Subjects; watch thread. A separate thread reports the health once a second, and at once
-/// when the loop's state changes, because the node may be about to end.
+/// Owned by RosInterface; watch thread. A separate thread reports the health once a second, and at
+/// once when the loop's state changes, because the node may be about to end.
 class Introspection {
    public:
     /// @param log receives the reasons of failed service calls; outlives this object

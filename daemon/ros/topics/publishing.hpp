@@ -23,7 +23,7 @@
 
 namespace rtcf::ros1 {
 
-/// Owned by Subjects. A separate thread empties the taps every millisecond, with or without a
+/// Owned by RosInterface. A separate thread empties the taps every millisecond, with or without a
 /// master, so that they do not overflow.
 class Publishing {
    public:

@@ -25,7 +25,7 @@ namespace rtcf::ros1 {
 
 class TopicSubscriber;
 
-/// Owned by Subjects. A separate thread delivers the messages.
+/// Owned by RosInterface. A separate thread delivers the messages.
 class Subscribing {
    public:
     using Injectors = std::vector<std::shared_ptr<executor::Injector>>;

@@ -13,7 +13,7 @@
 
 namespace rtcf::ros1 {
 
-/// Collects rejections during its life. Owned by Subjects; called in roscpp's threads.
+/// Collects rejections during its life. Owned by RosInterface; called in roscpp's threads.
 class RejectedConnections final : private ros::console::LogAppender {
    public:
     RejectedConnections();

@@ -1,10 +1,10 @@
-#include "ros/master/subjects.hpp"
+#include "ros/master/ros_interface.hpp"
 
 #include <utility>
 
 namespace rtcf::ros1 {
 
-Subjects::Subjects(Rosout& rosout, executor::Log& log)
+RosInterface::RosInterface(Rosout& rosout, executor::Log& log)
     : rosout_(rosout),
       log_(log),
       publishing_([&log](const std::string& line) { log.write(LogLevel::Warn, {}, line); }),
@@ -12,40 +12,40 @@ Subjects::Subjects(Rosout& rosout, executor::Log& log)
           log.write(LogLevel::Warn, component, line + " (requested by dynamic_reconfigure)");
       }) {}
 
-void Subjects::attach(executor::RunnerView& runner, const executor::AskSupervisor& ask) {
+void RosInterface::attach(executor::RunnerView& runner, const executor::AskSupervisor& ask) {
     auto introspection = std::make_unique<Introspection>(runner, ask, log_);
     const std::lock_guard lock(mutex_);
     introspection_ = std::move(introspection);
     rosout_.show(&runner);
 }
 
-void Subjects::detach() {
+void RosInterface::detach() {
     const std::lock_guard lock(mutex_);
     introspection_.reset();
 }
 
-void Subjects::configure(const executor::BridgeSettings& settings) {
+void RosInterface::configure(const executor::BridgeSettings& settings) {
     publishing_.configure(settings);
     reconfiguring_.refuseOutOfRange(settings.refuse_out_of_range);
 }
 
-void Subjects::setTable(const executor::BridgeTable& table) {
+void RosInterface::setTable(const executor::BridgeTable& table) {
     publishing_.setTaps(table.outputs);
     subscribing_.setInjectors(table.inputs);
     reconfiguring_.setSets(table.parameters);
 }
 
-void Subjects::setClock(std::shared_ptr<executor::SimulatedClock> clock) {
+void RosInterface::setClock(std::shared_ptr<executor::SimulatedClock> clock) {
     subscribing_.setClock(std::move(clock));
 }
 
-void Subjects::serveParameters(executor::ParameterRequest request) {
+void RosInterface::serveParameters(executor::ParameterRequest request) {
     reconfiguring_.serve(std::move(request));
 }
 
-void Subjects::noteParameterWritten(const std::string& key) { reconfiguring_.noteWritten(key); }
+void RosInterface::noteParameterWritten(const std::string& key) { reconfiguring_.noteWritten(key); }
 
-void Subjects::show(executor::BridgeStatus& status) const {
+void RosInterface::show(executor::BridgeStatus& status) const {
     status.publications = publishing_.open();
     status.subscriptions = subscribing_.open();
     status.follows_clock = subscribing_.followsClock();
@@ -54,7 +54,7 @@ void Subjects::show(executor::BridgeStatus& status) const {
     if (status.problem.empty()) status.problem = reconfiguring_.problem();
 }
 
-Reconciled Subjects::reconcile(MasterLink& link, const executor::BridgeSettings& settings) {
+Reconciled RosInterface::reconcile(MasterLink& link, const executor::BridgeSettings& settings) {
     open_ = true;
     if (rejected_ == nullptr) rejected_ = std::make_unique<RejectedConnections>();
     if (link.takeNew()) reconfiguring_.forget();
@@ -74,11 +74,11 @@ Reconciled Subjects::reconcile(MasterLink& link, const executor::BridgeSettings&
     return topics & reconfiguring_.reconcile(handle, master, link.caller());
 }
 
-void Subjects::reconcileWithoutMaster(MasterLink& link) {
+void RosInterface::reconcileWithoutMaster(MasterLink& link) {
     subscribing_.reconcileWithoutMaster(link.node().handle());
 }
 
-void Subjects::closeAll(MasterLink& link, MasterLink::Clock::time_point deadline) {
+void RosInterface::closeAll(MasterLink& link, MasterLink::Clock::time_point deadline) {
     // At a slow master, withdrawing registrations is more important.
     constexpr auto kReserve = std::chrono::milliseconds(500);
     if (!std::exchange(open_, false)) return;

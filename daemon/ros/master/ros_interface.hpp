@@ -25,11 +25,11 @@
 namespace rtcf::ros1 {
 
 /// Owned by the master watch. Watch thread, unless stated otherwise.
-class Subjects {
+class RosInterface {
    public:
     /// @param rosout opened and closed with the node; outlives this object
     /// @param log receives the reasons of rejected changes; outlives this object
-    Subjects(Rosout& rosout, executor::Log& log);
+    RosInterface(Rosout& rosout, executor::Log& log);
 
     /// @name Any thread; return at once
     /// @{
