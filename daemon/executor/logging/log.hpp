@@ -57,13 +57,13 @@ class Log final : public LogSink {
     /// library.
     void drain();
 
-    /// Sets the most records per second from one source line of one component; 0 = no limit. The
-    /// log counts suppressed records and reports the count. Any thread.
+    /// Sets the largest number of records per second from one source line of one component; 0 = no
+    /// limit. The log counts suppressed records and reports the count. Any thread.
     void setLimit(std::uint32_t records) {
         const std::lock_guard<std::mutex> lock(drain_mutex_);
         limit_.set(records);
     }
-    /// Passes on all pending records and counts of suppressed ones. The last call.
+    /// Passes on all pending records and counts of suppressed ones. Must be the last call.
     void end();
 
     /// Number of records dropped because a ring was full. Any thread.

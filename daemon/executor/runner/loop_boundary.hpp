@@ -1,7 +1,7 @@
 /// @file
 /// Changes and copies at the loop's next cycle boundary: waits for the boundary, limits the work of
-/// one boundary, and names the component that keeps the loop from it. Owned by the runner; graph
-/// thread.
+/// one boundary, and names the component that keeps the loop from reaching it. Owned by the runner;
+/// graph thread.
 #pragma once
 
 #include <cstddef>
@@ -31,7 +31,7 @@ class LoopBoundary {
     /// Most bytes to copy at one boundary.
     std::size_t mostBytes() const;
     /// @param what subject of the message, e.g. "a snapshot"
-    /// @throws Error if these are too many bytes for one boundary
+    /// @throws Error if `bytes` exceeds mostBytes()
     void requireSmall(std::size_t bytes, const char* what) const;
 
     /// Longest wait for the boundary, ns.
