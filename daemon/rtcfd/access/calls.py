@@ -1,4 +1,4 @@
-"""The calls of rtcf.v1.Control, each with its required right and its largest request and texts.
+"""The calls of rtcf.v1.Control, each with its required right and the limits of its request.
 
 A call that is missing here requires the right to administer; a test checks that
 none is missing.

@@ -191,7 +191,7 @@ class Store:
         if not running:
             try:
                 _unmark(mark)
-                # At once: the rest may fail, and in the old state the loop runs.
+                # Sync now: the rest may fail, and the old state says that the loop runs.
                 whole_files.sync_folder(self._folder)
             except OSError:
                 self.note_stop(runner)
