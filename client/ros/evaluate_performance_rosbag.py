@@ -1,5 +1,5 @@
 #!/usr/bin/python3 -I
-"""Evaluates a loop's recorded cycles, as Fig. 2 of the paper does: two histograms and numbers.
+"""Evaluates the recorded cycles of a loop, as in Fig. 2 of the paper: two histograms, statistics.
 
 rosbag record -e '.*/rt_runner/cycles'
 rosrun rtcf evaluate_performance_rosbag BAG FREQUENCY
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-# Ours, and RTCF 2021's, which has no number of the cycle.
+# The types of rtcf and of RTCF 2021; the latter has no cycle number.
 _TYPES = ("rtcf_msgs/Cycle", "rtcf_msgs/IterationInfo")
 _OF = " or ".join(_TYPES)
 _QUANTILES = {"p50": 0.5, "p99": 0.99, "p999": 0.999}
@@ -31,11 +31,11 @@ class Cycles:
     begins: list[int]  # when the cycle began
     durations: list[int]
     lost: int  # cycles that the loop ran and the bag does not have
-    runs: list[int]  # indices where the loop was started anew
+    runs: list[int]  # index of the first cycle of each start of the loop
 
 
 def read(bag: Path, topic: str) -> tuple[str, Cycles]:
-    """Return the topic and its cycles; without a topic, the only loop's."""
+    """Return the topic and its cycles; an empty `topic` selects that of the only loop."""
     try:
         import rosbag  # takes a while
     except ImportError:
@@ -52,7 +52,7 @@ def read(bag: Path, topic: str) -> tuple[str, Cycles]:
     except OSError as error:
         raise Unusable(f"cannot read {bag}: {error.strerror}") from None
     except rosbag.ROSBagException as error:
-        raise Unusable(f"{bag}: {error}; `rosbag reindex` may mend it") from None
+        raise Unusable(f"{bag}: {error}; `rosbag reindex` may repair it") from None
 
 
 def _choose(bag: Path, topic: str, found: dict[str, str]) -> str:
@@ -67,7 +67,7 @@ def _choose(bag: Path, topic: str, found: dict[str, str]) -> str:
             f"{bag} has no topic of type {_OF}: record it with `rosbag record -e "
             "'.*/rt_runner/cycles'`"
         )
-    # Of a loop whose both topics were recorded, the one that tells more.
+    # If both topics of a loop were recorded, use Cycle, which has more fields.
     better = {name.rpartition("/")[0] for name, kind in found.items() if kind.endswith("/Cycle")}
     loops = [
         name
@@ -100,7 +100,7 @@ def _cycles(messages: Iterable[Any]) -> Cycles:
 
 
 def jitter(cycles: Cycles, period_ns: float) -> list[float]:
-    """Return how far each time between two begins is from a whole number of periods, in ns."""
+    """Return the deviation of each interval between cycles from a multiple of the period, in ns."""
     runs = set(cycles.runs)
     found = []
     for index in range(1, len(cycles.begins)):
@@ -118,14 +118,14 @@ def summary(values_ns: Sequence[float]) -> dict[str, float]:
     ordered = sorted(values_ns)
     result = {"min": ordered[0], "mean": sum(ordered) / len(ordered)}
     for name, quantile in _QUANTILES.items():
-        # The smallest value that so many are not above.
+        # At least this share of the values is no larger.
         result[name] = ordered[min(len(ordered) - 1, int(quantile * len(ordered)))]
     result["max"] = ordered[-1]
     return {name: round(value * _US, 3) for name, value in result.items()}
 
 
 def evaluate(cycles: Cycles, frequency: float) -> dict[str, Any]:
-    """Return all numbers."""
+    """Return the results, by name."""
     period_ns = 1e9 / frequency
     deviations = jitter(cycles, period_ns)
     if not deviations:
@@ -135,7 +135,7 @@ def evaluate(cycles: Cycles, frequency: float) -> dict[str, Any]:
         "lost": cycles.lost,
         "overruns": sum(duration >= period_ns for duration in cycles.durations),
         "duration_us": summary(cycles.durations),
-        # Early and late alike.
+        # Absolute values: early and late cycles count alike.
         "jitter_us": summary([abs(each) for each in deviations]),
     }
 
@@ -167,7 +167,7 @@ def plot(cycles: Cycles, frequency: float, title: str, file: Path) -> None:
 
 
 def table(topic: str, numbers: dict[str, Any]) -> str:
-    """Return the numbers for people."""
+    """Return the results as text."""
     rows = (("calculation duration", "duration_us"), ("scheduling jitter", "jitter_us"))
     names = list(numbers["duration_us"])
     lines = [
@@ -194,7 +194,7 @@ def _frequency(text: str) -> float:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Evaluate a bag; return the exit status: 0 done, 1 the bag is of no use, 2 wrong usage."""
+    """Evaluate a bag; return the exit status: 0 success, 1 the bag cannot be evaluated, 2 usage."""
     parser = argparse.ArgumentParser(
         prog="evaluate_performance_rosbag",
         description=__doc__,
@@ -206,10 +206,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "frequency", type=_frequency, metavar="FREQUENCY", help="nominal frequency of the loop, Hz"
     )
-    parser.add_argument("--topic", default="", help="if the bag has several loops")
-    parser.add_argument(
-        "--png", type=Path, help="where the plot goes (default: BAG.evaluation.png)"
-    )
+    parser.add_argument("--topic", default="", help="loop topic, if the bag has several")
+    parser.add_argument("--png", type=Path, help="file of the plot (default: BAG.evaluation.png)")
     parser.add_argument("--json", action="store_true", help="print the numbers as JSON")
     given = parser.parse_args(arguments)
     try:

@@ -1,3 +1,5 @@
-"""What the nodes rt_runner and rt_launcher and the rosrun tools of the ROS package `rtcf` are
-made of.  They are processes of a launch but no ROS nodes: rospy would wait for a master
-where they are to end, so they talk to it themselves, with a limit for each call."""
+"""The nodes rt_runner and rt_launcher, and the rosrun tools of the ROS package `rtcf`.
+
+The two nodes do not use rospy, which waits for a master at its end.  They call the master
+themselves, with a timeout for each call.
+"""

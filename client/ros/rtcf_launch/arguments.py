@@ -1,8 +1,8 @@
-"""The command line of a ROS node, and the part of the environment that belongs to it.
+"""The command line of a ROS node, and the environment variables that complete it.
 
 from:=to        a remap
 _name:=value    a private parameter
-__name:=…       what ROS says: __name, __ns, __master, __hostname, __ip, __log
+__name:=value   a special key of ROS: __name, __ns, __master, __hostname, __ip, __log
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,12 +17,12 @@ DEFAULT_MASTER = "http://localhost:11311"
 
 @dataclass
 class Arguments:
-    """What a node is told at its start."""
+    """The parsed arguments of a node."""
 
     name: str  # base name
     ns: str  # namespace, absolute
     master_uri: str
-    hostname: str  # by which peers reach this host; empty = not said
+    hostname: str  # by which peers reach this host; empty = not given
     log_file: str  # of roslaunch for this node; empty = none
     words: list[str] = field(default_factory=list)
     remaps: list[tuple[str, str]] = field(default_factory=list)
@@ -35,7 +35,7 @@ class Arguments:
 
 
 def parse(argv: Sequence[str], environment: Mapping[str, str], default_name: str) -> Arguments:
-    """Return the arguments, without the program's name in front."""
+    """Parse the arguments of a program, without its name."""
     special: dict[str, str] = {}
     remaps: list[tuple[str, str]] = []
     private: dict[str, Any] = {}
@@ -76,7 +76,7 @@ def resolve(name: str, ns: str) -> str:
 
 
 def upward(name: str, ns: str) -> list[str]:
-    """Return what a relative name may mean, from its own namespace up to the root."""
+    """Return the absolute names that a name may have, from its namespace up to the root."""
     if name.startswith("/"):
         return [resolve(name, "/")]
     parts = [part for part in ns.split("/") if part]

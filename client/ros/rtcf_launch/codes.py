@@ -1,17 +1,16 @@
-"""Exit statuses of rt_runner and rt_launcher; roslaunch's `required` and `respawn` build on
-them."""
+"""Exit statuses of rt_runner and rt_launcher, for roslaunch's `required` and `respawn`."""
 
 from enum import IntEnum
 
 
 class Code(IntEnum):
-    """Why the process has ended."""
+    """The reason for the end of the process."""
 
-    DONE = 0  # it was asked to end
-    REFUSED = 1  # rtcfd or the machine refused; nothing is loaded
-    USAGE = 2  # wrong arguments or parameters
+    DONE = 0  # ended on request
+    REFUSED = 1  # an error of rtcfd or the machine; nothing is loaded
+    USAGE = 2  # invalid arguments or parameters
     FAILED = 3  # the component failed or was taken out; the loop ended by a fault
-    LOST = 4  # the runner or rtcfd has gone
+    LOST = 4  # the runner or rtcfd ended
 
 
 class Ending(Exception):

@@ -28,7 +28,7 @@ class ComponentChoice:
             if word in _FIRST_FLAGS:
                 first = True
             elif word.startswith("-"):
-                raise Ending(Code.USAGE, f"unknown option {word}: there is -f, --is_first")
+                raise Ending(Code.USAGE, f"unknown option {word}: use -f, --is_first")
             else:
                 names.append(word)
         if len(names) not in (0, 2):
@@ -54,7 +54,7 @@ class ComponentChoice:
                 Code.USAGE, f"~{named[0]} and the arguments both name the component: use one"
             )
         if self.first and given.has("is_first"):
-            raise Ending(Code.USAGE, "~is_first and -f say the same thing: use one")
+            raise Ending(Code.USAGE, "~is_first and -f both make the component first: use one")
         if not package:
             package, type_name = ((given.text(name) or "").strip() for name in _NAMES)
         if not package or not type_name:

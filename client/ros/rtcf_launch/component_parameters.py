@@ -17,7 +17,7 @@ _LARGEST = 2**31 - 1  # XML-RPC has no larger integers
 
 @dataclass
 class LauncherParameters:
-    """What an rt_launcher is asked to do."""
+    """The values of rt_launcher's private parameters."""
 
     runner: str | None  # name of an rt_runner; None = the nearest one
     first: bool
@@ -30,7 +30,7 @@ class LauncherParameters:
 
 
 def named_runner(values: Mapping[str, Any]) -> str | None:
-    """Return the name of the runner that is asked for, if any is."""
+    """Return the name of the runner that the parameters select; None = they select none."""
     for name in (PREFIX + "runner", "runner"):
         value = values.get(name)
         if isinstance(value, str):
@@ -41,10 +41,12 @@ def named_runner(values: Mapping[str, Any]) -> str | None:
 def read(
     values: Mapping[str, Any], declared: Container[str] = ()
 ) -> tuple[LauncherParameters, list[str]]:
-    """Check the launcher's own parameters; return them, and a line for each that gives way.
+    """Check the launcher's own parameters; return them, and a note for each that belongs to the
+    component instead.
 
-    Each may be named with a prefix.  Without it, it is the component's if that declares it, or
-    if the value does not fit: components may read private parameters that they do not declare.
+    A name may have the prefix `rtcf_`.  A parameter without the prefix belongs to the component
+    if the component declares it, or if its value is not valid for the launcher: components may
+    read private parameters that they do not declare.
     """
     given = Parameters(values)
     notes: list[str] = []
@@ -56,7 +58,7 @@ def read(
         if name in declared:
             why = "the component declares it"
         elif not fits:
-            why = "it means nothing without ~every"
+            why = "it has no effect without ~every"
         elif given.has(name):
             value = given.raw(name)
             try:
@@ -67,7 +69,7 @@ def read(
                 why = str(error)
         if given.has(name):
             notes.append(
-                f"~{name} is left to the component, rt_launcher's is ~{PREFIX}{name}: {why}"
+                f"~{name} belongs to the component, not to rt_launcher (use ~{PREFIX}{name}): {why}"
             )
         return None
 
@@ -90,9 +92,9 @@ def settings(
     others: Mapping[str, Any], declared: Mapping[str, graph_pb2.ParameterInfo]
 ) -> tuple[list[graph_pb2.ParameterSetting], list[str], list[str]]:
     """Return load-time values of declared parameters, the names of the other private ones, and a
-    line for each of those that may be a slip of the pen.
+    warning for each other one that may be misspelt.
 
-    The others are left to the component's node handle, for which any name is right.
+    The component's node handle can read the others, which may have any name.
     """
     result = []
     rest = []
@@ -131,7 +133,7 @@ def _value(info: graph_pb2.ParameterInfo, value: Any) -> graph_pb2.ParameterValu
 
 
 def _ignore(value: Any) -> str:
-    """Return an expression over connections; a list of them means any."""
+    """Return a regular expression for connections; a list matches if any of its items does."""
     if value is None:
         return ""
     expressions = value if isinstance(value, list) else [value]

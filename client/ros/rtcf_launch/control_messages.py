@@ -1,7 +1,7 @@
 """The messages of control_msgs/FollowJointTrajectory, which Debian 12 does not have.
 
-If the package control_msgs is on the search path, its own classes are used. Else they are made from
-the definitions below, with the same names and MD5 sums, so that any client fits.
+If the package control_msgs is on the search path, its own classes are used. Otherwise, classes are
+made from the definitions below, with the same names and MD5 sums, so that any client fits.
 """
 
 from typing import Any
@@ -73,7 +73,7 @@ def _made() -> dict[str, Any]:
     from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
     parts = [f"{_PACKAGE}/{name}\n{text}" for name, text in _OWN.items()]
-    # The definitions of others end with those that they refer to, which are all in this list.
+    # The definition of a message type ends with those of its fields, which are all in this list.
     for each in (Header, GoalID, GoalStatus, JointTrajectory, JointTrajectoryPoint):
         own, _, _ = each._full_text.partition("=" * 80)
         parts.append(f"{each._type}\n{own}")

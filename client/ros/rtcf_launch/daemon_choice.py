@@ -1,7 +1,7 @@
-"""Which rtcfd holds the runner of a launch: the system's, or a private one.
+"""The choice of the rtcfd for the runner of a launch: the system's, or a private one.
 
-`auto` takes the system's if it answers and we may use it, it finds each package
-in the folder where we would, it has the same ROS master, and the runner is free.
+`auto` selects the system's rtcfd if it answers and grants the necessary right, finds each package
+in the same folder as this process, has the same ROS master, and the runner is free.
 """
 
 import urllib.parse
@@ -18,28 +18,28 @@ from rtcf_launch import runner_entry
 
 @dataclass(frozen=True)
 class Choice:
-    """Whether it is the system's, and why."""
+    """The chosen rtcfd: the system's or a private one, and the reason."""
 
     system: bool
     why: str
 
 
 def choose(socket: str, runner: str, master_uri: str, build_tree: Path | None) -> Choice:
-    """Return what `auto` means here."""
+    """Return the choice for the parameter ~daemon = `auto`."""
     try:
         with rtcf.Client(socket) as client:
             objection = _objection(client, runner, master_uri, component_folders([], build_tree))
     except rtcf.DaemonUnreachableError as error:
         return Choice(False, error.what)
     except rtcf.RtcfError as error:
-        return Choice(False, f"the system daemon says: {error}")
+        return Choice(False, f"the system daemon reports an error: {error}")
     if objection:
         return Choice(False, objection)
-    return Choice(True, "it may be used, has all packages and the same ROS master")
+    return Choice(True, "it is accessible, has all packages and the same ROS master")
 
 
 def _objection(client: rtcf.Client, runner: str, master_uri: str, folders: Sequence[Path]) -> str:
-    """Say what stands against the system daemon; empty = nothing."""
+    """Return a reason not to use the system daemon; empty = there is none."""
     runners = list(client.get_status().runners)
     here = [each for each in runners if each.runner == runner]
     for status in here:
@@ -68,7 +68,7 @@ def _objection(client: rtcf.Client, runner: str, master_uri: str, folders: Seque
 
 
 def same_master(one: str, other: str) -> bool:
-    """Tell whether two URIs mean the same master, as far as names tell."""
+    """Return whether two URIs are those of the same master, judging by host name and port."""
     return _address(one) == _address(other)
 
 

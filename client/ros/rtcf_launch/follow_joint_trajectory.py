@@ -2,7 +2,7 @@
 
 MoveIt and other clients send trajectories by this action. The node passes each to the input
 `trajectory` of the generator, whose outputs and state show the progress. The loop itself runs
-without the node. A goal replaces the tail of the goal before, which ends as preempted.
+without the node. A new goal replaces the rest of the previous goal, which ends as preempted.
 """
 
 from __future__ import annotations
@@ -30,22 +30,22 @@ TrajectoryGenerator of rtcf_control, on the machine of its loop.
 
 private parameters:
   generator         name of the component (default: trajectory)
-  runner            name of the node rt_runner (default: rt_runner); if there is none, the runner
-                    of the system daemon, or that of RTCF_SOCKET, with this name
+  runner            name of the node rt_runner (default: rt_runner); if there is no such node, the
+                    runner with this name of the system daemon, or of the daemon at RTCF_SOCKET
   joint_states      topic of the measured positions (default: joint_states)
-  goal_time         s after the end of a trajectory in which the joints must be within the
-                    tolerances of the goal, if the goal has no time (default: 1)
+  goal_time         time after the end of a trajectory, in s, within which the joints must reach
+                    the tolerances of the goal, if the goal has no goal_time_tolerance (default: 1)
 """
 _FEEDBACK_S = 0.05
 _SIGNALS = (
     "done", "halted", "last_trajectory_number", "rejections", "position", "commanded_velocity"
 )  # fmt: skip
-_ACCEPT_CYCLES = 2000  # after which a trajectory that is neither accepted nor rejected is lost
+_ACCEPT_CYCLES = 2000  # longest wait until a trajectory is accepted or rejected
 
 
 @dataclass(frozen=True)
 class _Sample:
-    """The generator in one cycle."""
+    """The values of the generator in one cycle."""
 
     done: bool
     halted: bool
@@ -64,7 +64,7 @@ class _FailedError(Exception):
 
 
 class _PreemptedError(Exception):
-    """The goal was cancelled, or another one has come."""
+    """The goal was cancelled, or another one has replaced it."""
 
 
 class Server:
@@ -104,7 +104,9 @@ class Server:
         info = self._client.get_component(self._generator, self._runner)
         found = next((each for each in info.parameters if each.name == name), None)
         if found is None:
-            raise rtcf.RtcfError(f"{self._generator} is no TrajectoryGenerator: it has no {name}")
+            raise rtcf.RtcfError(
+                f"{self._generator} is not a TrajectoryGenerator: it has no parameter {name}"
+            )
         return str(found.value.string_value)
 
     def _measure(self, message: Any) -> None:
@@ -181,7 +183,7 @@ class Server:
                     "INVALID_GOAL",
                     f"{self._generator} rejects the trajectory: see its log, `rtcfctl logs`",
                 )
-        raise _FailedError("INVALID_GOAL", f"{self._generator} does not read it")
+        raise _FailedError("INVALID_GOAL", f"{self._generator} does not read the trajectory")
 
     def _await_end(self, samples: Iterator[_Sample], before: _Sample, goal: Any) -> None:
         import rospy
@@ -227,7 +229,7 @@ class Server:
                 raise _PreemptedError
 
     def _check(self, sample: _Sample, tolerances: Sequence[Any], code: str) -> None:
-        """Raise _FailedError if a joint is not within its tolerance; 0 or less is none."""
+        """Raise _FailedError if a joint is not within its tolerance; 0 or less = no tolerance."""
         for each in tolerances:
             if each.position <= 0.0:
                 continue

@@ -29,7 +29,7 @@ class LeaseLost:
 
 @dataclass(frozen=True)
 class MasterBack:
-    """A ROS master that did not know the node knows it again."""
+    """The node is registered again after a restart of the ROS master."""
 
 
 class Inbox:

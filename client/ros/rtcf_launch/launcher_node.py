@@ -1,6 +1,6 @@
-"""rt_launcher: loads a component into the runner of its launch, for as long as it lives.
+"""rt_launcher: loads a component into the runner of its launch, and unloads it when it ends.
 
-Exit statuses: codes.py.
+codes.py has the exit statuses.
 """
 
 import contextlib
@@ -29,7 +29,7 @@ _POLL_S = 0.2
 _SAY_EVERY_S = 5.0
 _PREDECESSOR_S = 10.0
 _LAST_CALL_S = 0.5
-# rtcfd waits as long for us after its restart; a little more for the restart itself.
+# After its restart, rtcfd waits 10 s for the holders of leases; the restart itself takes time, too.
 _RETURN_S = 15.0
 _RETRY_S = 0.3
 _END_S = 3.0
@@ -38,23 +38,25 @@ USAGE = """\
 usage: rosrun rtcf rt_launcher [-f] PACKAGE COMPONENT [__name:=NAME] [FROM:=TO]...
                                [_PARAMETER:=VALUE]...
 
-Loads a component into the loop of an rt_runner, and unloads it at its own end.
+Loads a component into the loop of an rt_runner, and unloads it when this process ends.
 
 private parameters; all others are values of parameters that the component declares:
   runner                   name of the rt_runner (default: the nearest one named rt_runner, else
                            the only one of the launch)
   rt_package, rt_type      PACKAGE and COMPONENT, instead of arguments
-  is_first                 all connections into it are loop breaks; also as argument -f, --is_first
-  topics_ignore_for_graph  regular expression, or a list: connections that are, for it
-  every, phase             run in each n-th cycle, and in which of them
-  optional                 after a fault the loop goes on without it
+  is_first                 all connections into the component are loop breaks; also as argument
+                           -f, --is_first
+  topics_ignore_for_graph  regular expression, or a list: connections into the component that are
+                           loop breaks
+  every, phase             run in each n-th cycle, and the first of these cycles
+  optional                 continue the loop without the component after its fault
   on_lease_lost            if this process dies: stop the loop and unload (stop, the default),
                            unload, or keep
-Those that are not RTCF 2021's are also known as rtcf_runner, rtcf_every and so on; a component
-that declares a name of ours gets it.
+runner, every, phase, optional and on_lease_lost may have the prefix rtcf_; without it, they belong
+to a component that declares them.
 
-exit status: 0 asked to end, 1 refused, 2 wrong arguments or parameters, 3 the component failed
-or was taken out, 4 its runner has gone
+exit status: 0 ended on request, 1 an error, 2 invalid arguments or parameters, 3 the component
+failed or was taken out, 4 its runner ended
 """
 
 _CODES = {
@@ -85,7 +87,7 @@ class LauncherNode:
         self._lost_since: float | None = None
 
     def run(self) -> Code:
-        """Serve until it is asked to end or something ends it."""
+        """Load the component and wait for the end; return the exit status."""
         try:
             self._read_parameters()
             self._enter_ros()
@@ -113,7 +115,7 @@ class LauncherNode:
         component_parameters.read(self._values)
 
     def _enter_ros(self) -> None:
-        """Become a node; wait until one of our name, which that displaces, has unloaded."""
+        """Register as a node.  This displaces a node of the same name: wait until it has ended."""
         self._ros_node = RosNode(
             self._master,
             self._node,
@@ -126,13 +128,13 @@ class LauncherNode:
         if before and not wait_until_gone(before, self._inbox.pause, _PREDECESSOR_S):
             raise Ending(
                 Code.DONE if self._inbox.end_requested else Code.REFUSED,
-                f"a node {self._node} is there already, and does not end",
+                f"another node {self._node} exists and does not end",
             )
 
     # -- the runner ---------------------------------------------------------
 
     def _find_runner(self) -> RunnerEntry:
-        """Wait for the runner, which may start after us."""
+        """Wait for the runner, which may start later than this process."""
         named = component_parameters.named_runner(self._values)
         choice = RunnerChoice(self._master, self._given.ns, named)
         self._unnamed = (
@@ -144,7 +146,7 @@ class LauncherNode:
         say_at = begin + _SAY_EVERY_S
         while True:
             now = time.monotonic()
-            with contextlib.suppress(MasterSilent):  # it may be restarted just now
+            with contextlib.suppress(MasterSilent):  # it may be restarting
                 if entry := choice.poll() or self._poll_unnamed(now - begin):
                     return entry
             if now > say_at:
@@ -175,7 +177,7 @@ class LauncherNode:
         self._client = rtcf.Client(entry.socket)
         package, type_name = self._component.package, self._component.type
         offered = {each.type: each for each in self._client.list_types(package).types}
-        # A type that is not there is refused by rtcfd, which knows why.
+        # rtcfd rejects an unknown type, and its error has the reason.
         declared = (
             {each.name: each for each in offered[type_name].parameters}
             if type_name in offered
@@ -201,7 +203,7 @@ class LauncherNode:
             notes += slips
             if rest:
                 names = ", ".join(f"~{name}" for name in rest)
-                self._screen.info(f"left to the component's node handle: {names}")
+                self._screen.info(f"parameters for the component's node handle: {names}")
         for note in notes:
             self._screen.warn(note)
         self._spec = spec
@@ -226,7 +228,7 @@ class LauncherNode:
 
     def _serve(self) -> Code:
         self._load(self._find_runner())
-        deadline: float | None = None  # for the end that was asked for
+        deadline: float | None = None  # of the requested end
         while True:
             left = None if deadline is None else max(deadline - time.monotonic(), 0.0)
             event = self._inbox.get(left)
@@ -274,7 +276,7 @@ class LauncherNode:
             if self._loaded:
                 raise Ending(Code.LOST, str(error))
             if isinstance(error, HolderGoneError):
-                # It ended between our look and our call: wait for the next one.
+                # The runner ended after it was found: wait for the next one.
                 self._load(self._find_runner())
                 return
             raise Ending(Code.REFUSED, str(error))
@@ -282,7 +284,7 @@ class LauncherNode:
         if self._lost_since is None:
             self._lost_since = now
             if self._loaded:
-                self._screen.warn(f"{error}; the loop goes on, coming back")
+                self._screen.warn(f"{error}; the loop continues; reconnecting")
         if not self._loaded or now - self._lost_since > _RETURN_S:
             raise Ending(Code.LOST, str(error))
         if self._inbox.pause(_RETRY_S):
@@ -291,7 +293,7 @@ class LauncherNode:
 
 
 def _prints_to_log(log_file: str) -> bool:
-    """Tell whether standard output is the file that roslaunch makes without output="screen"."""
+    """Return whether standard output is the file that roslaunch uses without output="screen"."""
     try:
         there = os.stat(f"{log_file.removesuffix('.log')}-stdout.log")
         return os.path.samestat(os.fstat(sys.stdout.fileno()), there)
@@ -311,6 +313,6 @@ def main(argv: Sequence[str] | None = None, build_tree: Path | None = None) -> i
     except (ValueError, Ending) as error:
         print(f"rt_launcher: {error}\n{USAGE}", file=sys.stderr, end="")
         return Code.USAGE
-    # By rosrun it may have no name: then it is that of the component type.
+    # Without a name, as from rosrun, the component type is the name.
     given.name = given.name or component.type.rpartition("::")[2] or "rt_launcher"
     return LauncherNode(given, component).run()

@@ -1,5 +1,7 @@
-"""The services get_loggers and set_logger_level of a node, in TCPROS, so that rqt_logger_level can
-ask it as any other.  The level holds for the node's own output."""
+"""The services get_loggers and set_logger_level of a node, in TCPROS, for rqt_logger_level.
+
+The level applies to the node's own messages.
+"""
 
 import contextlib
 import socket
@@ -21,10 +23,10 @@ _PATIENCE_S = 10.0
 
 
 class LoggerServices:
-    """Serves both on a port of its own, in threads of its own."""
+    """Serves both services on its own port, in its own threads."""
 
     def __init__(self, node: str, level_set: Callable[[str], None]) -> None:
-        """`level_set` is called, by any thread, with a new level."""
+        """Serve; any thread calls `level_set` with a new level."""
         self._node = node
         self._level = "info"
         self._level_set = level_set
@@ -34,7 +36,7 @@ class LoggerServices:
         threading.Thread(target=self._listen, daemon=True).start()
 
     def end(self) -> None:
-        """Take no more calls."""
+        """Accept no more calls."""
         with contextlib.suppress(OSError):
             self._listener.shutdown(socket.SHUT_RDWR)
         self._listener.close()

@@ -1,4 +1,4 @@
-"""A ROS master: its parameters and registrations, with a limit for each call."""
+"""A ROS master: its parameters and registrations, with a timeout for each call."""
 
 import xmlrpc.client
 from http.client import HTTPException
@@ -23,7 +23,7 @@ class _Transport(xmlrpc.client.Transport):
 
 
 class Master:
-    """One master.  Every call returns in `timeout_s`, or raises MasterSilent."""
+    """One master.  Each call raises MasterSilent after `timeout_s` without an answer."""
 
     def __init__(self, uri: str, caller: str, timeout_s: float = TIMEOUT_S) -> None:
         self.uri = uri
@@ -36,7 +36,7 @@ class Master:
         return value if code == 1 else default
 
     def has(self, name: str) -> bool:
-        """Tell whether a parameter or namespace is there."""
+        """Return whether a parameter or namespace exists."""
         return bool(self._call("hasParam", name)[2])
 
     def set(self, name: str, value: Any) -> None:
@@ -44,7 +44,7 @@ class Master:
         self._call("setParam", name, value)
 
     def delete(self, name: str) -> None:
-        """Delete a parameter, if it is there."""
+        """Delete a parameter if it exists."""
         self._call("deleteParam", name)
 
     def names(self) -> list[str]:
@@ -53,25 +53,25 @@ class Master:
         return [str(name) for name in names] if code == 1 else []
 
     def node_uri(self, name: str) -> str:
-        """Return where a node is said to be; empty = there is none of that name."""
+        """Return the URI of a registered node; empty = there is no such node."""
         code, _, uri = self._call("lookupNode", name)
         return str(uri) if code == 1 else ""
 
     def service_uri(self, name: str) -> str:
-        """Return where a service is said to be; empty = there is none of that name."""
+        """Return the URI of a registered service; empty = there is no such service."""
         code, _, uri = self._call("lookupService", name)
         return str(uri) if code == 1 else ""
 
     def register_service(self, service: str, service_uri: str, node_uri: str) -> None:
-        """Register a service of the caller's; another node of its name is told to shut down."""
+        """Register a service.  The master shuts down another node with the caller's name."""
         self._call("registerService", service, service_uri, node_uri)
 
     def unregister_service(self, service: str, service_uri: str) -> None:
-        """Take a service back."""
+        """Withdraw the registration of a service."""
         self._call("unregisterService", service, service_uri)
 
     def _call(self, method: str, *arguments: Any) -> Any:
-        # A connection for each call: a master may be restarted between two of them.
+        # A connection for each call, because the master may be restarted between two calls.
         try:
             proxy = xmlrpc.client.ServerProxy(self.uri, transport=_Transport(self._timeout_s))
             with proxy:

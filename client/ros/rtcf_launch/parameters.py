@@ -1,4 +1,4 @@
-"""Private parameters of a node: reading them with their types, one clear line for what is wrong."""
+"""Private parameters of a node, read with type checks; an error is one line."""
 
 import difflib
 from collections.abc import Iterable, Mapping
@@ -14,13 +14,13 @@ def _wrong(message: str) -> Ending:
 
 
 class Parameters:
-    """The private parameters of one node; each is taken by its name."""
+    """The private parameters of one node.  Reading a parameter removes it, see rest()."""
 
     def __init__(self, values: Mapping[str, Any]) -> None:
         self._values = dict(values)
 
     def boolean(self, name: str, default: bool | None = None) -> bool | None:
-        """Take true or false, or 1 or 0."""
+        """Take a bool: true, false, 1 or 0."""
         value = self._take(name)
         if value is _MISSING:
             return default
@@ -72,12 +72,12 @@ class Parameters:
         return value.lower()
 
     def raw(self, name: str) -> Any:
-        """Take a value of any type; None if it is not there."""
+        """Take a value of any type; None if it does not exist."""
         value = self._take(name)
         return None if value is _MISSING else value
 
     def has(self, name: str) -> bool:
-        """Tell whether a parameter is there and has not been taken."""
+        """Return whether a parameter exists and has not been taken."""
         return name in self._values
 
     def put(self, name: str, value: Any) -> None:
@@ -85,7 +85,7 @@ class Parameters:
         self._values[name] = value
 
     def rest(self) -> dict[str, Any]:
-        """Return what nobody has taken."""
+        """Return the parameters that have not been taken."""
         return dict(self._values)
 
     def _take(self, name: str) -> Any:
@@ -93,12 +93,12 @@ class Parameters:
 
 
 def as_integer(value: Any) -> Any:
-    """Return the integer that a number such as 2.0 is; other values as they are."""
+    """Convert a float with an integer value, such as 2.0, to int; return other values unchanged."""
     return int(value) if isinstance(value, float) and value.is_integer() else value
 
 
 def as_boolean(value: Any) -> Any:
-    """Return the truth value that the integer 1 or 0 stands for; other values as they are."""
+    """Convert the integers 1 and 0 to bool; return other values unchanged."""
     return bool(value) if isinstance(value, int) and value in (0, 1) else value
 
 

@@ -1,8 +1,8 @@
-"""A ROS node for those who look: rosnode list, info, ping and kill know it, and a second node of
-its name displaces it.  rospy would be one too, but waits for a master where we are to end.
+"""A ROS node without rospy: rosnode list, info, ping and kill work with it, and a second node of
+the same name displaces it.  A node of rospy would wait for a master at its end.
 
-It has no topics.  Its services are those that every node has, for its loggers.  When the master is
-started anew, the node registers again.
+It has no topics.  Its services are the logger services that every node has.  After a restart of
+the master, the node registers again.
 """
 
 import os
@@ -20,7 +20,7 @@ from rtcf_launch.master import Master, MasterSilent
 
 _LARGEST_CALL = 64 * 1024  # bytes
 _POLL_S = 0.1
-_LOOK_S = 1.0  # between two looks at the master
+_CHECK_S = 1.0  # between two checks of the registration
 _PROBE_S = 1.0
 
 
@@ -28,7 +28,7 @@ class _Handler(SimpleXMLRPCRequestHandler):
     rpc_paths = ()  # any
 
     def do_POST(self) -> None:
-        """Answer a call, if it is no longer than one of a master's."""
+        """Answer a call; reject one that is longer than any call of a master."""
         try:
             size = int(self.headers.get("content-length", ""))
         except ValueError:
@@ -43,11 +43,11 @@ class _Server(ThreadingMixIn, SimpleXMLRPCServer):
     daemon_threads = True
 
     def handle_error(self, *_: Any) -> None:
-        """Say nothing of callers that go away."""
+        """Ignore callers that disconnect early."""
 
 
 class RosNode:
-    """The node; owned by the process' main thread, served by threads of its own."""
+    """The node.  The main thread owns it; its own threads answer calls."""
 
     def __init__(
         self,
@@ -57,7 +57,7 @@ class RosNode:
         ended: Callable[[str], None],
         level_set: Callable[[str], None],
     ) -> None:
-        """Serve; register() makes it known.
+        """Start to answer calls; register() makes the node known.
 
         ended      called by any thread, when a ROS peer wants the node to end
         level_set  called by any thread, when a ROS peer sets the level of its logger
@@ -76,14 +76,14 @@ class RosNode:
         threading.Thread(target=self._server.serve_forever, daemon=True).start()
 
     def register(self) -> str:
-        """Make the node known; return where one of its name was before."""
+        """Register the node; return the URI of the node that had its name; empty = none."""
         before = self._master.node_uri(self._name)
         self._register()
         return "" if before == self._uri else before
 
     def stay_registered(self, back: Callable[[], None]) -> None:
-        """Register again at each master that does not know the node; then call `back`, by a thread
-        of the node's.  Another node of its name is left alone."""
+        """Start a thread that registers the node again whenever the master has lost it, and then
+        calls `back`.  If another node has the name, it does nothing."""
         threading.Thread(target=self._stay_registered, args=(back,), daemon=True).start()
 
     def _register(self) -> None:
@@ -91,7 +91,7 @@ class RosNode:
             self._master.register_service(service, self._service_uri, self._uri)
 
     def _stay_registered(self, back: Callable[[], None]) -> None:
-        while not self._ending.wait(_LOOK_S):
+        while not self._ending.wait(_CHECK_S):
             try:
                 if self._master.node_uri(self._name) or self._ending.is_set():
                     continue
@@ -101,7 +101,7 @@ class RosNode:
             back()
 
     def end(self, master: Master) -> None:
-        """Take all back, by a master object whose calls are short."""
+        """Withdraw all registrations and end; `master` needs a short timeout."""
         self._ending.set()
         try:
             for service in self._services.names:
@@ -114,7 +114,7 @@ class RosNode:
 
     def _calls(self) -> dict[str, Callable[..., Any]]:
         def shutdown(_: str, why: str = "") -> Any:
-            self._ended(why or "a ROS node has asked it to end")
+            self._ended(why or "a ROS node requested a shutdown")
             return [1, "shutting down", 0]
 
         return {
@@ -132,9 +132,9 @@ class RosNode:
 
 
 def wait_until_gone(uri: str, pause: Callable[[float], bool], limit_s: float) -> bool:
-    """Return when nobody listens at a node's URI any more; tell whether that is so in time.
+    """Wait until nobody listens at a node's URI; return False after `limit_s`.
 
-    `pause` waits for some seconds, and returns true if waiting is to end.
+    `pause` waits for some seconds, and returns True to end the wait.
     """
     parts = urllib.parse.urlsplit(uri)
     deadline = time.monotonic() + limit_s

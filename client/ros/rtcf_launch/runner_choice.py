@@ -1,5 +1,5 @@
 """The runner that a launcher loads into: the named one, else the nearest rt_runner, else the only
-runner of the launch.  Only living runners count: entries of others may be left over."""
+runner of the launch.  Only running runners count, because a dead runner may leave its entry."""
 
 import os
 import time
@@ -9,10 +9,10 @@ from rtcf_launch.codes import Code, Ending
 from rtcf_launch.master import Master
 from rtcf_launch.runner_entry import RunnerEntry
 
-# roslaunch has set the parameters of all nodes before it starts any: so long a runner that has
-# some may need to come to life.
+# Longest wait for a runner that has parameters to start: roslaunch sets the parameters of all nodes
+# before it starts the first one.
 _GRACE_S = 5.0
-# So long a runner of any other name may need to say that it is there.
+# Longest wait for a runner of another name to write its entry.
 _SETTLE_S = 2.0
 
 
@@ -55,7 +55,7 @@ class RunnerChoice:
             self.waiting = f"runner {node}, which starts"
             return None if entry.starting else entry
         left_over = self._master.has(node)
-        what = "its parameters are there, it is not" if left_over else "there is none of that name"
+        what = "it has parameters but does not run" if left_over else "there is no such runner"
         self.waiting = f"runner {node}: {what}{self._others()}"
         return None
 
@@ -70,7 +70,7 @@ class RunnerChoice:
         } or there
         if len(ours) > 1:
             raise Ending(
-                Code.USAGE, f"which runner? There are {', '.join(ours)}: name one by ~runner"
+                Code.USAGE, f"several runners run: {', '.join(ours)}: select one with ~runner"
             )
         if not ours:
             self.waiting = f"runner {nearest}: no rt_runner runs at this ROS master"
@@ -91,4 +91,4 @@ class RunnerChoice:
 
     def _others(self) -> str:
         there = ", ".join(self._living_runners())
-        return f" (there are: {there}; ~runner names another)" if there else ""
+        return f" (running: {there}; select one with ~runner)" if there else ""

@@ -1,7 +1,7 @@
-"""The entry of a runner on the ROS parameter server, by which launchers and tools find it.
+"""The entry of a runner on the ROS parameter server, by which launchers and tools find the runner.
 
-rt_runner writes it beside its private parameters: without a socket when it starts, so that
-launchers wait for it, and with one when rtcfd holds the runner.
+rt_runner writes it beside its private parameters: without a socket when rt_runner starts, so that
+launchers wait, and with a socket when rt_runner holds the lease on the runner.
 """
 
 import os

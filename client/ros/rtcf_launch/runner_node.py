@@ -1,6 +1,6 @@
-"""rt_runner: holds a runner for the life of a launch, and starts its loop when it is time.
+"""rt_runner: leases a runner for the life of a launch, and starts its loop as ~mode says.
 
-Exit statuses: codes.py.
+codes.py has the exit statuses.
 """
 
 import contextlib
@@ -29,15 +29,15 @@ from rtcf_launch.master import Master, MasterSilent
 from rtcf_launch.ros_node import RosNode, wait_until_gone
 from rtcf_launch.screen import Screen
 
-# rtcfd waits as long for us after its restart; a little more for the restart itself.
+# After its restart, rtcfd waits 10 s for the holders of leases; the restart itself takes time, too.
 _RETURN_S = 15.0
 _RETRY_S = 0.3
 _PREDECESSOR_S = 5.0
 _DISPLACED_S = 10.0
 _END_S = 3.0
 _LAST_CALL_S = 0.5
-_LOOK_S = 1.0
-_STATISTICS_S = 1.0  # for the executor to say them
+_CHECK_S = 1.0  # between two checks of the loop's node
+_STATISTICS_S = 1.0  # timeout of a query for statistics
 
 USAGE = """\
 usage: rosrun rtcf rt_runner [__name:=NAME] [_PARAMETER:=VALUE]...
@@ -48,37 +48,42 @@ private parameters:
   frequency                cycles per second, 0.1 to 50000 (default: 1000)
   graph                    graph file: its components and settings (default: none)
   mode                     wait_for_components, no_wait or wait_for_trigger
-  num_components_expected  for wait_for_components: start when so many are loaded
+  num_components_expected  for wait_for_components: start when this number is loaded
   ros_mapping_whitelist    regular expression: connections that become ROS topics
   ros_mapping_blacklist    exceptions from it
   ros_queue                messages kept for a slow subscriber (default: 1000)
   wait_policy              after a late cycle: absolute (catch up) or relative
   overrun                  the same with all choices: skip (default), catch_up, relative
-  max_overruns             stop the loop when a leaky bucket of so many is full; 0: never
-  cpu_affinity_mask, cpu   where the loop runs: a bit for each CPU (the last one counts), or one
+  max_overruns             stop the loop when its leaky bucket of overruns exceeds this number;
+                           0: never
+  cpu_affinity_mask, cpu   CPU of the loop: one bit per CPU (the last permitted one counts), or
+                           its number
   priority                 of SCHED_FIFO, 1 to 98 (default: 80 at 1 kHz, more for faster loops)
   spin                     busy wait before each cycle, in us, or "auto" (default: 0)
-  realtime                 required, or preferred: may it run without real-time rights?
+  realtime                 without real-time rights: reject the start (required), or run with a
+                           warning (preferred)
   lock_memory, safe_heap_size_kB, safe_stack_size_kB
-                           memory that is locked and touched at the start
-  stall_timeout            end a cycle that makes no progress, in s; 0: never (default: 2)
-  warmup_cycles            first cycles, kept out of the statistics (default: 10)
+                           memory that is locked, and allocated at the start
+  stall_timeout            end the executor if a cycle takes longer, in s; 0: never (default: 2)
+  warmup_cycles            first cycles that the statistics exclude (default: 10)
   ros_latch                regular expression: topics whose last message late subscribers get
   ros_decimation, ros_decimate
                            of the topics that match, publish each n-th value (default: 1, .*)
   ros_stamped              regular expression: topics of numbers and bools that have a header with
                            the time of the cycle
   ros_largest_message_kB   of types of variable size, in both directions (default: 256)
-  ros_peers                what ROS peers may do: none, observe, tune, operate, admin (default:
-                           what you may)
+  ros_peers                right of ROS peers: none, observe, tune, operate, admin (default: your
+                           right)
   sim_time                 follow /clock: auto (default: if /use_sim_time), never, always
-  max_clock_jump           a clock that goes further in one tick begins anew, in s (default: 10)
-  on_crash                 hold, or resume without a component that is optional
+  max_clock_jump           a larger forward jump of a simulated clock re-bases the loop, in s
+                           (default: 10)
+  on_crash                 after a crash: hold the loop (hold, the default), or resume it without
+                           the crashed component if that is optional (resume)
   on_fault                 when the loop ends by a fault: exit (default), or stay
-  daemon                   auto (default), system or private: whose rtcfd it is
+  daemon                   rtcfd to use: auto (default), system or private
 
-exit status: 0 asked to end, 1 refused, 2 wrong parameters, 3 the loop ended by a fault,
-4 rtcfd has gone
+exit status: 0 ended on request, 1 an error, 2 invalid parameters, 3 the loop ended by a fault,
+4 rtcfd ended
 """
 
 
@@ -109,7 +114,7 @@ class RunnerNode:
         self._lost_since: float | None = None
 
     def run(self) -> Code:
-        """Serve until it is asked to end or something ends it."""
+        """Lease the runner and wait for the end; return the exit status."""
         try:
             self._parameters = self._read_parameters()
             self._enter_ros()
@@ -126,7 +131,7 @@ class RunnerNode:
             if self._ros_node is not None:
                 self._ros_node.end(self._last_calls())
 
-    # -- the begin ----------------------------------------------------------
+    # -- the start ----------------------------------------------------------
 
     def _read_parameters(self) -> runner_parameters.RunnerParameters:
         for name, value in self._given.private.items():
@@ -141,7 +146,7 @@ class RunnerNode:
         return parameters
 
     def _enter_ros(self) -> None:
-        """Become a node; wait until one of our name, which that displaces, has given all back."""
+        """Register as a node.  This displaces a node of the same name: wait until it has ended."""
         self._ros_node = RosNode(
             self._master,
             own_node(self._node),
@@ -154,7 +159,7 @@ class RunnerNode:
         if before and not wait_until_gone(before, self._inbox.pause, _DISPLACED_S):
             raise Ending(
                 Code.DONE if self._inbox.end_requested else Code.REFUSED,
-                f"a runner {self._node} is there already at this ROS master, and does not end: "
+                f"another runner {self._node} exists at this ROS master and does not end: "
                 "end its launch, or give this one another name",
             )
         self._announce(runner_entry.own_entry(self._runner))
@@ -194,7 +199,7 @@ class RunnerNode:
         self._hold()
 
     def _await_predecessor(self, socket: str) -> None:
-        """Wait until rtcfd has taken the runner back from an rt_runner of our name that died."""
+        """Wait until rtcfd has ended the lease of a dead rt_runner of the same name."""
         deadline = time.monotonic() + _PREDECESSOR_S
         with rtcf.Client(socket) as client, contextlib.suppress(rtcf.RtcfError):
             while time.monotonic() < deadline:
@@ -277,18 +282,18 @@ class RunnerNode:
             self._screen.warn(note)
 
     def _come_back(self) -> None:
-        """After a restart of the master: launchers and tools look for us there."""
-        with contextlib.suppress(MasterSilent):  # it has gone again
+        """Write the entry again after a restart of the master, for launchers and tools."""
+        with contextlib.suppress(MasterSilent):  # it has ended again
             self._announce(self._entry)
             self._screen.info("registered again at the ROS master")
 
     def _watch_node(self, client: rtcf.Client) -> None:
-        """End when a ROS peer kills the loop's node, which has the name that people see."""
-        while not self._over.wait(_LOOK_S):
+        """End when a ROS peer kills the loop's node, which has the name in the launch file."""
+        while not self._over.wait(_CHECK_S):
             with contextlib.suppress(rtcf.RtcfError, ValueError):  # closed meanwhile
                 (status,) = client.get_status(self._runner).runners
                 if status.ros.killed:
-                    self._inbox.request_end("a ROS node has asked it to end")
+                    self._inbox.request_end("a ROS node requested a shutdown")
 
     def _report(self, report: control_pb2.HoldReport) -> None:
         if report.running and not self._was_running:
@@ -305,14 +310,14 @@ class RunnerNode:
             self._screen.error(f"the loop has ended: {report.fault}")
         self._fault = report.fault
         complete = report.components >= self._parameters.components
-        # Once for each time that it becomes complete: who stops the loop has his reasons.
+        # Start once each time the graph becomes complete: a loop stopped by a user stays stopped.
         due = self._parameters.mode == "wait_for_components" and complete and not self._complete
         self._complete = complete
         if due and not report.running:
             self._start()
 
     def _say_what_is_missing(self) -> None:
-        """Warn once a launch that the loop is not real-time, also of a loop that ran before."""
+        """Warn of each missing prerequisite of real time, once per launch."""
         assert self._client is not None
         with contextlib.suppress(rtcf.RtcfError):
             for runner in self._client.get_status(self._runner).runners:
@@ -322,7 +327,7 @@ class RunnerNode:
                 self._said_missing.update(runner.degraded)
 
     def _say_statistics(self) -> None:
-        """At the end of a loop, as RTCF 2021 does."""
+        """Print statistics at the end of a loop, as RTCF 2021 does."""
         assert self._client is not None
         with contextlib.suppress(rtcf.RtcfError):
             for line in loop_statistics.lines(
@@ -337,7 +342,7 @@ class RunnerNode:
             result = self._client.start(self._runner)
         except rtcf.RefusedError as error:
             raise Ending(Code.REFUSED, f"the loop does not start: {error}") from None
-        for note in result.notes:  # what is missing for real time is said when it runs
+        for note in result.notes:  # _report() warns of missing prerequisites of real time
             self._screen.warn(note)
 
     def _reconnect(self, error: rtcf.RtcfError) -> None:
@@ -348,7 +353,7 @@ class RunnerNode:
             code = Code.REFUSED if self._lost_since is None else Code.LOST
             raise Ending(code, str(error))
         if self._daemon is not None:
-            time.sleep(_RETRY_S)  # for the reason to be in its log
+            time.sleep(_RETRY_S)  # until the reason is in its log
             what = "has ended" if self._daemon.ended else f"does not answer ({error})"
             raise Ending(Code.LOST, f"the private rtcfd {what}: {self._daemon.last_words()}")
         now = time.monotonic()
@@ -356,7 +361,7 @@ class RunnerNode:
             raise Ending(Code.REFUSED, str(error))
         if self._lost_since is None:
             self._lost_since = now
-            self._screen.warn(f"{error}; the loop goes on, coming back")
+            self._screen.warn(f"{error}; the loop continues; reconnecting")
         if now - self._lost_since > _RETURN_S:
             raise Ending(Code.LOST, str(error))
         if not self._inbox.pause(_RETRY_S):
@@ -365,7 +370,7 @@ class RunnerNode:
             raise Ending(Code.DONE)
 
     def _falls_back(self, error: str) -> bool:
-        """Replace an expression that is none by the default of RTCF 2021, and say so."""
+        """Replace an invalid expression by the default of RTCF 2021, with an error message."""
         ros = self._parameters.settings.ros
         for field, default in (("whitelist", ".*"), ("blacklist", "")):
             bad = getattr(ros, field)
@@ -401,7 +406,7 @@ class RunnerNode:
             self._client.close()
 
     def _give_back(self, lease: rtcf.Lease) -> None:
-        """End the hold; show what hooks say until that is done."""
+        """End the lease; print log records of hooks until rtcfd has ended it."""
         lease.end()
         deadline = time.monotonic() + _END_S
         while (left := deadline - time.monotonic()) > 0:
@@ -417,7 +422,7 @@ class RunnerNode:
 
 
 def _shown(settings: runner_pb2.RunnerSettings) -> str:
-    """Return what the loop is, with the defaults that were taken."""
+    """Return the settings of the loop, including defaults, for people."""
     cpu = "a CPU with the fewest loops" if settings.cpu < 0 else f"CPU {settings.cpu}"
     return (
         f"{settings.frequency_hz:g} Hz, {cpu}, priority {settings.priority}, "
@@ -426,13 +431,13 @@ def _shown(settings: runner_pb2.RunnerSettings) -> str:
 
 
 def _log_folder() -> str:
-    """Return where ROS nodes log without roslaunch."""
+    """Return the log folder of ROS nodes that run without roslaunch."""
     home = os.environ.get("ROS_HOME") or os.path.expanduser("~/.ros")
     return os.environ.get("ROS_LOG_DIR") or f"{home}/log"
 
 
 def own_node(runner_node: str) -> str:
-    """Return the name of rt_runner's own node: that of the launch is the loop's."""
+    """Return the name of rt_runner's own node; the loop's node has the name in the launch file."""
     return f"{runner_node}/launch"
 
 

@@ -1,4 +1,4 @@
-"""The private parameters of rt_runner, and the settings of a runner they stand for."""
+"""The private parameters of rt_runner, and the runner settings made from them."""
 
 import os
 from collections.abc import Mapping
@@ -17,7 +17,7 @@ from rtcf_launch.runner_entry import NAME as RUNNER_ENTRY
 
 MODES = ("wait_for_components", "no_wait", "wait_for_trigger")
 DAEMONS = ("auto", "system", "private")
-# The paper's words for what follows a late cycle.
+# The paper's names of overrun policies.
 _WAIT_POLICIES = {
     "absolute": runner_pb2.OVERRUN_POLICY_CATCH_UP,
     "relative": runner_pb2.OVERRUN_POLICY_RELATIVE,
@@ -41,7 +41,7 @@ _NAMES = (
 
 @dataclass
 class RunnerParameters:
-    """What an rt_runner is asked to do."""
+    """The values of rt_runner's private parameters."""
 
     settings: runner_pb2.RunnerSettings
     mode: str
@@ -52,7 +52,7 @@ class RunnerParameters:
 
 
 def read(values: dict[str, Any]) -> tuple[RunnerParameters, list[str]]:
-    """Check all parameters; return what they say, and a line for each that is not known."""
+    """Check all parameters; return their values, and a warning for each unknown parameter."""
     given = Parameters(values)
     settings = runner_pb2.RunnerSettings()
 
@@ -64,7 +64,7 @@ def read(values: dict[str, Any]) -> tuple[RunnerParameters, list[str]]:
     put("priority", given.integer("priority", *_whole("priority")))
     put("lock_memory", given.boolean("lock_memory"))
     put("heap_kb", given.integer("safe_heap_size_kB", *_whole("heap_kb")))
-    # RTCF 2021's default of 0 means none; a thread has this much in any case.
+    # RTCF 2021's default of 0 means none; a thread has `least` in any case.
     least, most = _whole("stack_kb")
     stack = given.integer("safe_stack_size_kB", 0, most)
     put("stack_kb", None if stack is None else max(stack, least))
@@ -98,7 +98,7 @@ def read(values: dict[str, Any]) -> tuple[RunnerParameters, list[str]]:
     if mode == MODES[0] and components is None:
         raise Ending(
             Code.USAGE,
-            "~mode is wait_for_components: how many? Set ~num_components_expected",
+            "~mode is wait_for_components: set ~num_components_expected",
         )
     result = RunnerParameters(
         settings=settings,
@@ -111,7 +111,7 @@ def read(values: dict[str, Any]) -> tuple[RunnerParameters, list[str]]:
     # An unknown name may be a typing error, or belong to another program.
     unknown = sorted(name for name in given.rest() if name != RUNNER_ENTRY)
     return result, [
-        f"parameter ~{name} is not known to rt_runner{close_to(name, _NAMES)}" for name in unknown
+        f"rt_runner has no parameter ~{name}{close_to(name, _NAMES)}" for name in unknown
     ]
 
 
@@ -125,11 +125,11 @@ def _graph(given: Parameters, settings: runner_pb2.RunnerSettings) -> list[graph
     except OSError as error:
         raise Ending(Code.USAGE, f"~graph {file}: {error.strerror or error}") from None
     except UnicodeDecodeError:
-        raise Ending(Code.USAGE, f"~graph {file}: no text") from None
+        raise Ending(Code.USAGE, f"~graph {file}: not UTF-8 text") from None
     except rtcf.RtcfError as error:
         raise Ending(Code.USAGE, f"~graph {error}") from None
     if len(graphs) != 1:
-        raise Ending(Code.USAGE, f"~graph {file} has {len(graphs)} runners: one is needed")
+        raise Ending(Code.USAGE, f"~graph {file} has {len(graphs)} runners: it must have one")
     (graph,) = graphs
     graph.settings.MergeFrom(settings)
     settings.CopyFrom(graph.settings)
@@ -148,18 +148,18 @@ def _overrun(given: Parameters) -> int | None:
     overrun = given.word("overrun", _OVERRUNS)
     policy = given.word("wait_policy", _WAIT_POLICIES)
     if overrun is not None and policy is not None:
-        raise Ending(Code.USAGE, "~wait_policy and ~overrun say the same thing: set one of them")
+        raise Ending(Code.USAGE, "~wait_policy and ~overrun both set the overrun policy: use one")
     return _value(_OVERRUNS, overrun) or _value(_WAIT_POLICIES, policy)
 
 
 def _cpu(given: Parameters) -> int | None:
-    """Return the CPU: of a mask the last one, as a loop has one."""
+    """Return the CPU of the loop; with a mask, its last permitted CPU."""
     cpu = given.integer("cpu", -1, 4095)
     mask = as_integer(given.raw("cpu_affinity_mask"))
     if mask is None:
         return cpu
     if cpu is not None:
-        raise Ending(Code.USAGE, "~cpu and ~cpu_affinity_mask say the same thing: set one of them")
+        raise Ending(Code.USAGE, "~cpu and ~cpu_affinity_mask both set the CPU: use one")
     if isinstance(mask, bool) or not isinstance(mask, int) or mask < 1:
         raise Ending(
             Code.USAGE, f"~cpu_affinity_mask must be an integer with a bit for each CPU, not {mask}"

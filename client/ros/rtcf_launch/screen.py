@@ -1,8 +1,8 @@
-"""What a node prints: log records and its own words, as rosconsole does, also in the format of
-ROSCONSOLE_FORMAT.
+"""The output of a node: log records of the loop and its own messages, in the format of rosconsole
+(ROSCONSOLE_FORMAT).
 
-Warnings and errors go to standard error, which roslaunch always shows; the
-rest to standard output, which it shows with output="screen".
+Warnings and errors go to standard error, which roslaunch always shows; others go to standard
+output, which roslaunch shows with output="screen".
 """
 
 import contextlib
@@ -38,25 +38,25 @@ class Screen:
         self._least = "INFO"
 
     def set_level(self, level: str) -> None:
-        """Print no lines of the node's own below a level, e.g. "warn".  Any thread."""
+        """Set the lowest level of the node's own messages to print, e.g. "warn".  Any thread."""
         self._least = level.upper()
 
     def info(self, text: str) -> None:
-        """Print a line of the node's own."""
+        """Print a message of the node itself."""
         self._print_own("INFO", text)
 
     def warn(self, text: str) -> None:
-        """Print a warning of the node's own."""
+        """Print a warning of the node itself."""
         self._print_own("WARN", text)
 
     def error(self, text: str) -> None:
-        """Print an error of the node's own."""
+        """Print an error of the node itself."""
         self._print_own("ERROR", text)
 
     def records(self, logs: control_pb2.LogRecords) -> None:
         """Print records of a loop."""
         if logs.dropped:
-            self.warn(f"{logs.dropped} log records were lost: this terminal is slower than they")
+            self.warn(f"{logs.dropped} log records were dropped: this terminal is too slow")
         for record in logs.records:
             word = _WORDS.get(record.level, "INFO")
             place = (record.file, record.line)
@@ -82,17 +82,17 @@ class Screen:
         )
         if word in _COLOURS and stream.isatty():
             line = f"{_COLOURS[word]}{line}\033[0m"
-        # The terminal may have gone; the journal has it all the same.
+        # The terminal may be closed; the journal has the loop's records, too.
         with contextlib.suppress(OSError):
-            # In one piece, as other nodes of a launch write to the same terminal: where Python does
-            # not buffer, print() writes the end of the line by itself.
+            # One write per line, because other nodes of the launch write to the same terminal:
+            # print() without a buffer writes the end of the line separately.
             stream.write(f"{line}\n")
             stream.flush()
 
     def _formatted(
         self, word: str, time_s: float, text: str, name: str, place: tuple[str, int]
     ) -> str:
-        """Return a line in the format of the environment."""
+        """Return a line in the format of ROSCONSOLE_FORMAT."""
         values = {
             "severity": f"{word:>5}",
             "message": text,

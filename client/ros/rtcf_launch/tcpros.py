@@ -11,7 +11,7 @@ _LARGEST_ANSWER = 64 * 1024 * 1024
 
 
 class CallFailed(Exception):
-    """A service has not answered as it should; one line."""
+    """A call of a service failed; the text is one line."""
 
 
 def call(uri: str, service: str, kind: Any, caller: str, timeout_s: float) -> Any:
@@ -42,32 +42,32 @@ def call(uri: str, service: str, kind: Any, caller: str, timeout_s: float) -> An
 
 
 def exactly(connection: socket.socket, size: int) -> bytes:
-    """Return so many bytes.  Raises ValueError if the peer leaves before."""
+    """Read `size` bytes.  Raises ValueError if the peer disconnects before."""
     parts = bytearray()
     while len(parts) < size:
         part = connection.recv(size - len(parts))
         if not part:
-            raise ValueError("the peer has gone")
+            raise ValueError("the peer disconnected")
         parts += part
     return bytes(parts)
 
 
 def block(connection: socket.socket, largest: int = _LARGEST_CALL) -> bytes:
-    """Return a block, which follows its size.  Raises ValueError beyond `largest` bytes."""
+    """Read a size and a block of that size.  Raises ValueError beyond `largest` bytes."""
     (size,) = struct.unpack("<I", exactly(connection, 4))
     if size > largest:
-        raise ValueError(f"{size} bytes are more than the {largest} of any call")
+        raise ValueError(f"{size} bytes are more than the {largest} allowed")
     return exactly(connection, size)
 
 
 def text(value: str) -> bytes:
-    """Return a string as it goes over the wire."""
+    """Return a string in the wire format: its size, then its bytes."""
     encoded = value.encode()
     return struct.pack("<I", len(encoded)) + encoded
 
 
 def take_text(data: bytes) -> tuple[str, bytes]:
-    """Return a string, and the bytes behind it."""
+    """Parse a string; return it and the remaining bytes."""
     (size,) = struct.unpack_from("<I", data)
     return data[4 : 4 + size].decode(errors="replace"), data[4 + size :]
 

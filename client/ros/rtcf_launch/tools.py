@@ -1,6 +1,9 @@
 """The rosrun tools component_list, component_info, component_order, connection_list and
-connection_info: the output of RTCF 2021's, by a runner's ROS service and so from any machine; with
---table or -o rtcfctl's views of a runner of this machine, wherever its rtcfd is."""
+connection_info.
+
+They print the output of RTCF 2021's tools, by a runner's ROS service, from any machine.  With
+--table or -o, they print the output of rtcfctl for a runner of this machine.
+"""
 
 import argparse
 import os
@@ -28,8 +31,8 @@ _SERVICE = "get_introspection_information"
 class Tool:
     """One of the tools."""
 
-    text: str  # its message
-    named: str  # the name in it
+    text: str  # subject of the output, for the help text
+    named: str  # argument that names a component or connection; empty = none
     lines: Callable[[Any, str], list[str]]  # of a rtcf_msgs/RunnerInfo
     show: Callable[[rtcf.Client, argparse.Namespace, Output], None]
 
@@ -51,7 +54,7 @@ TOOLS = {
         "the connections of a loop", "", runner_info.connection_list, connections.show_connections
     ),
     "connection_info": Tool(
-        "one connection: who writes and who reads", "connection", runner_info.connection_info,
+        "one connection, its writers and its readers", "connection", runner_info.connection_info,
         connections.show_connection,
     ),
 }  # fmt: skip
@@ -84,9 +87,9 @@ def _parser(tool: str) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog=f"rosrun rtcf {tool}",
         description=f"Shows {TOOLS[tool].text}.",
-        epilog="Asks the runner's ROS service. With --table or -o rtcfd is asked, which must be on "
-        "this machine: without --socket the one that rt_runner names at the ROS master, else the "
-        "system's. Exit codes: 0 done, 1 refused or not there, 2 usage, 3 not reachable.",
+        epilog="Calls the runner's ROS service. With --table or -o, queries rtcfd "
+        "on this machine: that of --socket, else that of rt_runner at the ROS master, else the "
+        "system's. Exit status: 0 success, 1 rejected or not found, 2 usage, 3 not reachable.",
     )
     if TOOLS[tool].named:
         parser.add_argument(TOOLS[tool].named, metavar=TOOLS[tool].named.upper())
@@ -99,7 +102,7 @@ def _parser(tool: str) -> argparse.ArgumentParser:
         help="rtcfd's control socket (default: $RTCF_SOCKET)",
     )  # fmt: skip
     parser.add_argument(
-        "-o", "--output", choices=("table", "json", "yaml"), help="show what rtcfctl shows"
+        "-o", "--output", choices=("table", "json", "yaml"), help="show the output of rtcfctl"
     )
     parser.add_argument(
         "--table", dest="output", action="store_const", const="table", help="the same as -o table"
@@ -129,8 +132,8 @@ def _info(args: argparse.Namespace, given: arguments.Arguments) -> Any:
             found = tcpros.call(uri, service, GetRunnerInfo, given.full_name, _ANSWER_S)
             return found.runner_info
     raise tcpros.CallFailed(
-        f"no {services[0]} at the ROS master {given.master_uri}: start rt_runner, name it by "
-        "--runner, or see a runner of this machine by --table"
+        f"no {services[0]} at the ROS master {given.master_uri}: start rt_runner, select it with "
+        "--runner, or show a runner of this machine with --table"
     )
 
 

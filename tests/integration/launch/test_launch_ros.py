@@ -72,8 +72,8 @@ def test_a_dead_runners_parameters_block_no_launcher_and_waits_are_explained(
     runner = running(launching)
     near.wait_for_output("loaded into runner rt_runner")
     named.wait_for_output(
-        "for runner /left/rt_runner: its parameters are there, it is not (there are: /rt_runner; "
-        "~runner names another)"
+        "for runner /left/rt_runner: it has parameters but does not run (running: /rt_runner; "
+        "select one with ~runner)"
     )
     assert (near.end(), named.end(), runner.end()) == (DONE, DONE, DONE)
 
@@ -87,7 +87,9 @@ def test_a_single_runner_is_used_by_default_but_not_one_of_several(
     other = running(launching, "__name:=other")
     undecided = identity(launching, "two")
     assert undecided.wait() == USAGE
-    assert "which runner? There are /arm/control, /other: name one by ~runner" in undecided.output()
+    assert (
+        "several runners run: /arm/control, /other: select one with ~runner" in undecided.output()
+    )
     assert (launcher.end(), runner.end(), other.end()) == (DONE, DONE, DONE)
 
 
@@ -95,7 +97,7 @@ def test_component_parameters_are_passed_and_misspelled_ones_reported(
     launching: Launching,
 ) -> None:
     runner = running(launching, "_freqency:=5")
-    runner.wait_for_output("~freqency is not known to rt_runner; did you mean ~frequency?")
+    runner.wait_for_output("rt_runner has no parameter ~freqency; did you mean ~frequency?")
     launcher = launching.node(
         "rt_launcher", " rtcf_examples ", " waves::Wave", "__name:=wave", "_amplitud:=2.0",
         "_every:=0.5", "_rtcf_every:=2",

@@ -145,7 +145,7 @@ def test_a_goal_that_is_not_reached_says_why(
 def test_a_component_that_is_no_generator_is_rejected(launching: Launching) -> None:
     node = launching.node("follow_joint_trajectory", "__name:=other", "_generator:=robot")
     assert node.wait(60.0) == 1
-    assert "/robot is no TrajectoryGenerator: it has no joints" in node.output()
+    assert "/robot is not a TrajectoryGenerator: it has no parameter joints" in node.output()
     missing = launching.node("follow_joint_trajectory", "__name:=third", "_generator:=nobody")
     assert missing.wait(60.0) == 1
     assert "nobody" in missing.output()

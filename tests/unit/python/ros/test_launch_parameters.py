@@ -110,7 +110,7 @@ def test_a_graph_file_has_components_and_settings_that_parameters_override(tmp_p
     [
         (None, "~graph {file}: No such file or directory"),
         (b"components: ]", "~graph {file}:1: "),
-        (b"\xff\xfe", "~graph {file}: no text"),
+        (b"\xff\xfe", "~graph {file}: not UTF-8 text"),
         (b"runners: {a: {components: []}, b: {components: []}}", "~graph {file} has 2 runners"),
     ],
 )
@@ -174,7 +174,7 @@ def test_numbers_are_converted_as_in_roscpp() -> None:
         ({"frequency": float("nan")}, "~frequency of nan is out of range"),
         ({"frequency": True}, "~frequency must be a number, not True"),
         ({"mode": "wait"}, "~mode must be one of wait_for_components, no_wait, wait_for_trigger"),
-        ({"mode": "wait_for_components"}, "how many? Set ~num_components_expected"),
+        ({"mode": "wait_for_components"}, "wait_for_components: set ~num_components_expected"),
         ({"num_components_expected": 0}, "~num_components_expected of 0 is out of range"),
         ({"num_components_expected": 2.5}, "~num_components_expected must be an integer, not 2.5"),
         ({"num_components_expected": True}, "must be an integer, not True"),
@@ -185,7 +185,7 @@ def test_numbers_are_converted_as_in_roscpp() -> None:
             {"wait_policy": "absolut"},
             '~wait_policy must be one of absolute, relative, not "absolut',
         ),
-        ({"wait_policy": "relative", "overrun": "skip"}, "say the same thing"),
+        ({"wait_policy": "relative", "overrun": "skip"}, "both set the overrun policy"),
         ({"lock_memory": "yes"}, '~lock_memory must be true or false, not "yes"'),
         ({"safe_heap_size_kB": -1}, "~safe_heap_size_kB of -1 is out of range"),
         ({"safe_stack_size_kB": -8}, "~safe_stack_size_kB of -8 is out of range: 0 to"),
@@ -193,7 +193,7 @@ def test_numbers_are_converted_as_in_roscpp() -> None:
         ({"sim_time": "sometimes"}, "~sim_time must be one of auto, never, always"),
         ({"cpu_affinity_mask": 0}, "~cpu_affinity_mask must be an integer with a bit"),
         ({"cpu_affinity_mask": 1 << 30}, "has none of the CPUs that may be used"),
-        ({"cpu_affinity_mask": 1, "cpu": 0}, "say the same thing"),
+        ({"cpu_affinity_mask": 1, "cpu": 0}, "both set the CPU"),
         ({"priority": 99}, "~priority of 99 is out of range: 1 to 98"),
         ({"spin": "a lot"}, "~spin must be a number of µs or"),
         ({"daemon": "mine"}, "~daemon must be one of auto, system, private"),
@@ -211,8 +211,8 @@ def test_an_unknown_parameter_is_a_warning_with_a_suggestion() -> None:
         {"freqency": 1000, "robot": "r1", "rtcf_runner": {"socket": "/s"}}
     )
     assert lines == [
-        "parameter ~freqency is not known to rt_runner; did you mean ~frequency?",
-        "parameter ~robot is not known to rt_runner",
+        "rt_runner has no parameter ~freqency; did you mean ~frequency?",
+        "rt_runner has no parameter ~robot",
     ]
 
 
@@ -241,7 +241,7 @@ def test_the_components_parameters_precede_the_launchers() -> None:
     assert (found.every, found.phase, found.optional, found.runner) == (2, None, False, None)
     assert found.others == {"every": 0.5, "phase": 1, "optional": True, "runner": "arm"}
     assert notes[-1] == (
-        "~optional is left to the component, rt_launcher's is ~rtcf_optional: "
+        "~optional belongs to the component, not to rt_launcher (use ~rtcf_optional): "
         "the component declares it"
     )
 
@@ -251,12 +251,12 @@ def test_values_unsuitable_for_a_launcher_go_to_the_component_with_a_note() -> N
     assert (found.every, found.phase) == (0, None)
     assert found.others == {"every": 0.5, "phase": 2, "on_lease_lost": "die"}
     assert notes == [
-        "~every is left to the component, rt_launcher's is ~rtcf_every: "
+        "~every belongs to the component, not to rt_launcher (use ~rtcf_every): "
         "~every must be an integer, not 0.5",
-        "~on_lease_lost is left to the component, rt_launcher's is ~rtcf_on_lease_lost: "
+        "~on_lease_lost belongs to the component, not to rt_launcher (use ~rtcf_on_lease_lost): "
         '~on_lease_lost must be one of stop, unload, keep, not "die"',
-        "~phase is left to the component, rt_launcher's is ~rtcf_phase: "
-        "it means nothing without ~every",
+        "~phase belongs to the component, not to rt_launcher (use ~rtcf_phase): "
+        "it has no effect without ~every",
     ]
 
 
@@ -338,11 +338,11 @@ def test_the_component_is_named_by_arguments_or_parameters() -> None:
     [
         (["pkg"], {}, "name a package and a component"),
         (["pkg", "T", "more"], {}, "name a package and a component"),
-        (["--first", "pkg", "T"], {}, "unknown option --first: there is -f, --is_first"),
+        (["--first", "pkg", "T"], {}, "unknown option --first: use -f, --is_first"),
         ([], {}, "by ~rt_package and ~rt_type"),
         ([], {"rt_type": "T"}, "by ~rt_package and ~rt_type"),
         (["pkg", "T"], {"rt_type": "T"}, "~rt_type and the arguments both name the component"),
-        (["-f", "pkg", "T"], {"is_first": False}, "~is_first and -f say the same thing"),
+        (["-f", "pkg", "T"], {"is_first": False}, "~is_first and -f both make the component first"),
         ([], {"rt_type": 5, "rt_package": "pkg"}, "~rt_type must be a string, not 5"),
     ],
 )
