@@ -34,7 +34,7 @@ class Backlash final : public rtcf::Component {
         out.write(position_);
     }
 
-    // In the last cycle as in any other: passes on the safe command of a component in front.
+    // Runs in the last cycle, too, to pass on the safe command of an upstream component.
     void safe() noexcept override { update(); }
 };
 

@@ -258,7 +258,7 @@ class Biquads final : public rtcf::Component {
         fading_ = std::max(left, 0.0);
     }
 
-    // In the last cycle as in any other: passes on the safe command of a component in front.
+    // Runs in the last cycle, too, to pass on the safe command of an upstream component.
     void safe() noexcept override { update(); }
 
     void begin(double x) {

@@ -43,7 +43,7 @@ class Comparator final : public rtcf::Component {
         }
     }
 
-    // In the last cycle as in any other: passes on the safe command of a component in front.
+    // Runs in the last cycle, too, to pass on the safe command of an upstream component.
     void safe() noexcept override { update(); }
 };
 

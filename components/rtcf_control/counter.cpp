@@ -47,7 +47,7 @@ class Counter final : public rtcf::Component {
         count.write(count_);
     }
 
-    // In the last cycle as in any other: passes on the safe command of a component in front.
+    // Runs in the last cycle, too, to pass on the safe command of an upstream component.
     void safe() noexcept override { update(); }
 
     static bool rises(rtcf::Input<bool>& in, rtcf::State<bool>& was) {

@@ -9,8 +9,8 @@
 namespace rtcf_control {
 namespace {
 
-// The output is `initial` from the first cycle on, also without an input, so that a loop can be
-// closed over a delay.
+// The output is `initial` from the first cycle on, even if the input has no value, so that a loop
+// can be closed over a delay.
 class Delay final : public rtcf::Component {
     static constexpr std::size_t kSize = 1001;
 
@@ -55,26 +55,27 @@ class Delay final : public rtcf::Component {
         }
         const double value = in.value();
         if (!std::isfinite(value)) {
-            out.write(value);  // rejected by the check: readers keep the last output
+            out.write(value);  // rejected as not finite: readers keep the last output
             return;
         }
         values_.value()[count_ % kSize] = value;
         times_.value()[count_ % kSize] = now_;
         count_ += 1;
-        // prepare() has checked the delay at the frequency of that time.
+        // prepare() has checked the delay, but the frequency may have changed since then.
         if (nanoseconds(delay) > longest())
             RTCF_WARN_THROTTLE(this, 10.0, "delay is only {} s: at most 1000 cycles at {} Hz",
                                1e-9 * static_cast<double>(longest()), frequency());
         out.write(valueAt(now_ - nanoseconds(delay)));
     }
 
-    // In the last cycle as in any other: passes on the safe command of a component in front.
+    // Runs in the last cycle, too, to pass on the safe command of an upstream component.
     void safe() noexcept override { update(); }
 
     static std::int64_t nanoseconds(double seconds) { return std::llround(seconds * 1e9); }
     std::int64_t longest() const { return (static_cast<std::int64_t>(kSize) - 1) * period(); }
 
-    // Linear between the neighbours; the oldest kept value if the delay is longer than the memory.
+    // Interpolates linearly between two cycles. If the ring is too short for the delay, the result
+    // is the oldest value in it.
     double valueAt(std::int64_t time) const {
         const auto& times = times_.value();
         const auto& values = values_.value();

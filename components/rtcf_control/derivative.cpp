@@ -44,7 +44,7 @@ class Derivative final : public rtcf::Component {
         if (!begun_) rate_ = 0.0;  // overflow, which the filter would keep
     }
 
-    // In the last cycle as in any other: passes on the safe command of a component in front.
+    // Runs in the last cycle, too, to pass on the safe command of an upstream component.
     void safe() noexcept override { update(); }
 };
 

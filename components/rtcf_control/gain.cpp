@@ -15,7 +15,7 @@ class Gain final : public rtcf::Component {
         out.write(gain * in.value() + offset);
     }
 
-    // In the last cycle as in any other: passes on the safe command of a component in front.
+    // Runs in the last cycle, too, to pass on the safe command of an upstream component.
     void safe() noexcept override { update(); }
 };
 

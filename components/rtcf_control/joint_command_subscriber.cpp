@@ -110,7 +110,7 @@ class JointCommandSubscriber final : public rtcf::Component {
         rejected.write(rejected_);
     }
 
-    // In the last cycle as in any other: passes on the safe command of a component in front.
+    // Runs in the last cycle, too, to pass on the safe command of an upstream component.
     void safe() noexcept override { update(); }
 
     void follow(const sensor_msgs::JointState& message) {

@@ -109,7 +109,7 @@ class JointStatePublisher final : public rtcf::Component {
         state.publish();  // NaN is rejected by the check: readers keep the last message
     }
 
-    // In the last cycle as in any other: the measured values are as they are.
+    // Runs in the last cycle, too, since safe() does not change measured values.
     void safe() noexcept override { update(); }
 
     // One quantity of all joints.

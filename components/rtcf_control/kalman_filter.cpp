@@ -31,7 +31,7 @@ class KalmanFilter final : public rtcf::Component {
     enum class Form { Zoh, Discrete };
     enum class InputTime { Present, Previous };
 
-    // For one period of the loop.
+    // Matrices for one period of the loop.
     struct Design {
         SmallMatrix a, b, c, d;  // discrete
         SmallMatrix process_noise, measurement_noise;
@@ -40,7 +40,7 @@ class KalmanFilter final : public rtcf::Component {
         SmallMatrix gain;                  // steady: estimate by innovation
         SmallMatrix corrected_covariance;  // steady
         bool steady = false;
-        bool previous = false;  // the input of a cycle has acted since the last one
+        bool previous = false;  // the input acts from the last cycle to this one
     };
 
     Ports<rtcf::Input<double>, kPorts> in_ = makePorts<rtcf::Input<double>, kPorts>(this, "in");
@@ -216,7 +216,7 @@ class KalmanFilter final : public rtcf::Component {
         keep(u, x, covariance);
     }
 
-    // In the last cycle as in any other.
+    // Updates the estimate in the last cycle, too.
     void safe() noexcept override { update(); }
 
     // A measurement without a new value, or that is not finite, is missing.
@@ -252,7 +252,7 @@ class KalmanFilter final : public rtcf::Component {
         begun_ = true;
     }
 
-    // States that are new get their first estimates.
+    // Sets new states to their first estimates.
     void resize() {
         const Design& design = *design_;
         const Eigen::Index now = design.a.rows();
@@ -270,8 +270,9 @@ class KalmanFilter final : public rtcf::Component {
         states_ = static_cast<std::int32_t>(now);
     }
 
-    // Moves the estimate to this cycle: the prediction, which is exact also if the period has
-    // changed, or by the time that has really passed.
+    // Advances the estimate to this cycle. If the elapsed time is the predicted period, the stored
+    // prediction is exact, even if the period has changed since then; otherwise, the model advances
+    // the estimate by the elapsed time.
     void moveOn(const SmallVector& u, SmallVector& x, SmallMatrix& covariance) const {
         const Design& design = *design_;
         const Eigen::Index n = design.a.rows();
@@ -300,7 +301,7 @@ class KalmanFilter final : public rtcf::Component {
         if (!design.steady)
             return rtcf::correctEstimate(x, covariance, innovation, design.c,
                                          design.measurement_noise, present);
-        // The squared error, by the covariance of the prediction.
+        // correctEstimate() only computes the squared error, from the predicted covariance.
         SmallVector unused = x;
         SmallMatrix predicted = covariance;
         const rtcf::KalmanCorrection correction = rtcf::correctEstimate(
@@ -321,7 +322,8 @@ class KalmanFilter final : public rtcf::Component {
         return 0.5 * (next + next.transpose());
     }
 
-    // Predicts the estimate of the next cycle. An overflow keeps the last one.
+    // Stores the estimate, and predicts that of the next cycle. After an overflow, the state stays
+    // unchanged.
     void keep(const SmallVector& u, const SmallVector& x, const SmallMatrix& covariance) {
         const Design& design = *design_;
         SmallVector next = design.a.lazyProduct(x);
@@ -353,7 +355,8 @@ class KalmanFilter final : public rtcf::Component {
         age.write(age_);
     }
 
-    // Rejected by the check: readers keep the last estimate.
+    // Writes values that the check of Finite outputs rejects, so that readers keep the last
+    // estimate.
     void reject() {
         for (Eigen::Index i = 0; i < design_->a.rows(); ++i)
             out_[static_cast<std::size_t>(i)]->write(std::numeric_limits<double>::quiet_NaN());

@@ -106,7 +106,7 @@ class LookupTable final : public rtcf::Component {
                                      : between(points[at.cell], points[at.cell + 1], at.share));
     }
 
-    // In the last cycle as in any other: passes on the safe command of a component in front.
+    // Runs in the last cycle, too, to pass on the safe command of an upstream component.
     void safe() noexcept override { update(); }
 };
 
@@ -172,7 +172,7 @@ class LookupTable2D final : public rtcf::Component {
                           between(second[0], second[1], across.share), down.share));
     }
 
-    // In the last cycle as in any other: passes on the safe command of a component in front.
+    // Runs in the last cycle, too, to pass on the safe command of an upstream component.
     void safe() noexcept override { update(); }
 };
 

@@ -208,7 +208,7 @@ class Motor final : public rtcf::Component {
         return true;
     }
 
-    // In the last cycle as in any other: follows the safe command of a controller.
+    // Runs in the last cycle, too, to follow the safe command of a controller.
     void safe() noexcept override { update(); }
 
     void update() noexcept override {

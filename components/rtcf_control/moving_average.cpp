@@ -71,7 +71,7 @@ class MovingAverage final : public rtcf::Component {
         out.write(sum_ / count_);
     }
 
-    // In the last cycle as in any other: passes on the safe command of a component in front.
+    // Runs in the last cycle, too, to pass on the safe command of an upstream component.
     void safe() noexcept override { update(); }
 
     void restart() {

@@ -30,7 +30,7 @@ class Mux : public rtcf::Component {
         if (complete) out.write(values);
     }
 
-    // In the last cycle as in any other: passes on the safe command of a component in front.
+    // Runs in the last cycle, too, to pass on the safe command of an upstream component.
     void safe() noexcept override { update(); }
 };
 
@@ -46,7 +46,7 @@ class Demux : public rtcf::Component {
             out_[i]->write(in.value()[static_cast<Eigen::Index>(i)]);
     }
 
-    // In the last cycle as in any other: passes on the safe command of a component in front.
+    // Runs in the last cycle, too, to pass on the safe command of an upstream component.
     void safe() noexcept override { update(); }
 };
 

@@ -494,8 +494,8 @@ class StateSpace final : public rtcf::Component {
         endCycleOfTransition();
     }
 
-    // System and observer, in the last cycle as in any other: pass on the safe command of a
-    // component in front.
+    // Systems and observers run in the last cycle, too, to pass on the safe command of an upstream
+    // component. Other roles write safe_value.
     void safe() noexcept override {
         const Design& design = *design_;
         if (design.role == Role::System || design.role == Role::Observer) {

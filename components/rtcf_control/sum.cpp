@@ -31,7 +31,7 @@ class Sum final : public rtcf::Component {
         if (has_value) out.write(sum);
     }
 
-    // In the last cycle as in any other: passes on the safe command of a component in front.
+    // Runs in the last cycle, too, to pass on the safe command of an upstream component.
     void safe() noexcept override { update(); }
 };
 

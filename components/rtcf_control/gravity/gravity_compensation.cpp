@@ -180,7 +180,7 @@ class GravityCompensation final : public rtcf::Component {
         write();
     }
 
-    // In the last cycle as in any other: without this effort, the robot falls.
+    // Runs in the last cycle, too: without this effort, the robot falls.
     void safe() noexcept override { update(); }
 
     std::size_t count() const noexcept { return chain_->joints().size(); }

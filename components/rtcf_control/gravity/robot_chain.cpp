@@ -101,16 +101,18 @@ class Robot {
         for (LinkConstSharedPtr at = tip; at != base; at = at->getParent()) {
             found.push_back(at);
             if (at->getParent() == nullptr || found.size() > model_->links_.size())
-                reject("there is no way from base {} to tip {}", base->name, tip->name);
+                reject("there is no path from base {} to tip {}", base->name, tip->name);
         }
         std::reverse(found.begin(), found.end());
         return found;
     }
 
-    // The mass of a link, and of all links that it bears, but for those of the chain.
-    KDL::RigidBodyInertia bearing(const urdf::Link& link, const urdf::Link* next,
-                                  std::vector<std::string>& others, std::size_t depth = 0) const {
-        if (depth > model_->links_.size()) reject("link {} bears itself", link.name);
+    // The inertia of a link and of all links that it carries, without those of the chain. Adds the
+    // moving joints between them to `others`.
+    KDL::RigidBodyInertia carriedInertia(const urdf::Link& link, const urdf::Link* next,
+                                         std::vector<std::string>& others,
+                                         std::size_t depth = 0) const {
+        if (depth > model_->links_.size()) reject("link {} is its own descendant", link.name);
         KDL::RigidBodyInertia sum = inertiaOf(link);
         for (const urdf::LinkSharedPtr& child : link.child_links) {
             if (child.get() == next) continue;
@@ -119,7 +121,7 @@ class Robot {
                 reject("link {} is the child of two joints", child->name);
             if (isMoving(joint)) others.push_back(joint.name);
             sum = sum + frameOf(joint.parent_to_joint_origin_transform) *
-                            bearing(*child, nullptr, others, depth + 1);
+                            carriedInertia(*child, nullptr, others, depth + 1);
         }
         return sum;
     }
@@ -128,7 +130,7 @@ class Robot {
 
    private:
     bool leadsToMotion(const urdf::Link& link, std::size_t depth = 0) const {
-        if (depth > model_->links_.size()) reject("link {} bears itself", link.name);
+        if (depth > model_->links_.size()) reject("link {} is its own descendant", link.name);
         return std::any_of(link.child_links.begin(), link.child_links.end(), [&](const auto& each) {
             return isMoving(*each->parent_joint) || leadsToMotion(*each, depth + 1);
         });
@@ -161,7 +163,8 @@ class Robot {
             std::size_t depth = 0;
             for (LinkConstSharedPtr at = child; at != nullptr; at = at->getParent()) {
                 ++depth;
-                if (depth > model_->links_.size()) reject("link {} bears itself", at->name);
+                if (depth > model_->links_.size())
+                    reject("link {} is its own descendant", at->name);
             }
             if (depth <= most) continue;
             most = depth;
@@ -203,7 +206,7 @@ RobotChain::RobotChain(const std::string& urdf, const Selection& selection) {
         const urdf::Link* const next = i + 1 < path.size() ? path[i + 1].get() : nullptr;
         chain_.addSegment(KDL::Segment(link.name, jointOf(joint),
                                        frameOf(joint.parent_to_joint_origin_transform),
-                                       robot.bearing(link, next, others_)));
+                                       robot.carriedInertia(link, next, others_)));
         if (isMoving(joint)) in_chain.push_back(joint.name);
     }
     if (in_chain.empty()) reject("no joint moves between base and tip");

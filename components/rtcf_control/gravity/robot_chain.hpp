@@ -23,11 +23,11 @@ using JointNumbers = std::array<double, kMostJoints>;
 
 class RobotChain {
    public:
-    /// Which part of a robot.
+    /// The part of a robot that is the chain.
     struct Selection {
         std::string base;  ///< link; empty = root of the robot
-        /// Link; empty = that of the last of `joints`, or, without `joints`, the end of a robot
-        /// that does not branch.
+        /// Link; empty = the child link of the last of `joints`, or, without `joints`, the end of
+        /// a robot that does not branch.
         std::string tip;
         /// All moving joints from base to tip, in the order of the numbers; empty = as in the
         /// chain.
@@ -43,13 +43,13 @@ class RobotChain {
 
     /// Names of the joints, 1 to kMostJoints. Real-time safe.
     const std::vector<std::string>& joints() const noexcept { return joints_; }
-    /// Moving joints that do not belong to the chain but bear on it. They count at position 0.
+    /// Moving joints outside the chain whose links the chain carries. Their position counts as 0.
     const std::vector<std::string>& others() const noexcept { return others_; }
 
     /// Efforts that hold the robot at rest. Real-time safe.
     /// @param position rad or m
     /// @param gravity in the frame of the base, m/s^2
-    /// @param effort result, N m or N; only that of the joints is written
+    /// @param effort result, N m or N; elements beyond the joints stay unchanged
     void hold(const JointNumbers& position, const std::array<double, 3>& gravity,
               JointNumbers& effort);
 
@@ -58,7 +58,8 @@ class RobotChain {
     std::vector<std::string> others_;
     std::array<std::size_t, kMostJoints> index_{};  // of each joint in the chain
     KDL::Chain chain_;
-    // For a gravity of 1 m/s^2 along each axis: efforts are linear in gravity, which may change.
+    // Dynamics for a gravity of 1 m/s^2 along each axis. hold() combines them, because efforts are
+    // linear in gravity, which may change.
     std::array<std::unique_ptr<KDL::ChainDynParam>, 3> unit_;
     KDL::JntArray chain_position_;
     KDL::JntArray chain_effort_;

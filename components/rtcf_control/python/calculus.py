@@ -17,7 +17,7 @@ class Method(enum.IntEnum):
 
 
 class _Block(Component):
-    """In the last cycle as in any other: passes on the safe command of a component in front."""
+    """Runs in the last cycle, too, to pass on the safe command of an upstream component."""
 
     def update(self):
         self.run()

@@ -289,7 +289,7 @@ class Excitation(Component):
         self.send(value, value - base)
 
     def safe(self):
-        """End the excitation, and pass on the safe command of a component in front."""
+        """End the excitation, and pass on the safe command of an upstream component."""
         if self.progress is Progress.running:
             self.progress = Progress.stopped
         self.send(self.command(), 0.0)

@@ -269,4 +269,4 @@ class Motor(Component):
         self.run()
 
     def safe(self):
-        self.run()  # in the last cycle as in any other: follows the safe command of a controller
+        self.run()  # to follow the safe command of a controller

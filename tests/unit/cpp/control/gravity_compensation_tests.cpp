@@ -321,7 +321,7 @@ TEST(GravityCompensation, RejectsSelectionsWithOneLine) {
         {{{"tip", text("hand")}}, "configure failed: tip: link hand is not in the URDF"},
         {{{"base", text("floor")}}, "configure failed: base: link floor is not in the URDF"},
         {{{"base", text("fore")}, {"tip", text("upper")}},
-         "configure failed: there is no way from base fore to tip upper"},
+         "configure failed: there is no path from base fore to tip upper"},
         {{{"base", text("fore")}, {"tip", text("fore")}},
          "configure failed: no joint moves between base and tip"},
         {{{"urdf", text("")}, {"description", text("")}},
