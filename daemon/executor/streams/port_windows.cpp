@@ -12,7 +12,7 @@ std::vector<NumberField> numbersOf(const FrameColumn& column) {
     try {
         return numbersOfMessage(column.output->ros_definition, column.output->sample());
     } catch (const std::invalid_argument&) {
-        return {};  // whose numbers nobody else could name either
+        return {};  // clients cannot parse such a message either
     }
 }
 
@@ -29,7 +29,7 @@ PortWindows::PortWindows(const FrameTable& table, const std::vector<std::size_t>
 
 bool PortWindows::takes(const Frame& frame) const noexcept {
     const std::uint64_t cycle = frame.cycle().iteration;
-    // A loop that was started anew counts from its beginning.
+    // A restarted loop counts its cycles anew, so its cycles do not belong to the window.
     return count_ == 0 || (cycle > latest_ && cycle - cycle % every_ == first_);
 }
 

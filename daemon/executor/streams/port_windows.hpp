@@ -1,5 +1,6 @@
 /// @file
-/// The window of cycles that is open in a stream of minima and maxima. Main thread only.
+/// The open window of a stream of minima and maxima: the cycles whose minima and maxima become the
+/// next row of the stream. Main thread only.
 #pragma once
 
 #include <cstdint>
@@ -15,24 +16,26 @@ namespace rtcf::executor {
 
 class PortWindows {
    public:
-    /// @param columns of the table that are told
-    /// @param every   cycles of a window; it begins with a multiple of that
+    /// @param columns indices of the table's columns in the stream
+    /// @param every   length of a window, cycles; the number of its first cycle is a multiple of it
     PortWindows(const FrameTable& table, const std::vector<std::size_t>& columns,
                 std::uint32_t every);
 
-    /// Cycles in the open window.
+    /// Number of cycles added to the open window.
     std::uint32_t count() const noexcept { return count_; }
-    /// Number of its first cycle, whether that has come or not.
+    /// Number of the window's first cycle, which may be missing in the window.
     std::uint64_t first() const noexcept { return first_; }
-    /// Whether it can be told: its last cycle has come, or end() was called.
+    /// True if the window is complete: its last cycle was added, or end() was called.
     bool whole() const noexcept { return whole_; }
-    /// Nothing more will come into it.
+    /// Completes the window if it has any cycle.
     void end() noexcept { whole_ = count_ != 0; }
-    /// Whether a cycle belongs into it.
+    /// True if a cycle belongs to the open window.
     bool takes(const Frame& frame) const noexcept;
-    /// @param packers of its columns
+    /// Adds a cycle to the window.
+    /// @param packers one per column
     void add(const Frame& frame, const std::vector<PortPacker>& packers);
-    /// Appends it to a batch, and opens the next one. @return bytes, about
+    /// Appends the window to a batch, and opens the next one.
+    /// @return approximate size of the window in the batch, bytes
     std::size_t close(::rtcf::v1::PortBatch& batch);
 
    private:
