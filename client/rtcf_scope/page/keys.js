@@ -1,4 +1,4 @@
-// What keys do; `help` lists them.
+// The actions of keys; `help` lists them.
 export const KEYS = [
   ["Space", "freeze, or go on"], ["+ −", "a shorter or a longer time"], ["← →", "back and forth in time"],
   ["End", "the newest again"], ["A", "fit the scales to the values"], ["C", "take the cursors away"],
@@ -25,7 +25,7 @@ export function bindKeys(scope, does) {
       if (event.key === "Escape") event.target.blur();
       return;
     }
-    // A button that has the focus is pressed by Space.
+    // Space presses the button that has the focus.
     if (event.key === " " && event.target.closest("button, summary")) return;
     const does_ = /^[1-9]$/.test(event.key) ? () => { const pane = scope.panes[event.key - 1]; if (pane) scope.activate(pane); } : keys[event.key];
     if (!does_) return;

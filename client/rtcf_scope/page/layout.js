@@ -24,11 +24,11 @@ function paneTaken(pane) {
 const TRIGGER = { signal: "string", kind: "string", slope: "string", condition: "string", low: "number", high: "number",
   window: "number", position: "number", holdoff: "number", single: "boolean" };
 
-// The panes of a layout; `wrong` gets the errors of derived signals, which are left out.
+// The panes of a layout, without invalid derived signals; `wrong` gets their errors.
 function panesOf(layout, wrong) {
   return layout.panes.slice(0, 12).map((pane) => {
     const { traces, scale, right, height } = pane ?? {};
-    const found = new Map(); // by name: a signal is in a pane once
+    const found = new Map(); // by name, because a pane shows a signal once
     for (const each of Array.isArray(traces) ? traces : []) {
       const trace = typeof each === "string" ? { name: each } : each ?? {};
       if (typeof trace.name !== "string") continue;

@@ -104,7 +104,7 @@ function connect(runner) {
         for (const source of ["rtcfd", "missing"]) setError(source, "");
         generation = -1; // request the changes since then
       }
-      // One that waits is armed again with the connection.
+      // A trigger that waits is armed again after a reconnection.
       else if (scope.trigger.state !== "armed") stream.wanted.trigger = null;
     },
     message: receive,
@@ -145,18 +145,18 @@ function state(message) {
   $("state").textContent = message.frequency_hz ? `${message.state}, ${scaled(message.frequency_hz, "Hz")}` : message.state;
   $("state").className = message.state;
   $("state").title = [message.status, ...(message.degraded ?? [])].filter(Boolean).join("\n");
-  if (message.generation === undefined) { if (generation !== -1) runners().catch(() => {}); generation = -1; } // it has gone
+  if (message.generation === undefined) { if (generation !== -1) runners().catch(() => {}); generation = -1; } // the runner was removed
   else if (message.generation !== generation) { generation = message.generation; renew(true); }
 }
 
-// The runners there are, and the one that is shown, whether it is there or not.
+// Lists the existing runners and the shown one, which may not exist.
 async function runners() {
   const about = await ask("/api/about");
   const names = about.runners.map(({ runner }) => runner);
   const shown = page.runner();
   const all = shown && !names.includes(shown) ? [...names, shown] : names;
   const options = all.map((name) => new Option(names.includes(name) ? name : `${name} (not there)`, name));
-  // A list that is open stays.
+  // An open list is not replaced.
   if (options.map((each) => each.text).join() !== [...$("runner").options].map((each) => each.text).join()) {
     $("runner").replaceChildren(...options);
     if (shown) $("runner").value = shown;
@@ -164,7 +164,7 @@ async function runners() {
   return about;
 }
 
-// Requests the graph again: all of it, or only values of parameters.
+// Requests the graph again: as a whole, or only the values of parameters.
 async function renew(all) {
   const runner = page.runner();
   try {
@@ -266,7 +266,7 @@ function apply(found) {
     if (![...$("runner").options].some((each) => each.value === found.runner)) $("runner").append(new Option(`${found.runner} (not there)`, found.runner));
     $("runner").value = found.runner;
     connect(found.runner);
-  } else arm(null); // the layout's is another
+  } else arm(null); // the layout has another trigger
   xy.take(found?.xy ?? {});
   setError("layout", layout.given(scope, found ?? {}));
   mode(found?.mode === "trigger" ? "trigger" : "roll");
@@ -276,7 +276,7 @@ function apply(found) {
 
 const systemsLight = matchMedia("(prefers-color-scheme: light)");
 
-// The theme that was chosen, else the system's.
+// The chosen theme, or the system's.
 function theme() {
   document.documentElement.dataset.theme = localStorage.getItem("theme") ?? (systemsLight.matches ? "light" : "dark");
   for (const pane of scope.panes) pane.describe();
@@ -350,7 +350,7 @@ async function begin() {
     const found = await robot.request().catch(() => null);
     if (found?.links.length) showRobot(true, found);
   }
-  // Not earlier: until then the address has the requested layout.
+  // Set last: before, the address has the requested layout.
   scope.onLayout = () => layout.toAddress(() => layout.taken(scope, page.runner(), drawer, xy, robot));
   await Promise.all([layouts(), recordings.show()]);
   new ResizeObserver(() => scope.changed()).observe($("panes"));
@@ -362,6 +362,6 @@ begin().catch((error) => {
   setError("page", error.message);
   onSession(() => location.reload());
 });
-// A file that is opened has other signals than the stream.
+// A recording has other signals than the stream.
 const shown = scope.showRecordings.bind(scope);
 scope.showRecordings = (found) => { shown(found); show(); };

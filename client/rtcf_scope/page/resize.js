@@ -1,6 +1,6 @@
 // Bars between parts of the page that can be dragged, or moved by the arrow keys: beside the list,
 // above the drawer, and between panes. A double click restores the size.
-const STEP = 16; // pixels of a key
+const STEP = 16; // pixels per key press
 const LEAST_PANE = 60; // pixels
 
 // `axis` is "x" or "y"; `sign` is 1 if dragging right or down increases the size, else -1.
@@ -28,13 +28,13 @@ function dragged(bar, { axis, sign, size, set, reset }) {
   });
 }
 
-// A bar that sizes a part of the page, which this browser remembers as a property of its style.
+// A bar that resizes a part of the page. The browser stores the size, a property of the page's style.
 export function sizesPart(bar, property, { axis, sign, size, least, most }) {
   const root = document.documentElement;
   const set = (pixels) => {
     const text = `${Math.round(Math.min(Math.max(pixels, least), most()))}px`;
     root.style.setProperty(property, text);
-    try { localStorage.setItem(property, text); } catch { /* this page has it alone */ }
+    try { localStorage.setItem(property, text); } catch { /* only this page has the size */ }
   };
   const reset = () => {
     root.style.removeProperty(property);
@@ -46,7 +46,7 @@ export function sizesPart(bar, property, { axis, sign, size, least, most }) {
   dragged(bar, { axis, sign, size, set, reset });
 }
 
-// A bar between a pane and the one above it; their heights change, the sum of them does not.
+// A bar between a pane and the one above. It changes their heights and keeps the sum.
 export function sizesPanes(bar, pane, scope) {
   const above = () => scope.panes[scope.panes.indexOf(pane) - 1];
   const heights = () => scope.panes.map((each) => each.box.getBoundingClientRect().height);

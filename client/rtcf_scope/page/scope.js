@@ -32,12 +32,12 @@ export class Scope {
     // the graph does not have.
     this.trigger = { settings: { kind: "edge", signal: "", slope: "rising", low: 0, high: 1 }, state: "off", armed: [], missing: [] };
     this.baseNs = 0n;
-    this.onTraces = () => {}; // others are watched
-    this.onActive = () => {}; // another pane is the active one
+    this.onTraces = () => {}; // the watched signals have changed
+    this.onActive = () => {}; // another pane became active
     this.onShift = () => {}; // the second recording has moved
     this.onLayout = () => {}; // a part of the layout has changed
     this.dirty = true;
-    this.drawn = { end: NaN, time: NaN }; // of the live cycles, in the frame before
+    this.drawn = { end: NaN, time: NaN }; // the live cycles in the previous frame
     this.found = null; // the marks, until something changes
     this.marksNumber = 0; // changes with them
     this.addPane();
@@ -56,7 +56,7 @@ export class Scope {
   // The place of the legend's values without a cursor: the hit, or the newest cycle.
   get readAt() { return this.mode === "trigger" ? this.store.nearest(0) : this.store.end - 1; }
 
-  // Takes notice of signals: {name, unit, kind}.
+  // Stores unit and kind of signals: {name, unit, kind}.
   know(signals) {
     for (const { name, unit, kind } of signals) {
       this.units.set(name, unit);
@@ -67,7 +67,7 @@ export class Scope {
 
   unit(name) { return this.units.get(name) ?? ""; }
 
-  // All traces, a signal that is in several panes once.
+  // All traces; a signal in several panes counts once.
   traces() {
     const found = new Map();
     for (const pane of this.panes) for (const trace of pane.traces) if (!found.has(trace.name)) found.set(trace.name, trace);
@@ -76,27 +76,27 @@ export class Scope {
 
   get hasRight() { return this.panes.some((pane) => pane.traces.some((each) => pane.axisOf(each) === "right")); }
 
-  // Panes beside which no axis stands at the right are as wide as the others, too.
+  // All panes have the same width, with or without an axis at the right.
   arrange() { this.box.classList.toggle("both", this.hasRight); }
 
-  // The ns since 1970 of the time 0 of the axis, null where it is not known.
+  // Time 0 of the axis, ns since 1970; null if unknown.
   get origin() {
     if (this.mode === "recording") return this.recordings[0]?.beginNs ?? null;
     const { shot } = this, base = BigInt((this.mode === "trigger" ? shot?.baseNs : this.baseNs) ?? 0);
     return base ? base + BigInt(Math.round((this.mode === "trigger" ? shot.hitTime : 0) * 1e9)) : null;
   }
 
-  // The time of day of the time 0 of the axis, s.
+  // The time of day at time 0 of the axis, s.
   secondOfDay() {
     const { origin } = this;
     if (origin !== this.day?.origin) this.day = { origin, second: origin === null ? null : secondOfDay(origin) };
     return this.day.second;
   }
 
-  // The numbers of the time axis of a plot of so many CSS pixels.
+  // The ruler of the time axis of a plot of `width` CSS pixels.
   rulerOf(width) {
     const { store, view } = this;
-    // Of the live cycles it does not change from frame to frame.
+    // For live cycles, the ruler must not change from frame to frame.
     const own = this.mode === "roll" ? NaN : (store.cycle(store.end - 1) - store.cycle(store.begin)) / (store.lastTime - store.firstTime);
     const rate = own > 0 && isFinite(own) ? own : this.rate || 1000;
     return rulerOf(this.ruler, { span: view.span, width, zero: this.ruler === "clock" ? this.secondOfDay() : null, store, rate });
@@ -109,7 +109,7 @@ export class Scope {
 
   nextRuler() { this.setRuler(RULERS[(RULERS.indexOf(this.ruler) + 1) % RULERS.length]); }
 
-  // Where the pointer is in a plot, CSS pixels; null: in none.
+  // Sets the position of the pointer in a plot, CSS pixels; null = outside of all plots.
   pointAt(pane, x, y) {
     for (const each of this.panes) {
       if (pane && this.isPointing) each.readout.point(x, each === pane ? y : null);
@@ -118,7 +118,7 @@ export class Scope {
     pane?.readout.show();
   }
 
-  // Moves the second of two recordings, s from where it was at first.
+  // Moves the second recording to `seconds` after its original times.
   shiftSecond(seconds) {
     const [, second] = this.recordings;
     if (!second || !Number.isFinite(seconds)) return;
@@ -162,7 +162,7 @@ export class Scope {
     this.changed();
   }
 
-  // Shows a signal in a pane, or takes it away there.
+  // Shows a signal in a pane, or removes it from there.
   toggle(name, pane = this.active) {
     if (pane.has(name)) {
       pane.remove(name);
@@ -200,7 +200,7 @@ export class Scope {
     this.changed();
   }
 
-  // A shot's time is 0 at its hit.
+  // The time of a shot is 0 at its hit.
   addShot(message, names) {
     const hitTime = message.times[message.hit], cycle = message.cycles[message.hit];
     const times = Float64Array.from(message.times, (time) => time - hitTime);
@@ -218,7 +218,7 @@ export class Scope {
     const before = this.shot?.store;
     this.shotNumber = number;
     const { store } = this.shot;
-    // A zoom stays from shot to shot while they are of one length.
+    // A zoom is kept for shots of the same length.
     if (fresh || Math.abs((before.lastTime - before.firstTime) - (store.lastTime - store.firstTime)) > 0.01 * this.view.span)
       this.view.show(store.firstTime, store.lastTime);
     this.changed();
@@ -233,7 +233,7 @@ export class Scope {
     this.changed();
   }
 
-  // Events, warnings and errors, and the hit of a trigger, at the times of the axis that is shown.
+  // Events, warnings, errors and the hit of a trigger, with their times on the shown axis.
   marks() {
     if (this.found && this.found.baseNs === this.baseNs) return this.found.marks;
     const marks = this.#marks();

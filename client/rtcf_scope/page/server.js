@@ -1,23 +1,23 @@
-// The server: questions by HTTP, the stream by a WebSocket that comes back by itself. Each shows the
-// session, which pages of this host and port keep for each other.
+// The server: requests by HTTP, and the stream by a WebSocket that reconnects. Both authenticate by the
+// session, which pages of this host and port share.
 import { decode } from "./data/wire.js";
 
 const AGAIN_MS = 1000;
 const KEPT = "session";
 const PROTOCOL = "rtcf-scope";
-let own = ""; // where nothing can be kept
+let own = ""; // session of this page, if localStorage is not available
 
 function session() {
   try { return localStorage.getItem(KEPT) ?? own; } catch { return own; }
 }
 
-// Waits for the session that a token in the address gives.
+// Waits for the session that enter.js requests with the token of the address.
 export async function enter() {
   const response = await window.entering?.catch(() => null);
   delete window.entering;
   if (!response?.ok) return;
   own = (await response.json()).session;
-  try { localStorage.setItem(KEPT, own); } catch { /* this page has it alone */ }
+  try { localStorage.setItem(KEPT, own); } catch { /* only this page has the session */ }
 }
 
 // Calls `does` when another page gets a session.
@@ -31,7 +31,7 @@ export async function request(path, options = {}) {
   if (response.ok) return response;
   const text = await response.text();
   let refused;
-  try { ({ refused } = JSON.parse(text)); } catch { /* it is a line */ }
+  try { ({ refused } = JSON.parse(text)); } catch { /* it is not JSON but one line of text */ }
   throw Object.assign(new Error(refused ?? text.trim()), { status: response.status });
 }
 
@@ -42,7 +42,7 @@ export async function ask(path, options = {}) {
 
 export const query = (words) => new URLSearchParams(words).toString();
 
-export async function recorded(name, traces, begin, end) { // s after its first cycle; all without
+export async function recorded(name, traces, begin, end) { // times in s after its first cycle; all cycles without them
   const words = new URLSearchParams(traces.map((each) => ["trace", each]));
   if (begin !== undefined) { words.set("begin", begin); words.set("end", end); }
   const response = await request(`/api/recordings/${encodeURIComponent(name)}/columns?${words}`);
@@ -59,7 +59,7 @@ export class Stream {
     this.#open();
   }
 
-  // Said again after each reconnection.
+  // Sends a request, and repeats it after each reconnection.
   want(words) {
     Object.assign(this.wanted, words);
     this.#say(words);
@@ -71,7 +71,7 @@ export class Stream {
     if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(words));
   }
 
-  // Why there is no stream, in a line.
+  // Returns the reason why there is no stream, one line.
   async #why() {
     try { await request(`/stream?${query({ runner: this.runner })}`); } catch (error) {
       if (error.status >= 403) return error.message;

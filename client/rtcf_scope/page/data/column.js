@@ -1,12 +1,12 @@
-// Values in a ring, with minimum and maximum of each 16, 256 and 4096 of them: a second of 2000
-// cycles is drawn as fast as an hour, and no spike is lost.
+// A ring of values, with the minimum and maximum of each block of 16, 256 and 4096 values, so that
+// drawing is as fast for an hour as for a second, and shows each spike.
 const STEP = 16, LEVELS = 3;
 export const BLOCK = STEP ** LEVELS;
 
 export class Column {
   constructor(capacity) { // a multiple of BLOCK
     this.values = new Float64Array(capacity).fill(NaN);
-    // 1 where a cycle wrote NaN or an infinity; 0 where no cycle is, too.
+    // 1 where a cycle wrote NaN or infinity; 0 elsewhere, also at places without a cycle.
     this.odd = new Uint8Array(capacity);
     this.levels = [];
     for (let size = STEP; size <= BLOCK; size *= STEP)
@@ -20,7 +20,7 @@ export class Column {
     this.strange = 0;
   }
 
-  // `at` is the number of the first value since the beginning; the ring keeps the last ones.
+  // `at` is the number of the first value, counted from the first write; the ring keeps the newest values.
   write(at, values) {
     const capacity = this.values.length;
     for (let i = 0; i < values.length; i++) {
@@ -31,7 +31,7 @@ export class Column {
     for (const level of this.levels) fill(level, at, values);
   }
 
-  // Marks a place without a cycle, or whose cycle lacks this value.
+  // Marks a place that has no cycle, or a cycle without this value.
   blank(at) {
     const place = at % this.values.length;
     this.values[place] = NaN;
@@ -43,13 +43,13 @@ export class Column {
   isOdd(at) { return this.odd[at % this.odd.length] !== 0; }
   isBlank(at) { return !this.isOdd(at) && Number.isNaN(this.get(at)); }
 
-  // Minimum and maximum from `begin` to before `end`: [Infinity, -Infinity] where no number is.
+  // Minimum and maximum of the places [begin, end); [Infinity, -Infinity] if they have no number.
   range(begin, end) {
     this.scan(begin, end);
     return [this.low, this.high];
   }
 
-  // Sets `low` and `high` of the numbers, and `strange` where values are none.
+  // Sets `low` and `high` to the extremes of the numbers, and `strange` if a value is not a number.
   scan(begin, end) {
     const { values, odd, levels } = this, capacity = values.length;
     let low = Infinity, high = -Infinity, strange = 0, at = begin;

@@ -20,7 +20,7 @@ export class Derivation {
     this.isWarm = false;
   }
 
-  // Computes the values of cycles, one after the other; a place that is no cycle has none.
+  // Computes the values of the cycles in order; a place without a cycle has no value.
   run(begin, end) {
     const { store, column, sources, value } = this;
     for (let at = begin; at < end; at++) {
@@ -33,7 +33,7 @@ export class Derivation {
       const time = store.time(at);
       value[0] = this.step(this.get, time - this.last);
       this.last = time;
-      // A difference has no value in its first cycle, which is no error.
+      // A derivative has no value in its first cycle; this is not an error.
       this.isWarm ||= !Number.isNaN(value[0]) || sources.some((each) => each.isOdd(at));
       if (this.isWarm) column.write(at, value); else column.blank(at);
     }

@@ -1,9 +1,9 @@
 // Derived signals: "=" and an expression of signals, as in "= d(/arm.q[0]) - /arm.dq[0]".
-// Functions keep their state from cycle to cycle; where cycles are missing they start again.
+// Functions keep their state from cycle to cycle, and restart after missing cycles.
 const LONGEST = 500; // characters
 
 const pure = (f) => () => (dt, ...values) => f(...values);
-// Each with the number of its arguments, and a maker of (seconds since the last cycle, arguments) => value.
+// For each function the number of its arguments, and a factory of (seconds since the last cycle, arguments) => value.
 const FUNCTIONS = {
   d: [1, () => { let last = NaN; return (dt, x) => { const rate = (x - last) / dt; last = x; return rate; }; }],
   diff: [1, () => { let last = NaN; return (dt, x) => { const step = x - last; last = x; return step; }; }],
@@ -15,7 +15,7 @@ const FUNCTIONS = {
   min: [2, pure(Math.min)], max: [2, pure(Math.max)],
 };
 
-// Of the first order, with its corner at `hertz`.
+// A first-order low-pass filter with the corner frequency `hertz`.
 function lowPass() {
   let y = NaN;
   return (dt, x, hertz) => {
@@ -27,25 +27,25 @@ function lowPass() {
 const NUMBER = /(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?/y;
 const WORD = /[A-Za-z]\w*/y;
 const SIGNAL = /(?:\/[A-Za-z]\w*)+\.[A-Za-z_]\w*(?:\.[A-Za-z_]\w*|\[(?:\d+|state)\])*/y;
-const CYCLE = ["latency", "duration"]; // of a cycle, each the signal of that name with "~"
+const CYCLE = ["latency", "duration"]; // properties of a cycle; their signals are "~latency" and "~duration"
 
 export const isDerived = (name) => name.startsWith("=");
 
-// {signals, start}: `start` makes the function of (value of a signal by name, seconds since the last
-// cycle). Throws an Error whose message is one line.
+// Returns {signals, start}; `start` returns a function of (value of a signal by name, seconds since
+// the last cycle). Throws an Error with a message of one line.
 const known = new Map();
 export function derived(name) {
   if (!known.has(name)) known.set(name, new Parser(name.slice(1)).parse());
   return known.get(name);
 }
 
-// The error of an expression in one line; empty if it has none.
+// Returns the error of an expression, one line; empty if it is valid.
 export function errorOf(name) {
   try { derived(name); } catch (error) { return error.message; }
   return "";
 }
 
-// The signals that traces need, each once.
+// Returns the signals that traces need, each once.
 export function sources(names) {
   return [...new Set(names.flatMap((name) => (isDerived(name) ? derived(name).signals : [name])))];
 }

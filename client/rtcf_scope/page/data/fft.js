@@ -1,8 +1,8 @@
-// Spectrum of evenly spaced values: Hann's window, amplitudes of the sines it is made of.
+// The amplitude spectrum of evenly spaced values, with Hann's window.
 const MOST = 1 << 16; // values, the newest ones
-const FINER = 2; // as many points at least as the values alone would give
+const FINER = 2; // minimum factor of zero padding
 
-// `amplitudes[i]` is that of the frequency `i * step`; sines nearer than `resolution` are one peak.
+// `amplitudes[i]` is the amplitude at the frequency `i * step`; sines closer than `resolution` form one peak.
 export function spectrum(values, rate) {
   const count = Math.min(values.length, MOST), first = values.length - count;
   if (count < 16) return null;
@@ -14,13 +14,13 @@ export function spectrum(values, rate) {
   for (let i = 0; i < count; i++) real[i] = (values[first + i] - mean) * (0.5 - 0.5 * Math.cos(2 * Math.PI * i / count));
   transform(real, imaginary);
   const amplitudes = new Float64Array(size / 2);
-  // The window takes half of the amplitude.
+  // The window halves the amplitude.
   for (let i = 0; i < size / 2; i++) amplitudes[i] = Math.sqrt(real[i] * real[i] + imaginary[i] * imaginary[i]) * 4 / count;
   return { amplitudes, step: rate / size, resolution: rate / count };
 }
 
-// Where the peak is that is highest at point `at`: the top of the parabola through the logarithms of
-// it and its neighbours, which Hann's window comes near to.
+// Returns the peak whose highest point is `at`: the vertex of the parabola through the logarithms of
+// this point and its neighbours, which approximates a peak of Hann's window.
 export function peak({ amplitudes, step }, at) {
   const [before, top, after] = [at - 1, at, at + 1].map((each) => Math.log(Math.max(amplitudes[each] ?? 0, 1e-300)));
   const bend = before - 2 * top + after;
@@ -28,7 +28,7 @@ export function peak({ amplitudes, step }, at) {
   return { frequency: (at + by) * step, amplitude: Math.exp(top - (before - after) * by / 4) };
 }
 
-// The point of the highest peak. The remainder of the mean does not count.
+// Returns the highest point, without those near 0 Hz, which remain of the mean.
 export function highest({ amplitudes, step, resolution }) {
   let found = Math.min(Math.ceil(resolution / step), amplitudes.length - 1);
   for (let i = found + 1; i < amplitudes.length; i++) if (amplitudes[i] > amplitudes[found]) found = i;

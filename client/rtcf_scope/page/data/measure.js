@@ -1,8 +1,8 @@
 // Measurements of a part of a trace.
 const MOST = 400_000; // values
 
-// The values of a column between two times, those that are no numbers left out. The arrays are used
-// again by the next call.
+// The values of a column between two times, without those that are not numbers. The next call reuses
+// the arrays.
 let times = new Float64Array(0), numbers = new Float64Array(0);
 
 export function values(store, column, begin, end) {
@@ -23,7 +23,7 @@ export function values(store, column, begin, end) {
 export function measured(store, column, begin, end) {
   const { times, values: found } = values(store, column, begin, end);
   if (!found.length) return null;
-  // Of all values, however many: no spike is left out.
+  // The extremes of all values, even if there are more than MOST.
   const [min, max] = column.range(store.find(begin), Math.min(store.find(end), store.end));
   let sum = 0, squares = 0;
   for (let i = 0; i < found.length; i++) { sum += found[i]; squares += found[i] * found[i]; }
@@ -39,7 +39,7 @@ export function frequency(times, found, min, max) {
   for (let i = 1; i < found.length; i++) {
     if (found[i] < middle - band) armed = true;
     if (armed && found[i] >= middle) {
-      // Between two cycles, where the line crosses.
+      // Interpolate the crossing between two cycles.
       const part = (middle - found[i - 1]) / (found[i] - found[i - 1]);
       const at = times[i - 1] + (times[i] - times[i - 1]) * (isFinite(part) ? Math.min(Math.max(part, 0), 1) : 1);
       if (count === 0) first = at;
@@ -59,7 +59,7 @@ export function step(times, found) {
   if (count < 10) return none;
   const from = mean(found, 0, edge), to = mean(found, tail, count), size = to - from;
   if (size === 0) return none;
-  // A ramp does not stay, however short the piece of it.
+  // A piece of a ramp is not a step, because its end is not constant.
   if (Math.abs(mean(found, tail, tail + edge) - mean(found, tail + edge, count)) > Math.abs(size) * 0.015) return none;
   for (let i = tail; i < count; i++) if (Math.abs(found[i] - to) > Math.abs(size) * 0.05) return none;
   for (let i = 0; i < edge; i++) if (Math.abs(found[i] - from) > Math.abs(size) * 0.05) return none;

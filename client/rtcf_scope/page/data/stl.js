@@ -1,11 +1,11 @@
-// Meshes of binary STL files: corners with normals, which are smooth across flat angles.
+// Meshes from binary STL files: corners with normals, which are smooth across small angles.
 const SMOOTH = Math.cos(35 * Math.PI / 180);
 
-// Returns {positions, normals, index}: 3 numbers of a corner each, and 3 corners of a triangle.
+// Returns {positions, normals, index}: 3 numbers per corner in the first two, 3 corners per triangle in `index`.
 export function meshOf(buffer) {
   const data = new DataView(buffer), count = data.getUint32(80, true);
   const places = new Float32Array(count * 9), faces = new Float32Array(count * 3);
-  const around = new Map(); // triangles by the place of a corner
+  const around = new Map(); // triangles by the position of a corner
   for (let i = 0; i < count; i++) {
     for (let j = 0; j < 9; j++) places[9 * i + j] = data.getFloat32(84 + 50 * i + 12 + 4 * j, true);
     faces.set(normalOf(places, 9 * i), 3 * i);
@@ -31,7 +31,7 @@ export function meshOf(buffer) {
   return { positions: new Float32Array(positions), normals: new Float32Array(normals), index };
 }
 
-// A place, to a hundredth of a millimetre.
+// A position, rounded to a hundredth of a millimetre, as a key.
 function keyOf(places, at) {
   return `${Math.round(places[at] * 1e5)},${Math.round(places[at + 1] * 1e5)},${Math.round(places[at + 2] * 1e5)}`;
 }

@@ -5,7 +5,7 @@ import { derived, isDerived, sources } from "./derived.js";
 import { RECORDED } from "./wire.js";
 
 export const LATENCY = "~latency", DURATION = "~duration";
-const KEPT = 128 * BLOCK; // cycles: 4 minutes of 2 kHz, 5 MB a trace
+const KEPT = 128 * BLOCK; // cycles: 4 minutes at 2 kHz, 5 MB per trace
 
 let serial = 0;
 
@@ -15,7 +15,7 @@ export class Store {
     this.clear();
   }
 
-  // What came as one message: a shot, or a recording.
+  // Returns a store with the cycles of one message: a shot, or a recording.
   static of(message, names) {
     const store = new Store(message.count + 1);
     store.hasAll = message.kind !== RECORDED || !(message.hit > 1);
@@ -28,12 +28,12 @@ export class Store {
     this.cycles = new Float64Array(this.capacity);
     this.columns = new Map([[LATENCY, new Column(this.capacity)], [DURATION, new Column(this.capacity)]]);
     this.derivations = new Map(); // by name; their values are in a column of that name
-    this.hasAll = true; // each cycle is here, not only minima and maxima
-    this.shift = 0; // seconds that are added to all times
-    this.end = 0; // all that have come
+    this.hasAll = true; // the store has each cycle, not only minima and maxima
+    this.shift = 0; // seconds added to all times
+    this.end = 0; // number of places so far
     this.lost = 0;
     this.gaps = []; // {from, to, cycles}: times, without `shift`, between which cycles are missing, oldest first
-    this.serial = ++serial; // no other content has the same
+    this.serial = ++serial; // unique for each content
   }
 
   get begin() { return Math.max(0, this.end - this.capacity); }
@@ -44,7 +44,7 @@ export class Store {
   cycle(at) { return this.cycles[at % this.capacity]; }
   column(name) { return this.columns.get(name) ?? (isDerived(name) ? this.#derive(name) : undefined); }
 
-  // Moves all cycles in time, by so many seconds from where they were at first.
+  // Moves all cycles in time to `seconds` after their original times.
   move(seconds) {
     this.shift = seconds;
     this.serial = ++serial;
@@ -62,13 +62,13 @@ export class Store {
 
   push(message, names) {
     if (!message.count) return;
-    if (!this.empty && message.times[0] + this.shift < this.lastTime) this.clear(); // a clock that went back
+    if (!this.empty && message.times[0] + this.shift < this.lastTime) this.clear(); // the clock was set back
     this.lost += message.lost;
     const columns = new Map([[LATENCY, message.latencies], [DURATION, message.durations]]);
     names.forEach((name, i) => columns.set(name, message.traces[i]));
     for (const name of columns.keys())
       if (!this.columns.has(name)) this.columns.set(name, new Column(this.capacity));
-    // Where cycles are missing, and where a loop begins anew, lines are broken.
+    // Lines are broken at missing cycles, and at a restart of the loop.
     const missing = this.empty ? 0 : message.lost || message.cycles[0] - this.cycle(this.end - 1) - 1;
     if (missing !== 0) this.#gap(message.times[0], Math.max(missing, 0));
     for (let i = 0; i < message.count; i++) {
@@ -85,7 +85,7 @@ export class Store {
     while (this.gaps.length && this.gaps[0].to + this.shift <= this.firstTime) this.gaps.shift();
   }
 
-  // A place that is no cycle, and has the time of the last one.
+  // Adds a place without a cycle, with the time of the last cycle.
   #gap(until, cycles) {
     const time = this.times[(this.end - 1) % this.capacity], at = this.end++;
     this.gaps.push({ from: time, to: until, cycles });
@@ -105,10 +105,10 @@ export class Store {
       }
   }
 
-  // The place of the first cycle that is not before `time`.
+  // Returns the place of the first cycle at or after `time`.
   find(time) { return this.#between(time, this.begin, this.end); }
 
-  // The same, of a time that is not long after that of the place `from`, where the search begins.
+  // Like find(), for a time soon after that of the place `from`, where the search begins.
   findAfter(time, from) {
     let low = Math.max(from, this.begin), step = 1;
     while (low + step < this.end && this.time(low + step) < time) { low += step; step *= 2; }
@@ -123,7 +123,7 @@ export class Store {
     return low;
   }
 
-  // The place of the cycle nearest to a time, or -1.
+  // Returns the place of the cycle nearest to a time, or -1.
   nearest(time) {
     if (this.empty) return -1;
     const at = Math.min(this.find(time), this.end - 1);

@@ -1,4 +1,4 @@
-// Numbers for people, and where an axis has its ticks.
+// Texts of numbers, and the ticks of an axis.
 const PREFIXES = [[1e9, "G"], [1e6, "M"], [1e3, "k"], [1, ""], [1e-3, "m"], [1e-6, "µ"], [1e-9, "n"]];
 const CHARACTERS = 8; // of a tick's text
 const THIN = "\u202f"; // a narrow space
@@ -22,7 +22,7 @@ export function ticks(low, high, wanted) {
 
 const digitsOf = (step) => Math.max(-Math.floor(Math.log10(step) + 1e-9), 0);
 
-// A tick, with as many digits as its step has.
+// The text of a tick, with the digits of its step.
 export function tickText(value, step) {
   if (Math.abs(value) < step * 1e-6) value = 0;
   if (Math.abs(value) >= 1e15) return value.toExponential(3);
@@ -39,7 +39,7 @@ export function tickTexts(at, step) {
   const power = 3 * Math.floor(Math.log10(most) / 3 + 1e-9), unit = 10 ** power;
   if (characters(most / unit, digitsOf(step / unit)) <= CHARACTERS)
     return { texts: at.map((value) => tickText(value / unit, step / unit)), note: `×10${superscript(power)}` };
-  // Long numbers that are nearly the same: the differences from one of them.
+  // For long numbers that differ little, show the differences from one of them.
   const coarse = 10 ** Math.ceil(Math.log10(at.at(-1) - at[0] + step) + 1e-9);
   const base = Math.floor(at[0] / coarse + 1e-9) * coarse;
   if (!base) return { texts: at.map((value) => value.toExponential(3)), note: "" };
@@ -50,14 +50,14 @@ export function tickTexts(at, step) {
 
 const superscript = (power) => String(power).replace(/./g, (each) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(each)]);
 
-// Thousands apart, from five digits on.
+// Separates thousands in numbers of at least five digits.
 export function grouped(text) {
   const [whole, part] = text.split(".");
   const apart = whole.replace("−", "").length < 5 ? whole : whole.replace(/\B(?=(\d{3})+$)/g, THIN);
   return part === undefined ? apart : `${apart}.${part}`;
 }
 
-// A measured value: five digits that matter, and all of those before the point.
+// A measured value, with five significant digits and all digits before the point.
 export function figure(value, unit = "") {
   if (value === undefined || value === null || Number.isNaN(value)) return "–";
   if (!isFinite(value)) return value > 0 ? "∞" : "−∞";

@@ -3,10 +3,10 @@ import { colour, ink, pixel, symbol } from "./palette.js";
 import { Slices } from "./slices.js";
 import { drawTrace, reach } from "./trace.js";
 
-const GAP = 0.28; // how much of the ground's colour missing cycles take
+const GAP = 0.28; // opacity of missing cycles over the background
 const SHIFT = 53; // pixels between the symbols of one trace and the next
 
-// Columns from `from` to before `to` of a raster whose first one is column `base` of the sight.
+// Draws the columns [from, to) of a raster whose first column is column `base` of the sight.
 // `traces`: {name, number, sight, track}, where `track` has the first and the last row, or is null.
 export function drawColumns(raster, sight, base, from, to, sources, traces) {
   const paper = pixel(ink("paper")), grid = pixel(ink("grid")), bad = pixel(ink("bad"));
@@ -36,9 +36,9 @@ export function drawColumns(raster, sight, base, from, to, sources, traces) {
   });
 }
 
-// The state of the columns of a sight, while cycles arrive and the oldest ones leave. Columns from
-// `final` on may still change, from `drawn` on they are empty; before `gone` they are empty again, and
-// between `gone` and `held` cycles are leaving.
+// The state of the columns of a sight, while cycles arrive and the oldest ones are removed: columns
+// before `gone` are empty, those before `held` are losing cycles, those from `final` on may still
+// change, and those from `drawn` on have no cycles yet.
 export function changesOf(sight, sources, traces) {
   const near = reachOf(sight, traces) + 1;
   const changes = { stamp: 0, final: Infinity, drawn: -Infinity, held: -Infinity, gone: -Infinity };

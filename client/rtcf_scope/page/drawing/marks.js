@@ -1,5 +1,5 @@
-// Vertical lines that move with time: events, the hit of a trigger, cursors; each with a label that
-// ends before the next one begins.
+// Vertical lines that move with time: events, the hit of a trigger, and cursors. Each has a label that
+// ends before the next label begins.
 const ROOM = 26; // CSS pixels that a label needs
 
 export class Marks {
@@ -10,7 +10,7 @@ export class Marks {
     this.state = "";
   }
 
-  // `marks`: {time, ink, label, title}, in the order of time; `number` is another one when they are.
+  // `marks`: {time, ink, label, title}, in order of time; `number` differs for different marks.
   show(sight, marks, number, labels) {
     const part = Math.floor(sight.first / sight.width);
     const state = `${this.strip.number} ${number} ${part} ${labels}`;

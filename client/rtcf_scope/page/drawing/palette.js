@@ -9,7 +9,7 @@ export const isDark = () => document.documentElement.dataset.theme === "dark";
 export function colour(number) { return (isDark() ? DARK : LIGHT)[number % 8]; }
 export function symbol(number) { return SYMBOLS[Math.floor(number / 8) % SYMBOLS.length]; }
 
-// Whether a point, in units of half its size from its middle, is in a symbol.
+// Returns whether a point is in a symbol; x and y are relative to its centre, in units of half its size.
 export function isInSymbol(name, x, y) {
   if (name === "diamond") return Math.abs(x) + Math.abs(y) <= 1.2;
   if (name === "triangle") return y <= 0.8 && y >= -1 + 2 * Math.abs(x) - 0.2;

@@ -1,4 +1,4 @@
-// One pane: its traces and their scales, a plot of them with axes, marks and cursors, and a legend.
+// One pane: traces and their scales, a plot with axes, marks and cursors, and a legend.
 import { figure } from "./axes.js";
 import { drawMark, Marks } from "./marks.js";
 import { colour, ink, isInSymbol, symbol } from "./palette.js";
@@ -13,26 +13,26 @@ import { drawValues, FONT, LEFT, TOP, Values } from "./values.js";
 import { isDerived } from "../data/derived.js";
 
 const RIGHT = 12, BOTTOM = 22; // CSS pixels; the right one without an axis
-const TRACK = 34, TRACK_ALONE = 72; // height of a track at most, CSS pixels: below lines, and without any
-const NAMED = 14; // height of a track from which it has its name
-const TRACKS = 0.5; // how much of a plot with lines the tracks take at most
+const TRACK = 34, TRACK_ALONE = 72; // maximum height of a track, CSS pixels: below lines, and in a plot without lines
+const NAMED = 14; // minimum height of a track with a name, CSS pixels
+const TRACKS = 0.5; // maximum share of the tracks in the height of a plot with lines
 const AXES = [["left", "left axis"], ["right", "right axis"], ["own", "own scale"], ["track", "track"]];
 export const isAxis = (name) => AXES.some(([each]) => each === name);
 
 export class Pane {
   constructor(scope) {
     this.scope = scope;
-    // {name, number, axis, own}: the number gives the colour; `axis` is one of AXES, or undefined, and
-    // then a track for booleans and the left one for others; `own` is the scale of an own axis.
+    // {name, number, axis, own}: `number` selects the colour. `axis` is one of AXES; undefined = a track
+    // for booleans, the left axis for others. `own` is the scale of a separate axis.
     this.traces = [];
     this.left = new Scale();
     this.right = new Scale();
-    this.weight = 1; // its part of the height
-    this.drawn = []; // {name, number, sight, track}, of the traces, as they were drawn last
-    this.content = ""; // another one when the traces are
+    this.weight = 1; // share of the height
+    this.drawn = []; // {name, number, sight, track} of each trace when it was last drawn
+    this.content = ""; // differs for different traces
     this.size = { width: 0, height: 0 }; // of the plot
     this.box = element("div", "pane");
-    this.face = element("div", "face"); // where the mouse is heard
+    this.face = element("div", "face"); // receives the mouse events
     this.face.setAttribute("role", "img");
     this.plot = element("div", "plot");
     this.values = new Values("left");
@@ -48,7 +48,7 @@ export class Pane {
     this.face.append(this.values.canvas, this.plot, this.rightValues.canvas, below);
     this.readout = new Readout(this, scope);
     this.legend = element("div", "legend");
-    this.bar = element("div", "bar y"); // sizes it, and the pane above
+    this.bar = element("div", "bar y"); // resizes this pane and the one above
     this.box.append(this.bar, this.face, this.legend);
     new ResizeObserver(([{ contentRect: { width, height } }]) => {
       this.size = { width, height };
@@ -56,12 +56,12 @@ export class Pane {
     }).observe(this.plot);
   }
 
-  // The left scale, as it was set, and as it is.
+  // The set range of the left scale; null = fitted.
   get scale() { return this.left.set; }
   set scale(range) { this.left.set = range; }
   get shown() { return this.left.shown; }
 
-  // Its part of the height, beside those of the other panes.
+  // Sets this pane's share of the height, relative to other panes.
   weigh(weight) {
     this.weight = weight;
     this.box.style.flexGrow = weight;
@@ -124,7 +124,7 @@ export class Pane {
     return chip;
   }
 
-  // The sample of a trace's line; a press on it offers the axes.
+  // A sample of a trace's line; a click on it opens the choice of axes.
   #look(trace) {
     const look = element("span", "look"), select = element("select", "");
     select.setAttribute("aria-label", `axis of ${trace.name}`);
@@ -140,7 +140,7 @@ export class Pane {
     return look;
   }
 
-  // The values at cursor A, at the hit of a trigger, or the newest ones; and the scales that have no axis.
+  // Updates the values (at cursor A, at the hit of a trigger, or the newest), and the scales without an axis.
   update() {
     const { scope } = this, { a } = scope.cursors;
     const store = scope.sources()[0];
@@ -150,16 +150,16 @@ export class Pane {
       say(trace.badge, axis === "right" ? "right" : axis === "own" ? `${figure(low)} … ${figure(high)}` : "");
       const column = store.column(trace.name), isThere = column && at >= store.begin;
       const text = isThere && column.isOdd(at) && Number.isNaN(column.get(at)) ? "NaN"
-        : !store.hasAll && isDerived(trace.name) ? "zoom in" // minima and maxima are no cycles to compute with
+        : !store.hasAll && isDerived(trace.name) ? "zoom in" // derived signals need each cycle
           : figure(isThere ? column.get(at) : NaN, scope.unit(trace.name));
       if (trace.value.textContent === text) continue;
       trace.value.textContent = text;
-      // Room that is taken once is kept: a legend whose lines break anew moves the plot.
+      // The width never shrinks: new line breaks in the legend would move the plot.
       if (text.length > trace.room) { trace.room = text.length; trace.value.style.minWidth = `${text.length}ch`; }
     }
   }
 
-  // Of the plot in the face, in CSS pixels.
+  // The area of the plot in the face, CSS pixels.
   get area() { return { left: LEFT, top: TOP, width: Math.max(this.size.width, 10), height: Math.max(this.size.height, 10) }; }
 
   timeAt(x) {
@@ -185,22 +185,22 @@ export class Pane {
     for (const [scale, [low, high]] of needs) scale.fit(low, high, this.content);
   }
 
-  // All scales are fitted anew, closely.
+  // Fits all scales closely to the values in sight.
   refit() { for (const scale of this.#scales()) scale.refit(); }
 
   #scales() { return [this.left, this.right, ...this.traces.map((each) => each.own)]; }
 
-  // Other values are shown: the fitted scales are invalid.
+  // Discards the fitted scales, because other values are shown.
   forget() { for (const scale of this.#scales()) { const { set } = scale; scale.reset(); scale.set = set; } }
 
-  // The scales at a place of the face, each with the sight that shows it.
+  // Returns the scales at a position of the face, each with its sight.
   scalesAt(x) {
     const isOn = (axis) => (trace) => this.axisOf(trace) === axis;
     const side = x < LEFT ? "left" : x > LEFT + this.area.width ? "right" : "";
     const found = new Map();
     const wanted = this.traces.filter((each) => !isOn("track")(each));
     const those = wanted.filter((each) => !side || isOn(side)(each));
-    // Beside the plot, without an axis there, it is all of them.
+    // Beside the plot, where no axis is: all scales.
     for (const trace of those.length ? those : wanted) found.set(this.#scaleOf(trace), this.drawn.find(({ name }) => name === trace.name)?.sight);
     if (!this.traces.length) found.set(this.left, this.sight);
     return [...found].filter(([, sight]) => sight).map(([scale, sight]) => ({ scale, sight }));
@@ -255,13 +255,13 @@ export class Pane {
 
   #units(axis) { return [...new Set(this.#on(axis).map(({ name }) => this.scope.unit(name)).filter(Boolean))].join(", "); }
 
-  // One trace at the right gives its axis the colour.
+  // The right axis has the colour of its trace if there is only one.
   #rightInk() {
     const traces = this.#on("right");
     return traces.length === 1 ? colour(traces[0].number) : ink("soft");
   }
 
-  // The values that the trigger compares with, and where they are, if its signal is here.
+  // Returns the thresholds of the trigger and their positions, if this pane shows its signal.
   #thresholds(drawn) {
     const { trigger: { settings }, mode } = this.scope;
     const sight = drawn.find(({ name }) => name === settings.signal)?.sight;
@@ -286,7 +286,7 @@ export class Pane {
     }));
   }
 
-  // The names of the tracks; those of numbers have their range.
+  // Shows the names of the tracks, with the range of tracks of numbers.
   #names({ ratio }) {
     const tracks = this.#tracks(this.drawn, ratio);
     if (!tracks.length && !this.names.firstChild) return;
@@ -361,7 +361,7 @@ function cursorMarks(a, b) {
     .map((each) => ({ ...each, ink: "cursor" })).sort((one, other) => one.time - other.time);
 }
 
-// A piece of a line as the plot has it.
+// A short piece of a trace's line, for the legend.
 function sample(number) {
   const wide = 20, high = 10, ratio = 2, canvas = element("canvas", "sample");
   canvas.width = wide * ratio;

@@ -1,8 +1,8 @@
-// The mouse on a pane: wheel zooms, dragging pans, a click sets a cursor, and where it is the values
-// are shown.
+// The mouse on a pane: the wheel zooms, dragging pans, a click sets a cursor, and the values at the
+// pointer are shown.
 import { LEFT, TOP } from "./values.js";
 
-const DRAG = 4; // pixels that make a click a drag
+const DRAG = 4; // pixels; a longer movement is a drag, not a click
 
 export function bindPointer(pane, scope) {
   const { face } = pane;

@@ -1,5 +1,5 @@
-// Pixels of a stretch of a plot, drawn column by column. No column depends on another one, so that a
-// growing plot has the same pixels as one drawn at once.
+// The pixels of a part of a plot, drawn column by column. Columns are independent of each other, so
+// that a growing plot has the same pixels as one drawn at once.
 export class Raster {
   constructor(width, height) { // pixels of the screen
     this.width = width;
@@ -13,13 +13,13 @@ export class Raster {
     this.clip(0, height);
   }
 
-  // Limits bars and coverage to the rows from `begin` to before `end`.
+  // Limits bars and coverage to the rows [begin, end).
   clip(begin, end) {
     this.begin = Math.max(begin, 0);
     this.end = Math.min(end, this.height);
   }
 
-  // Columns from `from` to before `to`, all rows or one.
+  // Fills the columns [from, to), in all rows or in one.
   clear(from, to, colour) {
     const { pixels, width } = this;
     for (let begin = from; begin < this.height * width; begin += width)
@@ -30,7 +30,7 @@ export class Raster {
     if (y >= 0 && y < this.height) this.pixels.fill(colour, y * this.width + from, y * this.width + to);
   }
 
-  // A part of a column, between rows that need not be whole.
+  // Fills a part of a column between two rows, which need not be integers.
   bar(x, top, bottom, colour, alpha = 1) {
     top = Math.max(top, this.begin);
     bottom = Math.min(bottom, this.end);

@@ -1,11 +1,11 @@
-// The values under the pointer: a line at its time in all panes, and a box with the values there of
-// the traces of the pane that it is in. The trace next to the pointer is bold.
+// The readout at the pointer: a line at its time in all panes, and a box with the values at this time
+// of the traces of its pane. The trace nearest to the pointer is bold.
 import { figure } from "./axes.js";
 import { colour } from "./palette.js";
 import { clockText } from "./ruler.js";
 import { LEFT, TOP } from "./values.js";
 
-const OFTEN_MS = 100; // between two looks at values that move below the pointer
+const OFTEN_MS = 100; // interval of updates while values move below the pointer
 const ROW = 17, HEAD = 30, AWAY = 14; // CSS pixels
 
 export class Readout {
@@ -20,11 +20,11 @@ export class Readout {
     this.line.hidden = this.box.hidden = true;
     pane.plot.append(this.line);
     pane.face.append(this.box);
-    this.y = null; // of the pointer in the plot; null: it is in another pane
+    this.y = null; // y of the pointer in the plot; null = it is in another pane
     this.next = 0;
   }
 
-  // CSS pixels in the plot.
+  // Sets the position of the pointer in the plot, CSS pixels.
   point(x, y) {
     this.x = x;
     this.y = y;
@@ -65,7 +65,7 @@ export class Readout {
     style.bottom = low ? `${pane.face.clientHeight - TOP - this.y + 6}px` : "";
   }
 
-  // A trace's values, of each source, and how far its line is from the pointer.
+  // Returns a trace's value in each source, and the distance of its line from the pointer.
   #read({ name, number, sight }, sources, time) {
     const values = sources.map((store) => {
       const column = store.column(name), at = store.nearest(time);
@@ -75,7 +75,7 @@ export class Readout {
     return { name, number, away, text: values.map((value) => figure(value, this.scope.unit(name))).join(" | ") };
   }
 
-  // As many as have room, those nearest to the pointer.
+  // Returns the traces nearest to the pointer, as many as fit.
   #near(traces) {
     const { size } = this.pane, room = Math.max(1, Math.floor((Math.max(this.y, size.height - this.y) - HEAD) / ROW));
     if (traces.length <= room) return traces;

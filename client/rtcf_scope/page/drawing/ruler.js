@@ -1,13 +1,13 @@
 // The numbers of a time axis: seconds, the time of day, or the numbers of the cycles.
 import { grouped, tickStep, tickText } from "./axes.js";
 
-const EVERY = 110, EVERY_LONG = 150; // CSS pixels from tick to tick, about
+const EVERY = 110, EVERY_LONG = 150; // approximate distance of ticks, CSS pixels
 const CLOCK = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200, 10800, 21600, 43200, 86400]; // s
 const DAY = 86400;
 export const RULERS = ["seconds", "clock", "cycles"];
 
-// One for a span of time that is so many CSS pixels wide. `zero` is the time of day (s) of the time 0
-// of the axis, null where it is not known; `store` has the cycles, `rate` of them a second.
+// Returns a ruler for `span` seconds on `width` CSS pixels. `zero` is the time of day (s) at time 0 of
+// the axis, null if unknown; `store` has the cycles; `rate` is their number per second.
 export function rulerOf(kind, { span, width, zero, store, rate }) {
   if (kind === "cycles" && !store.empty) return new CycleRuler(Math.max(1, tickStep(span * rate, Math.max(2, width / EVERY))), store);
   if (kind === "clock" && zero !== null) {
@@ -19,7 +19,7 @@ export function rulerOf(kind, { span, width, zero, store, rate }) {
   return new EvenRuler(step, 0, (time) => tickText(time, step), "s", 40);
 }
 
-// Ticks of a number of seconds, counted from `zero` before time 0.
+// Ticks at multiples of a number of seconds, counted from `zero` before time 0.
 class EvenRuler {
   constructor(step, zero, text, unit, room) {
     this.step = step;
@@ -30,7 +30,7 @@ class EvenRuler {
     this.state = `${unit} ${step} ${zero}`;
   }
 
-  // {key, time, value} of those between two times.
+  // The ticks between two times: {key, time, value}.
   ticks(begin, end) {
     const { step, zero } = this, found = [];
     for (let n = Math.ceil((begin + zero) / step); n * step <= end + zero; n++) found.push({ key: n, time: n * step - zero, value: n * step });
@@ -50,7 +50,7 @@ class CycleRuler {
 
   ticks(begin, end) {
     const { store } = this, found = [];
-    // Where a loop begins anew its numbers do, too.
+    // Cycle numbers restart with the loop.
     let from = begin;
     for (const gap of store.gaps) {
       const to = gap.to + store.shift;
@@ -65,7 +65,7 @@ class CycleRuler {
 
   text({ value }) { return grouped(tickText(value, 1)); }
 
-  // Those of the cycles from `first` to before `last`, which count upwards.
+  // Adds the ticks of the cycles [first, last), whose numbers increase.
   #add(found, first, last) {
     if (last <= first) return;
     const { step, store } = this;
@@ -80,20 +80,20 @@ class CycleRuler {
     }
   }
 
-  // The number of a cycle; a place that is none has that of the last one.
+  // Returns the number of the cycle at a place; without a cycle there, that of the last one.
   #cycle(at) {
     const { store } = this, cycle = store.cycle(at);
     return Number.isNaN(cycle) && at > store.begin ? store.cycle(at - 1) : cycle;
   }
 }
 
-// Seconds since midnight, as clocks here show them.
+// Seconds since midnight, local time.
 export function secondOfDay(ns) {
   const zone = -60 * new Date(Number(ns / 1_000_000n)).getTimezoneOffset();
   return (Number(ns % (BigInt(DAY) * 1_000_000_000n)) / 1e9 + zone + DAY) % DAY;
 }
 
-// A time of day, with as many digits as a step of so many seconds needs.
+// The text of a time of day, with the digits that a step of `step` seconds needs.
 export function clockText(seconds, step) {
   const digits = Math.min(Math.max(Math.ceil(-Math.log10(step) - 1e-9), 0), 9), unit = 10 ** digits;
   const units = Math.round((seconds - Math.floor(seconds / DAY) * DAY) * unit) % (DAY * unit);

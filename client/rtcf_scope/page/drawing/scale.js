@@ -1,11 +1,11 @@
-// A range of values: as the values in sight need, or as it was set.
+// A range of values: fitted to the values in sight, or set by the user.
 import { ticks } from "./axes.js";
 
-const SHRINKS = 0.6; // a scale of which the values need less is fitted again
+const SHRINKS = 0.6; // a scale is fitted again if the values need a smaller share of it
 
 export class Scale {
   constructor() {
-    this.set = null; // {low, high}, or null: as the values need
+    this.set = null; // {low, high}; null = fitted
     this.reset();
   }
 
@@ -14,14 +14,14 @@ export class Scale {
     this.refit();
   }
 
-  // It is fitted anew, closely.
+  // Discards a set range, and makes the next fit() a close one.
   refit() {
     this.set = null;
     this.content = null;
   }
 
-  // Fits it to values, rounded to ticks; it stays as it is while it is about right. `content` is
-  // another one when the traces are.
+  // Fits the scale to values, rounded to ticks; keeps it if it is nearly right. `content` differs for
+  // different traces.
   fit(low, high, content) {
     if (this.set) { this.shown = this.set; return; }
     if (low > high) return;

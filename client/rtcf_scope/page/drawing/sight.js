@@ -1,12 +1,12 @@
-// What a plot shows in which pixels. Columns are pixels of the screen, numbered from time 0 on, so
-// that a value stays in its column while the view moves.
+// The map from times and values to the pixels of a plot. Columns are pixels of the screen, numbered
+// from time 0, so that a value stays in its column while the view moves.
 import { ticks } from "./axes.js";
 import { rulerOf } from "./ruler.js";
 
-const EVERY_Y = 45; // CSS pixels from tick to tick, about
+const EVERY_Y = 45; // approximate distance of ticks, CSS pixels
 
 export class Sight {
-  // Size in CSS pixels; ratio: pixels of the screen in one. The scale takes `tall` of the height.
+  // The size is in CSS pixels; `ratio` is the number of screen pixels in one. The scale uses `tall` of the height.
   constructor(view, scale, width, height, ratio, { ruler, tall = height } = {}) {
     this.ratio = ratio;
     this.width = Math.max(1, Math.round(width * ratio));
@@ -21,7 +21,7 @@ export class Sight {
     this.ticksOfRows = this.rowsOfGrid = null;
   }
 
-  // The same with another scale, between two rows.
+  // Returns a copy with another scale, between two rows.
   within(scale, top = this.top, bottom = this.bottom) {
     return Object.assign(Object.create(Sight.prototype), this, { low: scale.low, high: scale.high, top, bottom, ticksOfRows: null, rowsOfGrid: null });
   }
@@ -41,7 +41,7 @@ export class Sight {
   ticks(from, to) { return this.ruler.ticks(from * this.seconds, to * this.seconds); }
 
   column(time) { return time / this.seconds; }
-  // A row of pixels from the top, not rounded; far away is as good as farther.
+  // The row of a value, in pixels from the top, not rounded; limited far outside the plot.
   row(value) {
     const row = this.top + (this.high - value) / (this.high - this.low) * (this.bottom - this.top);
     return Math.min(Math.max(row, -1e9), 1e9);

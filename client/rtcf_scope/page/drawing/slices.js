@@ -1,7 +1,7 @@
-// Which cycles of a store fall into which columns of a stretch, and where they are in it.
+// The cycles of a store in each column of a part of a plot, and their positions.
 export class Slices {
-  // Columns are counted from `base` on; of those from `from` to before `to`, and of `reach` more on
-  // either side, the cycles are known.
+  // Columns are counted from `base`. Finds the cycles of the columns [from, to), and of `reach` more on
+  // both sides.
   constructor(store, seconds, base, from, to, reach) {
     this.store = store;
     this.seconds = seconds;
@@ -17,10 +17,10 @@ export class Slices {
     }
   }
 
-  // The first cycle that is not before a column.
+  // The first cycle at or after the left end of a column.
   start(x) { return this.starts[x - this.from + this.reach]; }
   // The left end of a column, as time.
   time(x) { return (this.base + x) * this.seconds; }
-  // Where a cycle is, in columns.
+  // The position of a cycle, in columns.
   place(at) { return this.store.time(at) / this.seconds - this.base; }
 }

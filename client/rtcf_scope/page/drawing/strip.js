@@ -1,12 +1,12 @@
 // An element that moves with time: it is shifted as a whole, by whole pixels of the screen, so that its
 // content is drawn once.
-const FAR = 1 << 20; // pixels that it may be shifted
+const FAR = 1 << 20; // longest shift, pixels
 
 export class Strip {
   constructor(name) {
     this.box = document.createElement("div");
     this.box.className = `strip ${name}`;
-    this.origin = NaN; // column at its left
+    this.origin = NaN; // column at the left end
     this.seconds = NaN;
     this.number = 0; // changes when the content must be placed again
     this.shift = null;
@@ -24,6 +24,6 @@ export class Strip {
     if (shift !== this.shift) this.box.style.transform = this.shift = shift;
   }
 
-  // Where a column is in it.
+  // The CSS position of a column.
   left(column) { return `${(column - this.origin) / this.ratio}px`; }
 }

@@ -1,5 +1,5 @@
-// The traces of a plot as a row of canvases, each of a stretch of time, that move with it. A tile is
-// drawn once; of the one that the newest cycles fall into their columns are drawn, no others.
+// The traces of a plot as a row of canvases (tiles) that move with time. A tile is drawn once; in the
+// tile with the newest cycles, only their columns are drawn.
 import { Raster } from "./raster.js";
 import { Strip } from "./strip.js";
 
@@ -15,7 +15,7 @@ export class Tiles {
   }
 
   // Draws all tiles again if `key` has changed. `changes` comes from changesOf() in columns.js; its
-  // `stamp` rises with new cycles.
+  // `stamp` increases with new cycles.
   show(sight, key, changes, draw) {
     this.strip.move(sight);
     if (key !== this.key) this.#begin(sight, key);
@@ -27,7 +27,7 @@ export class Tiles {
       if (tile.place !== this.strip.number) { tile.place = this.strip.number; tile.canvas.style.left = this.strip.left(number * WIDE); }
       this.#update(tile, changes, draw);
     }
-    // One more than fill the view is used again and again.
+    // Keep one spare tile for reuse.
     for (const tile of others.slice(1)) {
       tile.canvas.remove();
       this.tiles.splice(this.tiles.indexOf(tile), 1);
@@ -66,7 +66,7 @@ export class Tiles {
   #update(tile, { stamp, final, drawn, held, gone }, draw) {
     const base = tile.number * WIDE;
     let from = tile.ready, to = WIDE;
-    if (base < held && !tile.old) from = 0; // some of its cycles are gone
+    if (base < held && !tile.old) from = 0; // some of its cycles were removed
     else if (from >= WIDE || tile.stamp === stamp) return;
     else if (!Number.isNaN(tile.stamp)) to = Math.min(to, drawn - base);
     tile.stamp = stamp;

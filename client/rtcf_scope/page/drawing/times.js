@@ -1,10 +1,10 @@
-// The numbers below a plot, which move with time, and their unit: a button for another kind of them.
+// The numbers below a plot, which move with time, and their unit, a button that selects another kind.
 import { Strip } from "./strip.js";
 
 const LEFT = 14; // CSS pixels at the left end without a number
 
 export class Times {
-  constructor(box, change) { // change(): others are wanted
+  constructor(box, change) { // change() is called when the user wants another kind
     this.strip = new Strip("numbers");
     this.unit = document.createElement("button");
     this.unit.className = "unit";

@@ -1,22 +1,22 @@
-// Draws one trace: the line through its values. A column of pixels that has more than a few cycles
-// is filled from their minimum to their maximum; one that has few shows their line, with soft edges.
+// Draws one trace: the line through its values. A column of pixels with more than a few cycles is
+// filled from their minimum to their maximum; other columns show the line, with soft edges.
 import { isInSymbol } from "./palette.js";
 
-const FEW = 3; // cycles of a column that are drawn each
+const FEW = 3; // maximum cycles in a column that shows the line
 const WIDTH = 1.5, THIN = 1.1; // CSS pixels
-const DOT = 2.2, APART = 6; // radius of a cycle's dot, and the room from which there are dots
+const DOT = 2.2, APART = 6; // radius of a cycle's dot, and minimum distance of cycles with dots
 const SYMBOL = 4, SYMBOLS_APART = 170; // half the size of a symbol
 const DASH = 7, DASHES_APART = 12, FAINT = 0.4;
-const GROUND = 0.2; // below the line of a track
-const BAND = 4; // height of the mark of values that are no numbers
+const GROUND = 0.2; // opacity of the area below the line of a track
+const BAND = 4; // height of the mark of values that are not numbers
 
-// How many columns away something may be that is seen in a column: a dot, or a symbol.
+// How far a dot or a symbol reaches into other columns, columns.
 export const reach = (ratio, hasSymbols) => Math.ceil((hasSymbols ? SYMBOL + 1 : DOT) * ratio) + 2;
 
 let lows = new Float64Array(0), highs = new Float64Array(0), odds = new Uint8Array(0);
 
 // `style`: {colour, paper (pixels), symbol, shift, order, second, isTrack}; `sight` has the rows. The
-// line of a track holds each value until the next cycle, and has a faint ground below it.
+// line of a track holds each value until the next cycle, and has a faint area below it.
 export function drawTrace(raster, slices, column, sight, style) {
   new Stroke(raster, slices, column, sight, style).draw();
 }
@@ -63,8 +63,8 @@ class Stroke {
     return modulo(this.slices.base + x, Math.round(DASHES_APART * ratio)) < DASH * ratio ? 0.8 : FAINT;
   }
 
-  // Minimum and maximum of the line in each column: of its values, and where it enters and leaves;
-  // and whether a value there is no number, which holds until the next cycle.
+  // Finds the minimum and maximum of the line in each column, including its crossings of the column's
+  // ends, and whether a value there is not a number. A value counts until the next cycle.
   #measure() {
     const { slices, column } = this, { store } = slices;
     const begin = slices.from - slices.reach, end = slices.to + slices.reach;
@@ -133,7 +133,7 @@ class Stroke {
     }
   }
 
-  // What of a column the line from one cycle to the next covers, to a part of a pixel.
+  // Covers the part of a column that the line from one cycle to the next covers, to a fraction of a pixel.
   #segment(x, place, at, next) {
     const { raster, sight, column, width } = this;
     const from = sight.row(column.get(at)), to = sight.row(column.get(at + 1));
@@ -142,7 +142,7 @@ class Stroke {
     const high = width * length, wide = width / 2 * Math.abs(slope) / length;
     const left = Math.max(0, begin - wide), right = Math.min(1, end + wide);
     if (right <= left) return;
-    // It ends where its values end, but for a line that goes on in the same direction.
+    // It ends at its last value, unless the line continues in the same direction.
     let top = Math.min(from, to), bottom = Math.max(from, to);
     for (const other of [at - 1, at + 2])
       if (this.#isThere(other)) {
@@ -174,7 +174,7 @@ class Stroke {
     }
   }
 
-  // Values that are no numbers: a hatched band at the bottom, in the colour of the trace.
+  // Draws values that are not numbers as a hatched band at the bottom, in the colour of the trace.
   #strange(x) {
     const { slices, sight, raster, style } = this;
     const high = Math.round(BAND * sight.ratio), hatch = 2 * Math.round(sight.ratio);
@@ -183,7 +183,7 @@ class Stroke {
       if (modulo(slices.base + x + y, 2 * hatch) < hatch) raster.mix(y * raster.width + x, style.colour, 1);
   }
 
-  // A symbol every now and then, with a rim of the ground.
+  // Draws symbols at intervals, with a rim in the background colour.
   #symbol(x) {
     const { slices, sight, raster, style } = this, { ratio } = sight;
     const apart = Math.round(SYMBOLS_APART * ratio), half = SYMBOL * ratio;
@@ -201,8 +201,8 @@ class Stroke {
   }
 }
 
-// Of a band that is `high` and whose upper edge goes from `upper` to `lower` within a column of
-// width 1, the area above a row.
+// Returns the area above a row of a band of height `high` whose upper edge goes from `upper` to
+// `lower` within a column of width 1.
 function area(y, upper, lower, high) {
   if (Math.abs(lower - upper) < 1e-6) return Math.min(Math.max(y - upper, 0), high);
   return (ramp(y - upper) - ramp(y - lower) - ramp(y - upper - high) + ramp(y - lower - high)) / (lower - upper);

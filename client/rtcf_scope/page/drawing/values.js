@@ -1,4 +1,4 @@
-// The numbers at the left or the right of a plot, drawn again when the scale is another one.
+// The numbers at the left or right of a plot, drawn again when the scale changes.
 import { tickTexts } from "./axes.js";
 import { ink } from "./palette.js";
 
@@ -13,7 +13,7 @@ export class Values {
     this.state = "";
   }
 
-  // `sight` is null where the scale has no traces; `colour` is that of the numbers.
+  // `sight` is null if the scale has no traces; `colour` is the colour of the numbers.
   show(sight, whole, units, colour = ink("soft")) {
     const { ratio } = whole, height = Math.ceil(whole.height / ratio) + TOP + 8;
     const state = `${sight && [sight.low, sight.high, sight.bottom]} ${height} ${ratio} ${document.documentElement.dataset.theme} ${units} ${colour}`;

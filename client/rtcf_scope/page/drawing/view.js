@@ -1,4 +1,4 @@
-// Which stretch of time is looked at: the newest while it follows, else where it was left.
+// The visible interval of time: the newest one while the view follows, else the one that was set.
 export const SPANS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 30, 60, 120, 240];
 const LEAST = 1e-4, MOST = 24 * 3600;
 
@@ -11,7 +11,7 @@ export class View {
 
   zoom(factor, at) {
     const span = Math.min(MOST, Math.max(LEAST, this.span * factor));
-    // What is followed stays at its end.
+    // A view that follows stays at the newest cycle.
     if (!this.follows) this.end = at + (this.end - at) * (span / this.span);
     this.span = span;
   }
@@ -40,15 +40,15 @@ export class Pace {
     const looked = newest >= this.newest ? now - this.now : 0;
     const passed = Math.min(Math.max(looked, 0), PAUSE_MS) / 1000;
     this.now = now;
-    if (!(newest >= this.newest)) // the first ones, or those of a clock that went back
+    if (!(newest >= this.newest)) // the first cycles, or the clock was set back
       this.#begin(now, newest);
     if (newest > this.newest) {
-      // What comes in one go: the most of late, forgotten slowly.
+      // The longest recent batch; this maximum decays slowly.
       this.jump = Math.max(looked < PAUSE_MS ? newest - this.newest : 0, this.jump * 0.98);
       this.newest = newest;
     }
     if (now - this.since.now >= OFTEN_S * 1000) {
-      // A loop that stands will go on as before.
+      // A stopped loop keeps its rate.
       if (newest > this.since.newest) this.rate = (newest - this.since.newest) / (now - this.since.now) * 1000;
       this.since = { now, newest };
     }

@@ -57,7 +57,7 @@ export class Cycles {
     this.#components(g, AREA.top + h + 8, w);
   }
 
-  // A bar for each cycle, or of some for each pixel.
+  // Draws one bar per cycle, or one per pixel for several cycles.
   #bars(store, view, w) {
     const latency = store.column(LATENCY), duration = store.column(DURATION);
     const first = store.find(view.begin), last = Math.min(store.find(view.end) + 1, store.end);
@@ -79,7 +79,7 @@ export class Cycles {
     return bars;
   }
 
-  // A mean cycle, component by component in the order of the schedule.
+  // Draws the mean duration of each component, in schedule order.
   #components(g, top, w) {
     if (!this.statistics) return;
     const all = Object.entries(this.statistics.components);

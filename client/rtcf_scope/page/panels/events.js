@@ -1,5 +1,5 @@
-// The list of events: faults, changes and overruns, which are also marks in the panes, and log records
-// of components, of which warnings and errors are marks.
+// The list of events (faults, changes and overruns) and log records of components. Events, warnings
+// and errors are also marks in the panes.
 import { isBad, isForInformation } from "../scope.js";
 
 const MOST = 200; // in the list
@@ -55,7 +55,7 @@ export class Events {
       button.setAttribute("aria-pressed", String(!this.hidden.has(kind)));
     }
     const found = events.filter((event) => !this.hidden.has(kindOf(event)) && words.every((word) => textOf(event).toLowerCase().includes(word)));
-    // Informational events take no room from the others.
+    // Informational events do not displace others.
     const shown = new Set([...found.filter((each) => !isForInformation(each)).slice(-MOST * 3 / 4), ...found.filter(isForInformation).slice(-MOST / 4)]);
     this.list.replaceChildren(...found.filter((each) => shown.has(each)).reverse().map((event) => this.#item(event)));
     const left = found.length - shown.size;

@@ -1,5 +1,5 @@
-// The drawing of the graph: components from writers to readers, in rows that turn where the panel ends,
-// coloured by their durations. Pointing at a port shows its value.
+// The drawing of the graph: components from writers to readers, in rows that turn at the end of the
+// panel, coloured by their durations. Hovering over a port shows its value.
 import { scaled } from "../drawing/axes.js";
 import { left, place, route, top } from "./graph_layout.js";
 
@@ -14,7 +14,7 @@ export class Graph {
     this.values = values;
     this.graph = { components: [], connections: [] };
     this.statistics = null;
-    this.columns = 0; // of the drawing; 0 = there is none
+    this.columns = 0; // columns of the drawing; 0 = no drawing
     this.nodes = new Map();
     this.says = document.createElement("p");
     this.says.className = "says";
@@ -26,7 +26,7 @@ export class Graph {
     this.#draw();
   }
 
-  // Columns that are in sight; 0 of a panel that is not.
+  // Number of columns that fit; 0 for a hidden panel.
   #room() {
     const { clientWidth } = this.box;
     if (!clientWidth) return 0;
@@ -55,7 +55,7 @@ export class Graph {
 
   #links(components) {
     const known = new Set(components.map((each) => each.name));
-    // An input that nothing feeds has no line.
+    // An input without a writer has no line.
     return this.graph.connections.filter((each) => each.writer || each.subscribed).flatMap((connection) => connection.readers
       .filter(([reader]) => known.has(reader))
       .map(([reader, port, broken]) => ({
@@ -118,7 +118,7 @@ export class Graph {
   }
 }
 
-// A line along corners, which are rounded.
+// A line along rounded corners.
 function rounded(way) {
   let d = `M${way[0].join()}`;
   for (let at = 1; at + 1 < way.length; at++) {
@@ -128,14 +128,14 @@ function rounded(way) {
   return `${d} L${way.at(-1).join()}`;
 }
 
-// Where a corner's rounding begins or ends.
+// The begin or end of a corner's rounding.
 function towards(from, to) {
   const dx = to[0] - from[0], dy = to[1] - from[1], length = Math.hypot(dx, dy);
   const share = length ? Math.min(ROUND, length / 2) / length : 0;
   return [from[0] + dx * share, from[1] + dy * share];
 }
 
-// The middle of the stretch by which a line comes to its reader, or of its longest one.
+// The middle of the last section of a line, or of its longest section.
 function markAt(way) {
   const stretches = way.slice(1).map((b, at) => { const a = way[at]; return { a, b, length: Math.hypot(b[0] - a[0], b[1] - a[1]) }; });
   const last = stretches.at(-2);

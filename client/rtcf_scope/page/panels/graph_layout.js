@@ -1,16 +1,16 @@
-// Places of components on a grid, and ways of the lines between them: values go from left to right, at
-// the end of a row it turns, so that a long chain is as wide as its panel.  Pure functions; `rtcfctl
+// Places of components on a grid, and routes of the lines between them. Values go from left to right; the
+// direction turns at the end of each row, so that a long chain fits its panel.  Pure functions; `rtcfctl
 // graph` does the same in Python (client/rtcfctl/graph/folding.py).
 //
 // A link is one reader of a connection: { net, writer (null = from outside), reader, broken }.  Lines of
-// one net may lie on each other.
+// one net may overlap.
 
-const ROWS = 8; // a layer of more components than that may have several columns
+const ROWS = 8; // a layer of more components may have several columns
 // Lines that run side by side, from the middle of a gap outwards.
 const LANES_DOWN = [0, 1, -1, 2, -2, 3, -3], LANES_ACROSS = [0, 1, -1, 2, -2];
 
 // Places by name: { column, row, turned: values go from right to left }.  `names` are in the order of the
-// schedule; `columns` is how many there may be, at least 2.
+// schedule; `columns` is their maximum number, at least 2.
 export function place(names, links, columns) {
   const found = new Map();
   let column = 0, row = 0, below = 0;
@@ -27,7 +27,7 @@ export function place(names, links, columns) {
   return found;
 }
 
-// Groups that nothing connects; components of their own last.
+// Splits the graph into groups without links between them; single components are last.
 function islands(names, links) {
   const group = new Map(names.map((name) => [name, [name]]));
   for (const { writer, reader } of links) {
@@ -40,7 +40,7 @@ function islands(names, links) {
   return found.sort((a, b) => (a.length === 1) - (b.length === 1) || at.get(a[0]) - at.get(b[0]));
 }
 
-// The longest way to each component from one that reads no other, in this cycle.
+// Returns the layer of each component: the length of the longest path to it without loop breaks.
 function layersOf(names, links) {
   const sources = new Map(names.map((name) => [name, []])), readers = new Map(names.map((name) => [name, []]));
   for (const { writer, reader, broken } of links) {
@@ -50,7 +50,7 @@ function layersOf(names, links) {
   }
   const found = new Map();
   for (const name of names) found.set(name, 1 + Math.max(-1, ...sources.get(name).map((each) => found.get(each) ?? -1)));
-  // What reads nothing stands before its first reader.
+  // A component without writers is placed before its first reader.
   for (const name of names)
     if (!sources.get(name).length && readers.get(name).length)
       found.set(name, Math.max(0, Math.min(...readers.get(name).map((each) => found.get(each))) - 1));
@@ -89,7 +89,7 @@ function placeIsland(names, links, columns) {
   return cells;
 }
 
-// A row for each of a column, beside where its values come from if that is free.
+// Chooses a row for each component of a column, next to its writers if that row is free.
 function placeRows(column, wanted, most, rows) {
   const found = [];
   for (const name of column) found.push(Math.max(Math.round(wanted.get(name)), found.length ? found.at(-1) + 1 : 0));
@@ -101,7 +101,7 @@ function placeRows(column, wanted, most, rows) {
   }
 }
 
-// The layers cut into stretches, each of so many columns at most and about as long.
+// Cuts the layers into bands of similar length, each of at most `columns` columns.
 function bandsOf(blocks, columns) {
   const total = blocks.reduce((sum, each) => sum + each.length, 0);
   const room = Math.ceil(total / Math.ceil(total / columns)), bands = [[]];
@@ -114,7 +114,7 @@ function bandsOf(blocks, columns) {
 
 const mean = (numbers) => (numbers.length ? numbers.reduce((a, b) => a + b, 0) / numbers.length : 0);
 
-// The lines in gaps: those of different nets do not lie on each other while there is room.
+// The lines in gaps: lines of different nets do not overlap if there is room.
 class Lanes {
   constructor(numbers) {
     this.numbers = numbers;
@@ -135,9 +135,9 @@ class Lanes {
   }
 }
 
-// The way of each link: corners [x, y], the reader's end last; no line crosses a box.  `sizes`: wide and
-// high of boxes, gapX and gapY between them, laneX and laneY between lines in a gap, port between lines at
-// a box.
+// Returns the route of each link: corners [x, y], the reader's end last; no line crosses a box.  `sizes`:
+// wide and high of boxes, gapX and gapY between them, laneX and laneY between lines in a gap, port
+// between lines at a box.
 export function route(cells, links, sizes) {
   const outs = ports(links.map(({ writer, net }) => [writer, net]), sizes);
   const ins = ports(links.map(({ reader, net }) => [reader, net]), sizes);
@@ -156,7 +156,7 @@ export function route(cells, links, sizes) {
       const x = middle(gap) + sizes.laneX * down.take(gap, y1, y2, net);
       return [[x1, y1], [x, y1], [x, y2], [x2, y2]];
     }
-    // Above the reader, or below it where the line comes from there or goes back.
+    // Above the reader; below it if the line comes from a lower row, or is a loop break in the same row.
     const above = to.row > start.row || (to.row === start.row && !broken), aisle = to.row + !above;
     const lane = across.take(aisle, middle(gap), middle(gapTo), net);
     const y = top(aisle, sizes) - sizes.gapY / 2 + sizes.laneY * lane;
@@ -166,11 +166,11 @@ export function route(cells, links, sizes) {
   });
 }
 
-// Where the boxes of a column, or of a row, begin.
+// The left end of a column's boxes.
 export const left = (column, { wide, gapX }) => gapX + column * (wide + gapX);
 export const top = (row, { high, gapY }) => gapY + row * (high + gapY);
 
-// How far from the middle of a box each net begins or ends there.
+// Returns the distance of each net's end from the middle of a box.
 function ports(ends, { port, high }) {
   const nets = new Map();
   for (const [component, net] of ends) nets.set(component, (nets.get(component) ?? new Map()).set(net, 0));

@@ -4,7 +4,7 @@ import { measured } from "../data/measure.js";
 import { colour } from "../drawing/palette.js";
 
 const HEADS = ["", "trace", "A", "B", "B − A", "min", "max", "peak-peak", "mean", "RMS", "frequency", "rise 10–90 %", "overshoot", "settling 2 %"];
-const MOST_MS = 12; // of one call: the traces that are left come next
+const MOST_MS = 12; // longest time of one call; the next call continues with the other traces
 
 export class Measurements {
   constructor(scope, box) {

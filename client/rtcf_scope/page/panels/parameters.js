@@ -1,4 +1,4 @@
-// The parameters of all components, as fields; they can be changed where the scope has the right.
+// The parameters of all components, as fields, which are editable if the scope has the right.
 import { ask, query } from "../server.js";
 
 const UNDONE = 100; // changes that can be undone
@@ -14,7 +14,7 @@ export class Parameters {
     this.undoing.onclick = () => this.undo();
   }
 
-  // Takes the newest change of this page back.
+  // Undoes the newest change of this page.
   async undo() {
     const change = this.done.pop();
     if (!change) return;
@@ -131,7 +131,7 @@ export class Parameters {
   #bind(component, parameter, field, slider) {
     const read = (input) => parameter.type === "bool" ? input.checked
       : parameter.type === "int" || parameter.type === "double" ? Number(input.value) : input.value;
-    // One at a time, so that the newest value is set last.
+    // One request at a time, so that the newest value is set last.
     let isSetting = false, next;
     const setNext = async (value) => {
       next = { value };

@@ -1,4 +1,4 @@
-// Recordings: one opens in place of the stream, a second one over it.
+// Recordings: the first one replaces the stream, a second one is drawn over it.
 import { ask, recorded } from "../server.js";
 import { sources } from "../data/derived.js";
 import { Store } from "../data/store.js";
@@ -9,7 +9,7 @@ export class Recordings {
     this.box = box;
     this.setError = setError;
     this.open = []; // {name, signals, beginNs, shift}
-    this.shift = null; // the field for it, where there are two
+    this.shift = null; // the field for the shift; null unless there are two recordings
     scope.onShift = (seconds) => {
       const [, second] = this.open;
       if (second) second.shift = seconds;
@@ -37,7 +37,7 @@ export class Recordings {
     this.#tellShift();
   }
 
-  // How the second one is shifted against the first.
+  // Shows the shift of the second recording relative to the first.
   #shifting() {
     const { scope } = this, [first, second] = this.open;
     const label = element("label", "shift"), bar = element("div", "group");
@@ -89,7 +89,7 @@ export class Recordings {
     scope.showRecordings(await Promise.all(this.open.map((each) => Opened.of(each, wanted, scope.view))));
   }
 
-  // Reads each cycle in sight where all of a recording is too much; called a few times a second.
+  // Reads each visible cycle of a recording that is too large to read as a whole; called a few times a second.
   async loadVisible() {
     try {
       for (const each of this.scope.recordings) if (await each.loadVisible()) this.scope.changed();
@@ -104,12 +104,12 @@ export class Recordings {
   }
 }
 
-// One that is shown: all of it, and the part in sight more closely.
+// An open recording: an overview, and the visible part in detail.
 class Opened {
   static async of(description, wanted, view) {
     const { name, beginNs } = description, opened = new Opened();
     Object.assign(opened, { name, beginNs, wanted, view, all: await part(name, wanted), close: null, asks: false });
-    // It may have been shifted meanwhile.
+    // The user may have shifted it meanwhile.
     opened.shift = description.shift;
     return opened;
   }

@@ -1,15 +1,15 @@
-// The robot of the runner in 3-D: it moves with the signals of its joints, its target is a ghost, and a
-// joint that is picked shows its signals. Drawn by three.js, which is loaded when the panel is opened.
+// The robot of the runner in 3-D. It moves with the signals of its joints; a ghost shows its target;
+// picking a joint shows its signals. three.js draws it, and is loaded when the panel is opened.
 import { meshOf } from "../data/stl.js";
 import { ink } from "../drawing/palette.js";
 import { ask, query, request } from "../server.js";
 
 const GHOST = 0.2; // opacity
-const NEAR = 1e-4; // rad or m; a nearer target is not drawn
-const CLICK = 4; // CSS pixels; a longer way is a drag
+const NEAR = 1e-4; // rad or m; a target closer to the position is not drawn
+const CLICK = 4; // CSS pixels; a longer movement is a drag
 const SIDES = 48; // of a round shape
 
-// Whether WebGL has no graphics card here. Smooth edges then cost more time than all the rest.
+// Returns whether WebGL runs without a graphics card. Smooth edges are then the most expensive part.
 function drawsBySoftware() {
   const gl = document.createElement("canvas").getContext("webgl"), names = gl?.getExtension("WEBGL_debug_renderer_info");
   const name = names ? gl.getParameter(names.UNMASKED_RENDERER_WEBGL) : "";
@@ -19,7 +19,7 @@ function drawsBySoftware() {
 
 export class Robot {
   // `page.runner()`: the name of the runner; `onPick(signals)`: a joint was picked;
-  // `onSignals()`: others are watched.
+  // `onSignals()`: the signals to watch have changed.
   constructor(scope, box, page, { onPick, onSignals }) {
     Object.assign(this, { scope, box, page, onPick, onSignals });
     this.canvas = box.querySelector("canvas");
@@ -58,7 +58,7 @@ export class Robot {
 
   request() { return ask(`/api/robot?${query({ runner: this.page.runner() })}`); }
 
-  // Takes the robot, which is requested if it is not known: the graph has changed. One load after the other.
+  // Loads the robot after a change of the graph; requests it unless `known` is given. Loads run one after another.
   load(known) {
     this.lastLoad = this.lastLoad.then(() => this.#load(known));
     return this.lastLoad;
@@ -104,7 +104,7 @@ export class Robot {
     new ResizeObserver(() => { this.drawn = ""; }).observe(this.canvas.parentElement);
   }
 
-  // Makes the links and signals of a description; those that are the same as before are kept.
+  // Makes the links and signals of a description; keeps unchanged ones.
   async #build(found) {
     const description = JSON.stringify(found), form = JSON.stringify(found.links);
     if (description === this.description) return;
@@ -140,7 +140,7 @@ export class Robot {
     this.drawn = "";
   }
 
-  // Takes the signals of the joints, and lists them.
+  // Stores the signals of the joints, and lists them.
   #follow(found) {
     this.joints = found.links.filter((link) => link.moves && found.signals[link.joint]).map((link) => ({ ...link, ...found.signals[link.joint] }));
     this.signals = this.joints.flatMap(({ position, target }) => (target ? [position, target] : [position]));
@@ -153,7 +153,7 @@ export class Robot {
       row.append(Object.assign(document.createElement("b"), { textContent: joint.joint }), bar, says);
       row.onclick = () => this.#pick(joint.joint);
       joint.show = (value) => {
-        bar.value = Number.isFinite(value) ? value : 0; // it throws at NaN
+        bar.value = Number.isFinite(value) ? value : 0; // the element throws an exception for NaN
         says.textContent = Number.isFinite(value) ? joint.type === "prismatic" ? `${(value * 1e3).toFixed(1)} mm` : `${(value * 180 / Math.PI).toFixed(1)}°` : "–";
       };
       joint.row = row;
@@ -178,7 +178,7 @@ export class Robot {
 
   #solid(group, geometry, visual, isGhost) {
     const { Mesh, MeshPhongMaterial, MeshLambertMaterial, Color } = this.three, [r, g, b, a] = visual.rgba;
-    const behind = { polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2 }; // where both are at one place
+    const behind = { polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 2 }; // where robot and ghost coincide
     const material = isGhost ? new MeshLambertMaterial({ color: ink("accent"), transparent: true, opacity: GHOST, ...behind })
       : new MeshPhongMaterial({ color: new Color(r, g, b), shininess: 28, specular: 0x222222, transparent: a < 1, opacity: a });
     const solid = new Mesh(geometry, material);
@@ -203,7 +203,7 @@ export class Robot {
     });
   }
 
-  // The newest cycle, or the last one in sight where time stands still.
+  // Returns the place of the newest cycle, or of the last visible one in a view that does not follow.
   #at(store) {
     const { scope } = this;
     if (scope.mode === "roll" && scope.view.follows) return store.end - 1;
@@ -228,7 +228,7 @@ export class Robot {
     }
   }
 
-  // Takes the colours of the theme.
+  // Applies the colours of the theme.
   themed() {
     if (!this.size) return;
     const { GridHelper } = this.three;
@@ -290,7 +290,7 @@ export class Robot {
     this.centre.addScaledVector(right, -x * unit).addScaledVector(up, y * unit);
   }
 
-  // The joint that moves the link at a place of the canvas.
+  // Returns the joint of the link at a position of the canvas.
   #jointAt(x, y) {
     const { Vector2 } = this.three, { clientWidth, clientHeight } = this.canvas;
     this.ray.setFromCamera(new Vector2(2 * x / clientWidth - 1, 1 - 2 * y / clientHeight), this.camera);
@@ -317,7 +317,7 @@ export class Robot {
     this.drawn = "";
   }
 
-  // Draws, if something has changed. Returns whether it did.
+  // Draws if something has changed; returns whether it drew.
   frame() {
     if (!this.isOpen || !this.renderer || !this.links.size) return false;
     const values = this.#values("position"), targets = this.#values("target");

@@ -84,7 +84,7 @@ export class Spectrum {
     return found;
   }
 
-  // The points of the line: of those that fall into one pixel the highest.
+  // The points of the line: the highest one in each pixel.
   #line({ amplitudes, step }, { x, y }) {
     const points = [];
     let pixel = -1, most = 0;
@@ -123,7 +123,7 @@ export class Spectrum {
     g.strokeRect(AREA.left + 0.5, AREA.top + 0.5, w, h);
   }
 
-  // The highest peak of each, or the point below the mouse.
+  // Marks the highest peak of each trace, or the point below the mouse.
   #point(g, { w, x, y, hertz }) {
     g.textAlign = "left";
     this.found.slice(0, 8).forEach(({ name, number, of }, row) => {
@@ -142,7 +142,7 @@ export class Spectrum {
   }
 }
 
-// With the digits that a peak has that is known to a hundredth of the resolution.
+// The text of a peak's frequency, which is accurate to a hundredth of the resolution.
 export function hertzText(frequency, resolution) {
   const unit = 10 ** Math.floor(Math.log10(resolution / 100) + 1e-9);
   return scaled(Math.round(frequency / unit) * unit, "Hz");
@@ -153,7 +153,7 @@ function linearTicks(limit, w) {
   return at.map((hertz) => ({ hertz, text: tickText(hertz, step) }));
 }
 
-// 1, 2, 5 of each decade have a number, all others a line.
+// In each decade, 1, 2 and 5 have numbers, and all ticks have lines.
 function decadeTicks(from, limit) {
   const found = [];
   for (let power = Math.floor(Math.log10(from)); 10 ** power <= limit; power++)

@@ -1,4 +1,4 @@
-// Runs an expensive function less often the longer it takes: at most a tenth of the time.
+// Limits an expensive function to a tenth of the time: the longer it takes, the less often it runs.
 const SHARE = 0.1;
 
 export class Throttle {

@@ -3,7 +3,7 @@ import { isDerived } from "../data/derived.js";
 import { DURATION, LATENCY } from "../data/store.js";
 import { colour } from "../drawing/palette.js";
 
-const MANY = 60; // signals, from which components begin closed
+const MANY = 60; // minimum number of signals for components to be closed at first
 const TITLES = new Map([["cycles", "cycles of the loop"], ["derived", "derived signals"]]);
 const KINDS = { bool: "bool", integer: "int" };
 

@@ -1,4 +1,4 @@
-// The trigger's settings; the server looks at every cycle.
+// The settings of the trigger; the server checks every cycle.
 import { isDerived } from "../data/derived.js";
 import { figure } from "../drawing/axes.js";
 
@@ -23,7 +23,7 @@ export class TriggerPanel {
     this.#signals();
     for (const name of ["kind", "low", "high", "single", "window", "position", "holdoff", "condition"]) {
       const input = this.part(name);
-      // Leave the field in which the user types.
+      // Do not change the field in which the user types.
       if (settings[name] === undefined || input === document.activeElement) continue;
       if (input.type === "checkbox") input.checked = settings[name]; else input.value = settings[name];
     }
@@ -38,11 +38,11 @@ export class TriggerPanel {
     this.showState();
   }
 
-  // Those that are shown, those there are, and the one that is set, whether it is there or not.
+  // Lists the shown signals, all other signals, and the selected one, which may not exist.
   #signals() {
     const { settings } = this.scope.trigger;
     const there = this.scope.catalog.map((each) => each.name);
-    // The server, which looks at the cycles, derives nothing.
+    // The server checks the cycles, and it does not compute derived signals.
     const shown = this.scope.traces().map((each) => each.name).filter((name) => !isDerived(name));
     if (!settings.signal) settings.signal = shown[0] ?? there.find((name) => !name.startsWith("~")) ?? there[0] ?? "";
     const known = new Set(there);
@@ -50,7 +50,7 @@ export class TriggerPanel {
     const names = [...new Set([settings.signal, ...shown, ...there])].filter(Boolean);
     const options = names.map((name) => [name, are && !known.has(name) ? `${name} (not there)` : name]);
     const select = this.part("signal");
-    // A list that is open stays.
+    // An open list is not replaced.
     if (JSON.stringify(options) !== this.listed) {
       this.listed = JSON.stringify(options);
       select.replaceChildren(...options.map(([name, text]) => new Option(text, name)));

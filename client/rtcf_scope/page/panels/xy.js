@@ -1,4 +1,4 @@
-// One trace over another, of the cycles in sight: a phase portrait, a hysteresis, a path.
+// One trace over another, for the visible cycles: a phase portrait, a hysteresis, a path.
 import { tickTexts, ticks } from "../drawing/axes.js";
 import { blank } from "../drawing/canvas.js";
 import { colour, ink } from "../drawing/palette.js";
@@ -26,7 +26,7 @@ export class XY {
     this.equal.onchange = () => { this.isEqual = this.equal.checked; this.#again(); };
   }
 
-  // Takes the settings of a layout.
+  // Applies the settings of a layout.
   take({ x, y, equal } = {}) {
     this.chosen = { x: typeof x === "string" ? x : "", y: typeof y === "string" ? y : "" };
     this.isEqual = equal === true;
@@ -120,7 +120,7 @@ export class XY {
   }
 }
 
-// Pairs of values of the cycles in sight, BREAK where one of them is no number.
+// Returns the pairs of values of the visible cycles; BREAK if one of them is not a number.
 function pointsOf(store, { x, y }, view) {
   const points = [], one = store.column(x), other = store.column(y);
   if (store.empty || !one || !other) return { points, every: 1 };
