@@ -277,8 +277,8 @@ def _member(owner: type, name: str, annotation: object, line: int) -> Member:
         raise DeclarationError("is None: declare State[float | None], or set a number")
     elif given is not None:
         if kind in (*PORTS, Derived):
-            way_out = "set it in prepare" if kind is Derived else "remove the value"
-            raise DeclarationError(f"is {_a(kind)}, which has no initial value: {way_out}")
+            remedy = "set it in prepare" if kind is Derived else "remove the value"
+            raise DeclarationError(f"is {_a(kind)}, which has no initial value: {remedy}")
         initial = given
     if declared.optional and kind is not State:
         raise DeclarationError("may be None, but only a State may be None: use .valid of an Input")

@@ -134,7 +134,7 @@ def _work(
             results.flush()
         status = 0
     except Mistake as mistake:
-        parts = (mistake.file, mistake.line, mistake.what, mistake.way_out, mistake.text)
+        parts = (mistake.file, mistake.line, mistake.what, mistake.remedy, mistake.text)
         pickle.dump(parts, results)
         results.flush()
     except BaseException:

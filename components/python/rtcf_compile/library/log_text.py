@@ -66,15 +66,15 @@ def _is_float(call: LogCall, form: str, kind: str) -> bool:
     """Tell whether a placeholder formats a float; raise Mistake if its argument is no match."""
     found = _BOTH.fullmatch(form)
     if found is None:
-        way_out = "write width, precision and type: {:8.3f}"
-        raise _mistake(call, f"{{:{form}}} is not supported", way_out)
+        remedy = "write width, precision and type: {:8.3f}"
+        raise _mistake(call, f"{{:{form}}} is not supported", remedy)
     if found["type"] and found["type"] not in (_FLOAT if kind == "float64" else _FLOAT + _WHOLE):
-        way_out = "write {:d} for an int, {:.3f} for a float"
-        raise _mistake(call, f"{{:{form}}} cannot show a {kind}", way_out)
+        remedy = "write {:d} for an int, {:.3f} for a float"
+        raise _mistake(call, f"{{:{form}}} cannot show a {kind}", remedy)
     if found["type"]:
         return found["type"] in _FLOAT
     return kind == "float64" or bool(found["precision"])
 
 
-def _mistake(call: LogCall, what: str, way_out: str) -> Mistake:
-    return Mistake(call.file, call.line, what, way_out)
+def _mistake(call: LogCall, what: str, remedy: str) -> Mistake:
+    return Mistake(call.file, call.line, what, remedy)

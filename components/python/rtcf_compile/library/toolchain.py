@@ -66,12 +66,12 @@ def identity() -> str:
 def mistake(file: str, said: str) -> Mistake:
     """Return the output of a failed compiler or linker as a Mistake."""
     first = next((each for each in said.splitlines() if re.search("error|undefined", each)), "")
-    way_out = "this is a bug of rtcf-compile: report it with the source"
+    remedy = "this is a bug of rtcf-compile: report it with the source"
     if "rtcf_python_library_" in said:
-        way_out = "install the same version of librtcf-dev and rtcf-python"
+        remedy = "install the same version of librtcf-dev and rtcf-python"
     elif "No such file" in first or "cannot find" in said:
-        way_out = "sudo apt install librtcf-dev"
-    return Mistake(file, 0, f"{compiler()[0]}: {(first or said.strip())[:300]}", way_out)
+        remedy = "sudo apt install librtcf-dev"
+    return Mistake(file, 0, f"{compiler()[0]}: {(first or said.strip())[:300]}", remedy)
 
 
 def _paths(variable: str) -> list[str]:

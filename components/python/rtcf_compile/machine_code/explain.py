@@ -1,4 +1,4 @@
-"""Translates numba's errors into one line: place, error and way out, without terms of numba."""
+"""Translates numba's errors into one line: place, error and remedy, without terms of numba."""
 
 import re
 from types import FunctionType
@@ -126,12 +126,12 @@ def mistake(error: Any, function: FunctionType) -> Mistake:
 
 
 def _said(text: str, source: str) -> tuple[str, str]:
-    """Return the error in a line and the way out."""
+    """Return the error in a line and the remedy."""
     if found := _MARK.search(text):
         return found[1].strip(), found[2].strip()
-    for pattern, what, way_out in _KNOWN[:2]:
+    for pattern, what, remedy in _KNOWN[:2]:
         if found := re.search(pattern, text):
-            return what.format(*found.groups()), way_out
+            return what.format(*found.groups()), remedy
     if found := _NONE_FOR.search(text):
         return _no_implementation(found["name"], _arguments(found["arguments"]), source)
     if found := _INVALID.search(text):
@@ -140,7 +140,7 @@ def _said(text: str, source: str) -> tuple[str, str]:
             over = ", ".join(kind_of(each) for each in _arguments(found["arguments"]))
             return f"a loop over {over}", "use range(…) of an int, an array or a tuple"
         return f"{kind} is not a function", "write * to multiply, or [0] for an element"
-    for pattern, what, way_out in _KNOWN[2:]:
+    for pattern, what, remedy in _KNOWN[2:]:
         if found := re.search(pattern, text):
             words = [each or "" for each in found.groups()]
             kinds = {f"kind{i}": kind_of(each) for i, each in enumerate(words)}
@@ -148,7 +148,7 @@ def _said(text: str, source: str) -> tuple[str, str]:
                 f"kinds{i}": ", ".join(kind_of(one) for one in _arguments(each))
                 for i, each in enumerate(words)
             }
-            return what.format(*words, **kinds, **several), way_out
+            return what.format(*words, **kinds, **several), remedy
     return "cannot be compiled", "write it in smaller steps, each with a name"
 
 
@@ -173,8 +173,8 @@ def _no_implementation(name: str, arguments: list[str], source: str) -> tuple[st
     of = " and ".join(kinds)
     if name.startswith("rtcf_"):
         done = f"{NAMES[name]} of {of}" if name in NAMES else f"is not possible with {of}"
-        way_out = "give it a matrix" if ".linalg." in done else "give it numbers and arrays"
-        return done, way_out
+        remedy = "give it a matrix" if ".linalg." in done else "give it numbers and arrays"
+        return done, remedy
     if as_written := re.search(rf"[\w.]*\b{name}(?= ?\()", source):
         name = as_written[0]
     if named:
@@ -182,8 +182,8 @@ def _no_implementation(name: str, arguments: list[str], source: str) -> tuple[st
     short = name.rpartition(".")[2]
     if short in ("zeros", "ones", "empty", "full", "eye", "identity", "arange"):
         return f"{name} of {of}", "convert its sizes to ints: int(…)"
-    way_out = "give it an array or a tuple" if short in ("len", "sum", "min", "max") else ""
-    return f"{name} of {of}", way_out or "give it numbers or arrays of a suitable type"
+    remedy = "give it an array or a tuple" if short in ("len", "sum", "min", "max") else ""
+    return f"{name} of {of}", remedy or "give it numbers or arrays of a suitable type"
 
 
 def _operator(operator: str, kinds: list[str]) -> tuple[str, str]:

@@ -79,8 +79,8 @@ def compile_component(cls: type[Component], arena_bytes: int = ARENA) -> Compile
     """Compile a class; raise Mistake on error."""
     if problem := class_name_error(cls.__name__):
         file, line = inspect.getsourcefile(cls) or "?", inspect.getsourcelines(cls)[1]
-        what, _, way_out = problem.partition(": ")
-        raise Mistake(file, line, f"{cls.__name__} {what}", way_out)
+        what, _, remedy = problem.partition(": ")
+        raise Mistake(file, line, f"{cls.__name__} {what}", remedy)
     description = describe(cls)
     record = numba.from_dtype(description.record)
     narrow: set[CodeType] = set()

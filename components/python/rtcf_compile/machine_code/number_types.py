@@ -152,5 +152,5 @@ def _differ(one: Operand, other: Operand) -> None:
 
 
 def plain_of(each: Operand) -> str:
-    """Return the way out for a single number: convert it."""
+    """Return the remedy for a single number: convert it."""
     return f"convert the number: {_PYTHONS[each.dtype.kind]}(…)"

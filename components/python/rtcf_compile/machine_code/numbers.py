@@ -150,9 +150,9 @@ class Numbers:
         if any(map(self._becomes_float, self._statements)):
             Bounds(self).check()
 
-    def stop(self, what: str, way_out: str, line: int = 0) -> Stop:
+    def stop(self, what: str, remedy: str, line: int = 0) -> Stop:
         """Return an error at a line (default: the current one)."""
-        return Stop(Mistake(self._file, line or self._line, what, way_out))
+        return Stop(Mistake(self._file, line or self._line, what, remedy))
 
     def _joined(self, assignment: Any) -> None:
         """Reject a variable that is a narrow number in one place and another type in another."""
@@ -347,8 +347,8 @@ class Numbers:
         try:
             meeting = together(operation, one, other, is_exact)
         except TypingError as error:
-            what, way_out = str(error.msg).removeprefix("RTCF:").split(":", 1)
-            raise self.stop(what, way_out) from None
+            what, remedy = str(error.msg).removeprefix("RTCF:").split(":", 1)
+            raise self.stop(what, remedy) from None
         for to, variable in ((meeting.left, variables[0]), (meeting.right, variables[1])):
             constant = self.constant(variable)
             if to is None or to.kind not in "iu" or type(constant) is not int:

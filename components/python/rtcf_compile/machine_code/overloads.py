@@ -77,8 +77,8 @@ def _refuse_narrow(helper: Callable[..., Any], kind: Any, refused: str) -> None:
     number = operand(kind)
     other = number is not None and (number.is_narrow or number.is_bool)
     if number is not None and other and number.dtype.kind in refused:
-        way_out = "convert it: x.astype(float)" if number.is_array else plain_of(number)
-        raise TypingError(f"RTCF:{NAMES.get(helper.__name__, 'this')} of {number.words}:{way_out}")
+        remedy = "convert it: x.astype(float)" if number.is_array else plain_of(number)
+        raise TypingError(f"RTCF:{NAMES.get(helper.__name__, 'this')} of {number.words}:{remedy}")
 
 
 def _again(helper: Callable[..., Any], names: list[str], changed: dict[str, str]) -> Any:

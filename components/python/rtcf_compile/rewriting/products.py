@@ -54,9 +54,9 @@ class Products(ast.NodeTransformer):
         # Calls that may need functions that the loop does not have.
         self.others: list[ast.Call] = []
 
-    def mistake(self, node: ast.AST, what: str, way_out: str) -> Exception:
+    def mistake(self, node: ast.AST, what: str, remedy: str) -> Exception:
         """Return an error at a node."""
-        return at(self.source.file, node, what, way_out)
+        return at(self.source.file, node, what, remedy)
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
         """Rewrite `GAINS.kp` of a dataclass of constants, `Mode.RUN` of an enum."""
@@ -442,8 +442,8 @@ class Products(ast.NodeTransformer):
             what = f"{target.__name__} takes {target.nin} arguments"
             raise self.mistake(node, what, "give all of them")
         if target in (max, min, sum) and node.keywords:
-            way_out = f"use np.{target.__name__}, np.argmax or a loop"
-            raise self.mistake(node, f"{target.__name__} takes no {node.keywords[0].arg}", way_out)
+            remedy = f"use np.{target.__name__}, np.argmax or a loop"
+            raise self.mistake(node, f"{target.__name__} takes no {node.keywords[0].arg}", remedy)
         if isinstance(node.func, ast.Attribute) and (
             target is None or isinstance(resolve(node.func.value, self.source), np.ndarray)
         ):
@@ -527,10 +527,10 @@ class Products(ast.NodeTransformer):
             bound = signature.bind(*arguments, **named).arguments
         except TypeError:
             name, takes = ast.unparse(node.func), ", ".join(signature.parameters)
-            way_out = f"write {name}({takes})"
+            remedy = f"write {name}({takes})"
             if "kind" in signature.parameters:
-                way_out = 'write kind="stable"'
-            raise self.mistake(node, f"{name} takes {takes}", way_out) from None
+                remedy = 'write kind="stable"'
+            raise self.mistake(node, f"{name} takes {takes}", remedy) from None
         given: list[ast.expr] = []
         for name, parameter in signature.parameters.items():
             value = bound.get(name)

@@ -400,18 +400,18 @@ class Hook(Ports):
             )
         if member.kind in PORTS:
             if member.kind is Output:
-                way_out = f"write self.{node.attr}.write(…)"
-                raise self.mistake(node, f"is {a_kind(member)}", way_out)
+                remedy = f"write self.{node.attr}.write(…)"
+                raise self.mistake(node, f"is {a_kind(member)}", remedy)
             raise self.mistake(node, f"is {a_kind(member)}, which is read-only", "write an Output")
         return member
 
     def _undeclared(self, node: ast.Attribute) -> Exception:
         names = [each for each in self._description.members if "__" not in each]
         words = (*names, *TIME_FIELDS, *LOG_LEVELS, *self._methods.names())
-        way_out = f"write `{node.attr}: State[float]` in the class"
+        remedy = f"write `{node.attr}: State[float]` in the class"
         if near := difflib.get_close_matches(node.attr, words, 1, 0.75):
-            way_out = f"correct its name (self.{near[0]}), or {way_out}"
-        return self.mistake(node, "is not declared", way_out)
+            remedy = f"correct its name (self.{near[0]}), or {remedy}"
+        return self.mistake(node, "is not declared", remedy)
 
     def _no_function(self, node: ast.Call, called: ast.Attribute) -> None:
         """Reject the call of a member, a time or a property of `self`."""
@@ -421,17 +421,17 @@ class Hook(Ports):
             raise self.mistake(node, f"self.{name} is not a function", "leave the ( ) out")
         member = self._description.members.get(name)
         if member is not None or name in self._description.constants:
-            way_out = f"write self.{name}[0] for an element, * to multiply"
-            raise self.mistake(node, f"self.{name} is not a function", way_out)
+            remedy = f"write self.{name}[0] for an element, * to multiply"
+            raise self.mistake(node, f"self.{name} is not a function", remedy)
         if name in HOOKS:
-            way_out = "call a method that both hooks use"
-            raise self.mistake(node, f"{name} is a hook, which the loop calls", way_out)
+            remedy = "call a method that both hooks use"
+            raise self.mistake(node, f"{name} is a hook, which the loop calls", remedy)
         if method is None and name not in (*HOOKS, *LOG_LEVELS, "fault"):
             near = difflib.get_close_matches(name, (*self._methods.names(), *LOG_LEVELS), 1, 0.6)
-            way_out = f"define it: def {name}(self, …):"
+            remedy = f"define it: def {name}(self, …):"
             if near:
-                way_out = f"correct its name (self.{near[0]}), or {way_out}"
-            raise self.mistake(node, f"there is no method {name}", way_out)
+                remedy = f"correct its name (self.{near[0]}), or {remedy}"
+            raise self.mistake(node, f"there is no method {name}", remedy)
 
     def _is_property(self, node: ast.AST, surely: bool = False) -> bool:
         if not isinstance(node, ast.Attribute):

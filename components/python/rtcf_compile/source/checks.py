@@ -283,8 +283,8 @@ def _called(node: ast.Call, target: Any, source: Source) -> None:
         return
     if isinstance(target, type):
         if hasattr(target, "_md5sum"):
-            way_out = "set the fields of an Output: self.port.value.x = 1.0"
-            raise at(file, node, "only an Output makes messages", way_out)
+            remedy = "set the fields of an Output: self.port.value.x = 1.0"
+            raise at(file, node, "only an Output makes messages", remedy)
         if issubclass(target, enum.Enum) and not issubclass(target, enum.IntEnum):
             raise at(file, node, f"{name} is not an enum of ints", "derive it from enum.IntEnum")
     root = (getattr(target, "__module__", None) or "numpy").partition(".")[0]
@@ -346,8 +346,8 @@ def _raised(node: ast.Raise, file: str) -> None:
     if any(isinstance(each, ast.JoinedStr) for each in made.args):
         return  # rejected as an f-string
     if not plain or made.keywords:
-        way_out = "log the values before it with self.error(…)"
-        raise at(file, node, "an exception takes one constant text", way_out)
+        remedy = "log the values before it with self.error(…)"
+        raise at(file, node, "an exception takes one constant text", remedy)
 
 
 def _slice(node: ast.Slice, file: str) -> None:

@@ -1,4 +1,4 @@
-"""An error in the source of a component: one line with the place, the error and a way out."""
+"""An error in the source of a component: one line with the place, the error and a remedy."""
 
 import ast
 import io
@@ -10,9 +10,9 @@ from pathlib import Path
 class Mistake(Exception):
     """An error that prevents compiling."""
 
-    def __init__(self, file: str, line: int, what: str, way_out: str, text: str = "") -> None:
-        """Describe an error and a way out; `text`: the expression (default: the source line)."""
-        self.file, self.line, self.what, self.way_out = file, line, what, way_out
+    def __init__(self, file: str, line: int, what: str, remedy: str, text: str = "") -> None:
+        """Describe an error and a remedy; `text`: the expression (default: the source line)."""
+        self.file, self.line, self.what, self.remedy = file, line, what, remedy
         self.text = text or source_line(file, line)
         super().__init__(str(self))
 
@@ -20,12 +20,12 @@ class Mistake(Exception):
         """Return the message, one line."""
         place = f"{display(self.file)}:{self.line}: " if self.line else f"{display(self.file)}: "
         text = f"`{self.text}`: " if self.text else ""
-        return f"{place}{text}{self.what}: {self.way_out}"
+        return f"{place}{text}{self.what}: {self.remedy}"
 
 
-def at(file: str, node: ast.AST, what: str, way_out: str) -> Mistake:
+def at(file: str, node: ast.AST, what: str, remedy: str) -> Mistake:
     """Return the error at a node of the source."""
-    return Mistake(file, getattr(node, "lineno", 0), what, way_out, written(file, node))
+    return Mistake(file, getattr(node, "lineno", 0), what, remedy, written(file, node))
 
 
 def written(file: str, node: ast.AST) -> str:

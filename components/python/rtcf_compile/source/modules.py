@@ -112,9 +112,9 @@ def is_own(value: Any) -> bool:
 
 
 def _parts(text: str) -> tuple[str, str]:
-    """Split the message of a DeclarationError into the error and the way out."""
-    what, _, way_out = text.rpartition(": ")
-    return what, way_out
+    """Split the message of a DeclarationError into the error and the remedy."""
+    what, _, remedy = text.rpartition(": ")
+    return what, remedy
 
 
 def _line_in(file: Path, error: BaseException) -> int:

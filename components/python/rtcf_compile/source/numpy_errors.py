@@ -1,4 +1,4 @@
-"""Rewords NumPy's errors about shapes and indices, and adds a way out."""
+"""Rewords NumPy's errors about shapes and indices, and adds a remedy."""
 
 import ast
 import re
@@ -82,16 +82,16 @@ _BY_TYPES = re.compile(r"has shape \(\), not ")
 
 
 def explained(error: BaseException, source: str) -> tuple[str, str] | None:
-    """Return the error of a line and the way out; None for other errors, and for those that depend
+    """Return the error of a line and the remedy; None for other errors, and for those that depend
     on inputs.
     """
     text = " ".join(str(error).split())
     by_input = isinstance(error, ValueError | IndexError) and _has_variable_slice(source)
     if _BY_TYPES.search(text) or by_input:
         return None
-    for kind, pattern, what, way_out in _KNOWN:
+    for kind, pattern, what, remedy in _KNOWN:
         if isinstance(error, kind) and (found := re.search(pattern, text, re.IGNORECASE)):
-            return what.format(found[0], *found.groups()), way_out
+            return what.format(found[0], *found.groups()), remedy
     return None
 
 

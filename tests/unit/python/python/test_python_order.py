@@ -114,19 +114,19 @@ def test_the_comparison_evaluates_in_pythons_order(both: tuple[Any, Any]) -> Non
 
 
 @pytest.mark.parametrize(
-    ("text", "way_out"),
+    ("text", "remedy"),
     [
         ("self.counts[0] = self.head + (now := self.advance(1)) + now", "a statement before"),
         ("self.counts[:] = np.array([self.next] * 4)", "set variables to their results before"),
     ],
 )
 def test_statements_needing_another_order_are_rejected(
-    text: str, way_out: str, tmp_path: Path
+    text: str, remedy: str, tmp_path: Path
 ) -> None:
     file = tmp_path / "order.py"
     file.write_text(f"{HEAD}        {text}\n")
     (cls,) = modules.components(modules.load(file))
-    with pytest.raises(Mistake, match=way_out):
+    with pytest.raises(Mistake, match=remedy):
         lowering.compile_component(cls)
 
 
