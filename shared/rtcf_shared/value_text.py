@@ -15,7 +15,7 @@ _MATRIX = re.compile(r"\[([^][{}\"]*;[^][{}\"]*)\]")
 
 
 class _Loader(yaml.BaseLoader):  # type: ignore[misc]
-    """Reads numbers as such, even where YAML 1.1 sees a word, a date or a time of day."""
+    """Reads numbers as numbers, even if YAML 1.1 reads them as words, dates or times of day."""
 
     def construct_scalar(self, node: Any) -> Any:
         text = super().construct_scalar(node)
@@ -23,7 +23,7 @@ class _Loader(yaml.BaseLoader):  # type: ignore[misc]
 
 
 def parse(text: str) -> Any:
-    """Return the value of a text; the text itself if it is not valid, as a truncated one."""
+    """Return the value of a text, or the text itself if it is not valid, e.g. truncated."""
     try:
         return yaml.load(_MATRIX.sub(_rows, text), _Loader)
     except yaml.YAMLError:

@@ -15,9 +15,10 @@ that kind until it is removed; `serve` delays the executor's start, `gone` its e
 
 PEER_PORT is the name of each component's input.
 
-Setting a parameter `die` makes it die as if in the component's update:
-"SIGSEGV" and so on with a note in the flight recorder, "stall" likewise,
-"exit" and "SIGKILL" without.  The loop counts its cycles by the wall clock.
+Setting a parameter `die` ends the process as if the component's update had failed: "exit" and
+"SIGKILL" leave no crash in the flight recorder; other signals and "stall" leave one.
+
+The loop counts its cycles by the wall clock.
 """
 
 import argparse

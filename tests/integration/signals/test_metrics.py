@@ -18,7 +18,7 @@ import rtcf
 from daemon_process import Daemon, wait_for
 from values import iteration
 
-# Without type hints in some releases.
+# Some releases of Debian have this module without type hints.
 _PARSER: Any = importlib.import_module("prometheus_client.parser")
 
 Samples = dict[tuple[str, frozenset[tuple[str, str]]], float]
