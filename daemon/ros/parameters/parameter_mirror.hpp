@@ -26,7 +26,8 @@ class ParameterMirror {
         std::string name;
         std::string uri;
     };
-    /// A component. If it is new since this master was met, its values are newer than the master's.
+    /// A component. `is_new` = it was loaded after the node registered at this master, so its
+    /// values are newer than the master's.
     struct Component {
         std::shared_ptr<const executor::ParameterSet> set;
         bool is_new = false;
@@ -64,13 +65,13 @@ class ParameterMirror {
         std::map<std::string, XmlRpc::XmlRpcValue> others;  // last values written by others
         std::set<std::string> ours;                         // parameters written by us
     };
-    // Components, by full name. Shared with late answers.
+    // Sets of components, by full name. Shared with callbacks, which may be called late.
     struct Pending {
         std::mutex mutex;                // protects all members below
         std::set<std::string> followed;  // the master reports writes
         std::set<std::string> written;   // written since the last read
         std::set<std::string> asked;     // with a pending request to the loop
-        std::set<std::string> refused;   // rejected by the loop and not overwritten yet
+        std::set<std::string> refused;   // values rejected by the loop, not overwritten yet
         std::string problem;
     };
 
