@@ -52,20 +52,20 @@ class FirstFault {
     /// @return null if there is none, or it was taken before
     const ComponentFault* take() noexcept {
         if (state_.load(std::memory_order_acquire) != State::Noted) return nullptr;
-        state_.store(State::Told, std::memory_order_relaxed);
+        state_.store(State::Taken, std::memory_order_relaxed);
         return &fault_;
     }
     /// Records the next fault, if this one was taken. Graph thread.
     void rearm() noexcept {
-        State told = State::Told;
-        state_.compare_exchange_strong(told, State::Empty, std::memory_order_release,
+        State taken = State::Taken;
+        state_.compare_exchange_strong(taken, State::Empty, std::memory_order_release,
                                        std::memory_order_relaxed);
     }
     /// Removes the record. While no cycle runs.
     void clear() noexcept { state_.store(State::Empty, std::memory_order_relaxed); }
 
    private:
-    enum class State { Empty, Noted, Told };
+    enum class State { Empty, Noted, Taken };
     std::atomic<State> state_{State::Empty};
     ComponentFault fault_;
 };

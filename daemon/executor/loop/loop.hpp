@@ -44,7 +44,7 @@ struct LoopSettings {
 
 class Loop {
    public:
-    /// @param log told which thread is the real-time thread; outlives the loop
+    /// @param log notified of the real-time thread; outlives the loop
     /// @param recorder notes the running component; outlives the loop
     /// @param cpu_claims folder of CPU claims, shared by loops that must not use the same CPU, see
     /// CpuClaim

@@ -26,10 +26,10 @@ std::string whatFailed(const LoopFault& fault) {
 
 }  // namespace
 
-FaultReports::FaultReports(const std::string& runner, const Loop& loop, Log& log, TellEvent tell,
-                           PublishFault publish)
+FaultReports::FaultReports(const std::string& runner, const Loop& loop, Log& log,
+                           ReportEvent report_event, PublishFault publish)
     : loop_(loop),
-      tell_(std::move(tell)),
+      report_event_(std::move(report_event)),
       publish_(std::move(publish)),
       sizes_(runner, [&log](const std::string& line) { log.write(LogLevel::Warn, {}, line); }) {}
 
@@ -69,9 +69,10 @@ void FaultReports::report(Instance& instance) {
         std::string what = fmt::vformat(text, fmt::make_format_args(of));
         if (more > 1) what += fmt::format("; {} times since the last report", more);
         instance.setFault(fmt::format("iteration {}: {}", fault->iteration, what));
-        tell_({RunnerEvent::Kind::ComponentFailed,
-               fmt::format("{}: iteration {}: {}", instance.fullName(), fault->iteration, what),
-               instance.fullName(), fault->iteration});
+        report_event_(
+            {RunnerEvent::Kind::ComponentFailed,
+             fmt::format("{}: iteration {}: {}", instance.fullName(), fault->iteration, what),
+             instance.fullName(), fault->iteration});
         publish_(instance.fullName());
     };
     if (const ComponentFault* fault = faults.not_finite.take(); fault != nullptr) {
@@ -86,7 +87,8 @@ void FaultReports::report(Instance& instance) {
 void FaultReports::reportOverruns(const Graph& graph, bool last, const char* remark) {
     std::string line = overruns_.take(loop_, graph, last);
     if (line.empty()) return;
-    tell_({RunnerEvent::Kind::Overruns, line + remark, {}, loop_.statistics().iteration.load()});
+    report_event_(
+        {RunnerEvent::Kind::Overruns, line + remark, {}, loop_.statistics().iteration.load()});
 }
 
 void FaultReports::reportLostMessages(const Plan& plan, std::size_t largest) {

@@ -23,7 +23,7 @@ class FaultReports {
     using PublishFault = std::function<void(const std::string& component)>;
 
     /// @param runner name of the runner, for messages
-    FaultReports(const std::string& runner, const Loop& loop, Log& log, TellEvent tell,
+    FaultReports(const std::string& runner, const Loop& loop, Log& log, ReportEvent report_event,
                  PublishFault publish);
 
     /// Forgets which faults were reported, before components start again.
@@ -49,7 +49,7 @@ class FaultReports {
 
    private:
     const Loop& loop_;
-    TellEvent tell_;
+    ReportEvent report_event_;
     PublishFault publish_;
     std::uint64_t reported_faults_ = 0;  // LoopStatistics::faults at the last report
     FaultReportLimit not_finite_;

@@ -38,9 +38,9 @@ void FrameKeeper::publish(std::shared_ptr<const FrameTable> table) noexcept {
             published_.push_back(table_);
         }
         if (table_->shortness.empty()) return;
-        const bool told = previous != nullptr && !previous->shortness.empty() &&
-                          previous->ring->capacity() <= table_->ring->capacity();
-        if (!told) log_.write(LogLevel::Warn, {}, table_->shortness);
+        const bool reported = previous != nullptr && !previous->shortness.empty() &&
+                              previous->ring->capacity() <= table_->ring->capacity();
+        if (!reported) log_.write(LogLevel::Warn, {}, table_->shortness);
     });
 }
 
@@ -60,15 +60,15 @@ std::uint64_t FrameKeeper::step(std::uint64_t cycles, const std::atomic<bool>* g
 
 void FrameKeeper::awaitReaders() {
     const FrameRing& ring = *table_->ring;
-    std::function<void()> tell;
+    std::function<void()> callback;
     {
         const std::lock_guard<std::mutex> lock(mutex_);
-        tell = readers_awaited_;
+        callback = readers_awaited_;
     }
     auto since = std::chrono::steady_clock::now();
     std::uint64_t before = ring.waiting();
     while (before > ring.capacity() / 4 && std::chrono::steady_clock::now() - since < kPatience) {
-        if (tell) tell();
+        if (callback) callback();
         std::this_thread::sleep_for(kLook);
         const std::uint64_t now = ring.waiting();
         if (now < before) since = std::chrono::steady_clock::now();
@@ -81,9 +81,9 @@ std::vector<std::shared_ptr<const FrameTable>> FrameKeeper::takePublished() {
     return std::exchange(published_, {});
 }
 
-void FrameKeeper::onReadersAwaited(std::function<void()> tell) {
+void FrameKeeper::onReadersAwaited(std::function<void()> callback) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    readers_awaited_ = std::move(tell);
+    readers_awaited_ = std::move(callback);
 }
 
 }  // namespace rtcf::executor

@@ -51,7 +51,7 @@ class FrameKeeper {
     /// until the next table's first frame. The last owner must release a table on the graph thread.
     std::vector<std::shared_ptr<const FrameTable>> takePublished();
     /// Sets a function that the graph thread calls when steps wait for readers.
-    void onReadersAwaited(std::function<void()> tell);
+    void onReadersAwaited(std::function<void()> callback);
     const FrameMemory& memory() const noexcept { return memory_; }
     /// @}
 

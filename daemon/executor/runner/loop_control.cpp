@@ -24,7 +24,7 @@ void addTexts(RealtimeProblems problems, std::vector<std::string>& texts) {
 
 LoopControl::LoopControl(std::string runner, RunnerSettings& settings, Loop& loop,
                          const LoopBoundary& boundary, ActivePlan& plan, Publication& publication,
-                         BridgeLink& bridge, Log& log, TellEvent tell,
+                         BridgeLink& bridge, Log& log, ReportEvent report_event,
                          const std::atomic<bool>& ending)
     : runner_(std::move(runner)),
       settings_(settings),
@@ -34,10 +34,10 @@ LoopControl::LoopControl(std::string runner, RunnerSettings& settings, Loop& loo
       publication_(publication),
       bridge_(bridge),
       log_(log),
-      tell_(std::move(tell)),
+      report_event_(std::move(report_event)),
       stall_monitor_(loop),
       simulation_(loop, bridge, ending),
-      faults_(runner_, loop, log, tell_,
+      faults_(runner_, loop, log, report_event_,
               [this](const std::string& component) { publish({component}); }) {
     stall_monitor_.setTimeout(settings.stall_timeout_ns);
 }
@@ -79,7 +79,7 @@ const std::vector<std::string>& LoopControl::start(const Progress& progress) {
     loop_fault_.clear();
     publish();
     for (const std::string& problem : degraded_) {
-        tell_({RunnerEvent::Kind::Degraded, "degraded real time: " + problem, {}, 0});
+        report_event_({RunnerEvent::Kind::Degraded, "degraded real time: " + problem, {}, 0});
     }
     return degraded_;
 }
@@ -162,7 +162,7 @@ void LoopControl::noteLoopFault() {
     if (!faulted) return;
     const RunnerEvent event = faults_.endOfLoop(plan_->graph, settings_.loop.max_overruns);
     loop_fault_ = event.message;
-    tell_(event);
+    report_event_(event);
 }
 
 void LoopControl::beginStepping(const Progress& progress, std::int64_t stamp_ns) {
@@ -192,7 +192,7 @@ void LoopControl::tick() {
     }
     faults_.reportComponents(plan_->graph);
     reportOverruns(false);
-    simulation_.reportJumps(tell_);
+    simulation_.reportJumps(report_event_);
     faults_.reportLostMessages(*plan_, settings_.bridge.largest_message);
 }
 

@@ -31,7 +31,8 @@ class LoopControl {
     /// All references outlive this object.
     LoopControl(std::string runner, RunnerSettings& settings, Loop& loop,
                 const LoopBoundary& boundary, ActivePlan& plan, Publication& publication,
-                BridgeLink& bridge, Log& log, TellEvent tell, const std::atomic<bool>& ending);
+                BridgeLink& bridge, Log& log, ReportEvent report_event,
+                const std::atomic<bool>& ending);
 
     /// Begins a job, which starts cycles only while no stop is requested.
     /// @param stops Loop::stops() when the job was posted
@@ -89,7 +90,7 @@ class LoopControl {
     Publication& publication_;
     BridgeLink& bridge_;
     Log& log_;
-    const TellEvent tell_;
+    const ReportEvent report_event_;
     StallMonitor stall_monitor_;
     Simulation simulation_;
     SpinTuner spin_tuner_;

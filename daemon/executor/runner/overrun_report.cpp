@@ -21,16 +21,17 @@ std::string OverrunReport::take(const Loop& loop, const Graph& graph, bool last)
     const std::uint64_t overruns = statistics.overruns.load(std::memory_order_relaxed);
     const std::uint64_t missed = statistics.missed.load(std::memory_order_relaxed);
     const std::int64_t now = monotonicNow();
-    if (overruns == told_overruns_) return {};
-    if (!last && told_at_ns_ != 0 && now - told_at_ns_ < kInterval) return {};
-    std::string line = fmt::format("{} ended late", cycles(overruns - told_overruns_));
-    if (missed != told_missed_) line += fmt::format(", {} missed", cycles(missed - told_missed_));
-    if (told_at_ns_ != 0)
-        line += fmt::format(" in {:.0f} s", static_cast<double>(now - told_at_ns_) / 1e9);
+    if (overruns == reported_overruns_) return {};
+    if (!last && reported_at_ns_ != 0 && now - reported_at_ns_ < kInterval) return {};
+    std::string line = fmt::format("{} ended late", cycles(overruns - reported_overruns_));
+    if (missed != reported_missed_)
+        line += fmt::format(", {} missed", cycles(missed - reported_missed_));
+    if (reported_at_ns_ != 0)
+        line += fmt::format(" in {:.0f} s", static_cast<double>(now - reported_at_ns_) / 1e9);
     line += mostFrequentCause(statistics, graph);
-    told_at_ns_ = now;
-    told_overruns_ = overruns;
-    told_missed_ = missed;
+    reported_at_ns_ = now;
+    reported_overruns_ = overruns;
+    reported_missed_ = missed;
     return line;
 }
 
@@ -48,20 +49,20 @@ std::string OverrunReport::mostFrequentCause(const LoopStatistics& statistics, c
     for (const GraphNode& node : graph.nodes()) {
         const std::shared_ptr<const ComponentStatistics> counted = node.instance->statistics();
         const std::uint64_t count = counted->overruns.load(std::memory_order_relaxed);
-        const auto told = told_of_.find(counted);
+        const auto reported = reported_of_component_.find(counted);
         present.emplace(counted, count);
-        consider(count - (told == told_of_.end() ? 0 : told->second),
+        consider(count - (reported == reported_of_component_.end() ? 0 : reported->second),
                  ", most of them in " + node.instance->fullName());
     }
-    told_of_ = std::move(present);
+    reported_of_component_ = std::move(present);
     const std::uint64_t late = statistics.late_wake_ups.value();
     const std::uint64_t exchanges = statistics.exchange_overruns.value();
     const std::uint64_t frames = statistics.frame_overruns.value();
-    consider(late - std::exchange(told_late_, late),
+    consider(late - std::exchange(reported_late_, late),
              ", most of them because the machine woke the loop late");
-    consider(exchanges - std::exchange(told_exchanges_, exchanges),
+    consider(exchanges - std::exchange(reported_exchanges_, exchanges),
              ", most of them while changes or values were exchanged");
-    consider(frames - std::exchange(told_frames_, frames),
+    consider(frames - std::exchange(reported_frames_, frames),
              ", most of them while values were copied into frames: lower frame_kb of the runner");
     return text;
 }

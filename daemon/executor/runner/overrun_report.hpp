@@ -22,13 +22,13 @@ class OverrunReport {
    private:
     std::string mostFrequentCause(const LoopStatistics& statistics, const Graph& graph);
 
-    std::int64_t told_at_ns_ = 0;
-    std::uint64_t told_overruns_ = 0;
-    std::uint64_t told_missed_ = 0;
-    std::uint64_t told_late_ = 0;
-    std::uint64_t told_exchanges_ = 0;
-    std::uint64_t told_frames_ = 0;
-    std::map<std::shared_ptr<const ComponentStatistics>, std::uint64_t> told_of_;
+    std::int64_t reported_at_ns_ = 0;
+    std::uint64_t reported_overruns_ = 0;
+    std::uint64_t reported_missed_ = 0;
+    std::uint64_t reported_late_ = 0;
+    std::uint64_t reported_exchanges_ = 0;
+    std::uint64_t reported_frames_ = 0;
+    std::map<std::shared_ptr<const ComponentStatistics>, std::uint64_t> reported_of_component_;
 };
 
 }  // namespace rtcf::executor

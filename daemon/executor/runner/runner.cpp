@@ -25,7 +25,7 @@ Runner::Runner(std::string name, Log& log, EventConsumer events, std::unique_ptr
       boundary_(name_, settings_, loop_, recorder, activity_),
       control_(
           name_, settings_, loop_, boundary_, plan_, publication_, bridge_, log,
-          [this](const RunnerEvent& event) { tell(event); }, ending_),
+          [this](const RunnerEvent& event) { reportEvent(event); }, ending_),
       loader_(name_, loop_, control_, bridge_, activity_, log, recorder),
       transactions_(name_, settings_, loop_, boundary_, control_, plan_, frames_, publication_,
                     bridge_, loader_, activity_, log),
@@ -98,7 +98,7 @@ void Runner::tick() {
     control_.publishStatus();
 }
 
-void Runner::tell(const RunnerEvent& event) noexcept {
+void Runner::reportEvent(const RunnerEvent& event) noexcept {
     logErrors(log_, "reporting an event", [&] {
         RunnerEvent numbered = event;
         numbered.state = numberedState();
@@ -147,7 +147,7 @@ void Runner::changeByBridge(const std::string& component, const ParameterBatch& 
         setParameters(component, batch);
         RunnerEvent event{RunnerEvent::Kind::ParametersChanged, {}, component, 0};
         for (const auto& [name, value] : batch) event.parameters.push_back(name);
-        tell(event);
+        reportEvent(event);
     } catch (const std::exception& error) {
         message = error.what();
         log_.write(LogLevel::Warn, component, "a change requested by ROS was rejected: " + message);

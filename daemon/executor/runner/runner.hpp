@@ -160,7 +160,9 @@ class Runner final : private RunnerView {
     std::vector<std::shared_ptr<const FrameTable>> takeFrameTables() {
         return frames_.takePublished();
     }
-    void onReadersAwaited(std::function<void()> tell) { frames_.onReadersAwaited(std::move(tell)); }
+    void onReadersAwaited(std::function<void()> callback) {
+        frames_.onReadersAwaited(std::move(callback));
+    }
     /// See Loop. One thread only.
     void holdStatistics(bool held) noexcept { loop_.holdStatistics(held); }
     /// Hook that the graph thread is running, and since when (CLOCK_MONOTONIC, ns); empty = none.
@@ -178,7 +180,7 @@ class Runner final : private RunnerView {
 
     void threadMain();
     void tick();
-    void tell(const RunnerEvent& event) noexcept;
+    void reportEvent(const RunnerEvent& event) noexcept;
     /// Changes parameters at the request of the bridge.
     void changeByBridge(const std::string& component, const ParameterBatch& batch,
                         const std::function<void(const std::string&)>& done);

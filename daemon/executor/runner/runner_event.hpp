@@ -31,6 +31,6 @@ struct RunnerEvent {
 };
 
 /// Sends an event; logs errors.
-using TellEvent = std::function<void(const RunnerEvent& event)>;
+using ReportEvent = std::function<void(const RunnerEvent& event)>;
 
 }  // namespace rtcf::executor

@@ -51,7 +51,7 @@ void Simulation::set(bool active, RunnerSettings& settings, const Plan& plan) {
     bridge_.setClock(settings.loop.clock);
 }
 
-void Simulation::reportJumps(const TellEvent& tell) {
+void Simulation::reportJumps(const ReportEvent& report_event) {
     while (const std::optional<ClockJump> jump = clock_->takeJump()) {
         const double to = static_cast<double>(jump->to_ns) / 1e9;
         std::string message = fmt::format("the simulated clock begins at {:.9f} s", to);
@@ -61,10 +61,10 @@ void Simulation::reportJumps(const TellEvent& tell) {
                 "continues from there with one cycle",
                 static_cast<double>(*jump->from_ns) / 1e9, to);
         }
-        tell({RunnerEvent::Kind::Clock,
-              message,
-              {},
-              loop_.statistics().iteration.load(std::memory_order_relaxed)});
+        report_event({RunnerEvent::Kind::Clock,
+                      message,
+                      {},
+                      loop_.statistics().iteration.load(std::memory_order_relaxed)});
     }
 }
 

@@ -35,7 +35,7 @@ class Simulation {
     /// True between begin() and end().
     bool active() const noexcept { return active_; }
     /// Reports jumps of the clock.
-    void reportJumps(const TellEvent& tell);
+    void reportJumps(const ReportEvent& report_event);
 
    private:
     void set(bool active, RunnerSettings& settings, const Plan& plan);

@@ -55,11 +55,12 @@ SnapshotOutcome Snapshots::take() {
         if (component.states.empty()) stateless.push_back(component.name);
     }
     if (!stateless.empty()) {
-        const std::size_t told = std::min(stateless.size(), kNamedComponents);
+        const std::size_t named = std::min(stateless.size(), kNamedComponents);
         std::string names = fmt::format(
             "{}", fmt::join(stateless.begin(),
-                            stateless.begin() + static_cast<std::ptrdiff_t>(told), ", "));
-        if (stateless.size() > told) names += fmt::format(" and {} more", stateless.size() - told);
+                            stateless.begin() + static_cast<std::ptrdiff_t>(named), ", "));
+        if (stateless.size() > named)
+            names += fmt::format(" and {} more", stateless.size() - named);
         outcome.notes.push_back(
             "the snapshot omits values that components without declared state keep between "
             "cycles: " +

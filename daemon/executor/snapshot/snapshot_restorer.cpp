@@ -13,7 +13,7 @@ namespace rtcf::executor {
 
 namespace {
 
-constexpr std::size_t kToldProblems = 5;
+constexpr std::size_t kReportedProblems = 5;
 constexpr std::int64_t kLongest = INT64_MAX / 2;  // ns
 
 std::string orNothing(const std::string& source) { return source.empty() ? "nothing" : source; }
@@ -89,11 +89,12 @@ void SnapshotRestorer::requireTimes() const {
 
 void SnapshotRestorer::requireFit() const {
     if (problems_.empty()) return;
-    const auto told = static_cast<std::ptrdiff_t>(std::min(problems_.size(), kToldProblems));
+    const auto reported =
+        static_cast<std::ptrdiff_t>(std::min(problems_.size(), kReportedProblems));
     std::string text =
-        fmt::format("{}", fmt::join(problems_.begin(), problems_.begin() + told, "; "));
-    if (problems_.size() > kToldProblems)
-        text += fmt::format("; and {} more", problems_.size() - kToldProblems);
+        fmt::format("{}", fmt::join(problems_.begin(), problems_.begin() + reported, "; "));
+    if (problems_.size() > kReportedProblems)
+        text += fmt::format("; and {} more", problems_.size() - kReportedProblems);
     throw Error(ErrorKind::FailedPrecondition,
                 fmt::format("the snapshot of {} does not fit this graph: {}; load the graph that "
                             "it was taken from",

@@ -124,7 +124,7 @@ void PortStreams::chooseColumns(Stream& stream) {
         if (stream.wanted.selection.matches(table.columns[i].fullName()))
             stream.columns.push_back(i);
     }
-    stream.told = false;
+    stream.schema_sent = false;
     stream.windows = stream.min_max
                          ? std::make_unique<PortWindows>(table, stream.columns, stream.every)
                          : nullptr;
@@ -133,8 +133,8 @@ void PortStreams::chooseColumns(Stream& stream) {
 void PortStreams::serve(Stream& stream, const Send& send) {
     const Id id = stream.id;  // a copy, as sending may destroy the stream
     while (!stream.tables.empty()) {
-        if (!stream.told) {
-            stream.told = true;
+        if (!stream.schema_sent) {
+            stream.schema_sent = true;
             const v1::Response schema = schemaOf(stream);
             if (!send(id, schema)) return;
         }

@@ -66,8 +66,8 @@ class PortStreams {
         std::vector<std::size_t> columns;  // columns of the first table
         // Open window of minima and maxima; null = single cycles.
         std::unique_ptr<PortWindows> windows;
-        bool begun = false;      // the first table has arrived
-        bool told = false;       // the schema was sent
+        bool begun = false;  // the first table has arrived
+        bool schema_sent = false;
         std::uint64_t next = 0;  // next frame of the first table
         std::uint64_t lost = 0;  // lost cycles since the last batch
 

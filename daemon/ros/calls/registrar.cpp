@@ -38,7 +38,7 @@ bool Registrar::note(const std::string& method, const XmlRpc::XmlRpcValue& argum
         if (registers) {
             entry.arguments = values;
             ++entry.version;
-        } else if (entry.told != Told::No) {
+        } else if (entry.registered != Registered::No) {
             entry.renewed = true;
         }
         if (due(entry) == Step::None && !entry.wanted) entries_.erase(key);
@@ -61,7 +61,7 @@ void Registrar::forget() {
     {
         const std::lock_guard lock(mutex_);
         for (auto entry = entries_.begin(); entry != entries_.end();) {
-            entry->second.told = Told::No;
+            entry->second.registered = Registered::No;
             entry->second.renewed = false;
             ++entry->second.version;  // the present call does not count
             entry = entry->second.wanted ? std::next(entry) : entries_.erase(entry);
@@ -96,10 +96,10 @@ bool Registrar::flush(Clock::time_point deadline) {
     return changed_.wait_until(lock, deadline, done) && settled();
 }
 
-bool Registrar::hasTold() const {
+bool Registrar::hasRegistered() const {
     const std::lock_guard lock(mutex_);
     return std::any_of(entries_.begin(), entries_.end(),
-                       [](const auto& each) { return each.second.told == Told::Yes; });
+                       [](const auto& each) { return each.second.registered == Registered::Yes; });
 }
 
 std::size_t Registrar::withdraw(Clock::time_point deadline) {
@@ -113,18 +113,18 @@ std::size_t Registrar::withdraw(Clock::time_point deadline) {
     deadline_ = Clock::time_point::max();
     return static_cast<std::size_t>(
         std::count_if(entries_.begin(), entries_.end(),
-                      [](const auto& each) { return each.second.told != Told::No; }));
+                      [](const auto& each) { return each.second.registered != Registered::No; }));
 }
 
 Registrar::Step Registrar::due(const Entry& entry) const {
     const bool wanted = entry.wanted && shown_;
-    if (entry.told != Told::No && (!wanted || entry.renewed)) return Step::Withdraw;
-    return wanted && entry.told != Told::Yes ? Step::Register : Step::None;
+    if (entry.registered != Registered::No && (!wanted || entry.renewed)) return Step::Withdraw;
+    return wanted && entry.registered != Registered::Yes ? Step::Register : Step::None;
 }
 
 // With mutex_ held.
 bool Registrar::settled() const {
-    return !telling_ && std::all_of(entries_.begin(), entries_.end(), [this](const auto& each) {
+    return !calling_ && std::all_of(entries_.begin(), entries_.end(), [this](const auto& each) {
         return due(each.second) == Step::None;
     });
 }
@@ -138,7 +138,8 @@ std::vector<Registrar::Task> Registrar::tasks(std::vector<MasterCall>& calls) {
         if (step == Step::None) continue;
         tasks.push_back({key, step, entry.version});
         if (step == Step::Register) {
-            entry.told = Told::Maybe;  // the master may receive it even if no answer arrives
+            // The master may receive it even if no answer arrives.
+            entry.registered = Registered::Maybe;
             calls.push_back({"register" + key.first, entry.arguments});
             continue;
         }
@@ -161,13 +162,13 @@ void Registrar::apply(const Task& task, MasterAnswer& answer,
         return;
     }
     if (task.step == Step::Withdraw) {
-        entry.told = Told::No;
+        entry.registered = Registered::No;
         entry.renewed = false;
         if (!entry.wanted) entries_.erase(found);
         return;
     }
     // Also if the master rejects it: repeating it would not help.
-    entry.told = entry.version == task.version ? Told::Yes : Told::Maybe;
+    entry.registered = entry.version == task.version ? Registered::Yes : Registered::Maybe;
     const bool subscribed = task.key.first == "Subscriber" && entry.wanted;
     if (subscribed && answer.value.getType() == XmlRpc::XmlRpcValue::TypeArray)
         connections.emplace_back(task.key.second, answer.value);
@@ -188,12 +189,12 @@ void Registrar::run() {
         std::vector<MasterCall> calls;
         const std::vector<Task> due = tasks(calls);
         const Clock::time_point deadline = deadline_;
-        telling_ = true;
+        calling_ = true;
         lock.unlock();
         std::vector<MasterAnswer> answers = master->run(calls, kMasterAnswerTimeout, deadline);
         std::vector<std::pair<std::string, XmlRpc::XmlRpcValue>> connections;
         lock.lock();
-        telling_ = false;
+        calling_ = false;
         for (std::size_t i = 0; i < due.size(); ++i) apply(due[i], answers[i], connections);
         lock.unlock();
         changed_.notify_all();

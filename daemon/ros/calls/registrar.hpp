@@ -50,19 +50,19 @@ class Registrar {
     /// @return false if that takes longer than the deadline
     bool flush(Clock::time_point deadline);
     /// True if the master has confirmed any registration.
-    bool hasTold() const;
+    bool hasRegistered() const;
     /// Withdraws everything and registers nothing more.
     /// @return number of registrations that the master may still have
     std::size_t withdraw(Clock::time_point deadline);
 
    private:
-    enum class Told { No, Maybe, Yes };
+    enum class Registered { No, Maybe, Yes };
     // A registration of a published topic, a subscribed topic or a service.
     struct Entry {
         XmlRpc::XmlRpcValue arguments;  // arguments of the registration
         bool wanted = false;
         bool renewed = false;  // withdrawn and registered again: both go to the master
-        Told told = Told::No;
+        Registered registered = Registered::No;
         std::uint64_t version = 0;  // number of registrations
     };
     using Key = std::pair<std::string, std::string>;  // kind, as in the method's name; name
@@ -89,7 +89,7 @@ class Registrar {
     std::uint64_t master_version_ = 0;
     bool shown_ = true;
     bool silent_ = false;  // the master did not answer the last call
-    bool telling_ = false;
+    bool calling_ = false;
     bool stop_ = false;
     Clock::time_point deadline_ = Clock::time_point::max();  // deadline of the last calls
     std::thread thread_;

@@ -71,7 +71,7 @@ MasterLink::State MasterLink::look(const executor::BridgeSettings& settings) {
         say_("the new ROS hostname takes effect at the next start of the executor");
     }
     // Read before the check, so that the master's answers are newer.
-    const bool told = node_.registrar().hasTold();
+    const bool was_registered = node_.registrar().hasRegistered();
     const bool asked_to_go = takeShutdownRequest();
     const CheckResult found = check();
     if (asked_to_go) obeyShutdownRequest(found);
@@ -92,7 +92,7 @@ MasterLink::State MasterLink::look(const executor::BridgeSettings& settings) {
     simulated_ = found.simulated;
     const bool returned = std::exchange(was_silent_, false);
     // A hook may have registered something at a new master before this check.
-    const bool lost = is_new || (told && found.node_uri != node_.uri());
+    const bool lost = is_new || (was_registered && found.node_uri != node_.uri());
     if (lost) new_ = true;
     // A master that was out of reach has not reported new or lost publishers meanwhile.
     if (lost || returned) node_.registrar().forget();
@@ -127,7 +127,7 @@ std::size_t MasterLink::end(Clock::time_point deadline) {
     return left;
 }
 
-void MasterLink::tell() {
+void MasterLink::awaitRegistrations() {
     constexpr auto kPatience = std::chrono::milliseconds(500);
     node_.registrar().flush(Clock::now() + kPatience);
 }

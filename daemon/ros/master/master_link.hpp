@@ -76,7 +76,7 @@ class MasterLink {
     /// True if a node of the master answers.
     bool lives(const std::string& node);
     /// Waits until all topics and services are registered, half a second at most.
-    void tell();
+    void awaitRegistrations();
     /// Retries failed withdrawals.
     void retry() { node_.registrar().retry(); }
     /// For calls to the master. They end with hurry(), unless `leaving` is true.

@@ -180,7 +180,7 @@ void MasterWatch::serve(const executor::BridgeSettings& looked) {
         status_.simulated_time = operates ? link_.simulated() : std::optional<bool>(false);
     }
     const Reconciled result = interface_.reconcile(link_, settings);
-    link_.tell();
+    link_.awaitRegistrations();
     setConnected();
     if (result == Reconciled::Again) wake();
     for (const std::string& rejection : interface_.newRejections()) say(rejection);

@@ -58,25 +58,25 @@ void Introspection::close() {
     if (!open_) return;
     open_ = false;
     services_.close();
-    tellLast();
+    publishLastHealth();
     shutDown(mutex_, diagnostics_);
     cycles_.close();
 }
 
 void Introspection::watchHealth() {
-    constexpr auto kLook = std::chrono::milliseconds(20);
+    constexpr auto kPollPeriod = std::chrono::milliseconds(20);
     Clock::time_point due = Clock::now();
-    for (; !stop_; std::this_thread::sleep_for(kLook)) {
+    for (; !stop_; std::this_thread::sleep_for(kPollPeriod)) {
         const std::lock_guard lock(mutex_);
-        if (runner_.status().state == told_ && Clock::now() < due) continue;
+        if (runner_.status().state == published_ && Clock::now() < due) continue;
         if (!diagnostics_) continue;
-        tell();
+        publishHealth();
         due = Clock::now() + std::chrono::seconds(1);
     }
 }
 
-void Introspection::tell() {
-    told_ = runner_.status().state;
+void Introspection::publishHealth() {
+    published_ = runner_.status().state;
     diagnostic_msgs::DiagnosticArray array = report_.take();
     array.header.stamp = ros::Time::now();
     std::vector<std::uint8_t> bytes(ros::serialization::serializationLength(array));
@@ -86,18 +86,18 @@ void Introspection::tell() {
     try {
         diagnostics_.publish(RawView{bytes.data(), size, &departures_});
     } catch (const std::bad_alloc&) {  // the network memory is exhausted
-        told_.reset();
+        published_.reset();
     }
 }
 
 // Publishes the last state and waits until it is sent, because closing a topic drops queued
 // messages.
-void Introspection::tellLast() {
+void Introspection::publishLastHealth() {
     constexpr auto kPatience = std::chrono::milliseconds(500);
     constexpr auto kPause = std::chrono::milliseconds(1);
     std::unique_lock lock(mutex_);
     if (!diagnostics_) return;
-    if (runner_.status().state != told_) tell();
+    if (runner_.status().state != published_) publishHealth();
     const Departures::Until last = departures_.mark();
     const auto deadline = Clock::now() + kPatience;
     while (!departures_.gone(last) && Clock::now() < deadline) {

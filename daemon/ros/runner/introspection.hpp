@@ -47,8 +47,8 @@ class Introspection {
     using Clock = std::chrono::steady_clock;
 
     void watchHealth();
-    void tell();      // with mutex_ held and the topic open
-    void tellLast();  // publishes the last state
+    void publishHealth();      // with mutex_ held and the topic open
+    void publishLastHealth();  // publishes the last state
 
     executor::RunnerView& runner_;
     CycleTopic cycles_;
@@ -60,7 +60,7 @@ class Introspection {
     std::mutex mutex_;  // protects diagnostics_ to report_
     ros::Publisher diagnostics_;
     Departures departures_{false};
-    std::optional<executor::RunnerState> told_;
+    std::optional<executor::RunnerState> published_;
     DiagnosticReport report_;
     std::thread health_;
 };
