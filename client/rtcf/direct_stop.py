@@ -108,8 +108,8 @@ def stop_with_fallback(
         return asked.result()  # wait for rtcfd
     if stopped.died:
         return _after_a_death(asked)
-    told = f"the loop was stopped at its executor, because {problem}"
-    return control_pb2.ChangeResult(notes=[told, *stopped.notes])
+    note = f"the loop was stopped at its executor, because {problem}"
+    return control_pb2.ChangeResult(notes=[note, *stopped.notes])
 
 
 def _after_a_death(asked: "Future[control_pb2.ChangeResult]") -> control_pb2.ChangeResult:

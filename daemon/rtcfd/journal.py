@@ -65,14 +65,14 @@ class LogThread(logging.Handler):
         super().close()
 
     def _work(self) -> None:
-        failed = told = 0
+        failed = reported = 0
         while True:
             record = self._queue.get()
             try:
                 failed += not self._written(record)
-                lost = self._no_room + failed - told
+                lost = self._no_room + failed - reported
                 if lost and self._queue.empty() and self._written(_report(lost)):
-                    told += lost
+                    reported += lost
             finally:
                 self._queue.task_done()
 

@@ -59,7 +59,7 @@ class KernelTrace:
         """Start tracing; raises RtcfError if the kernel's trace is not readable."""
         root = _root()
         self._folder = root / "instances" / f"rtcf-{os.getpid()}"
-        with _told(root):
+        with _converted_errors(root):
             _remove_left(root / "instances")
             self._folder.mkdir()
             try:
@@ -235,7 +235,7 @@ def _root() -> Path:
 
 
 @contextlib.contextmanager
-def _told(root: Path) -> Iterator[None]:
+def _converted_errors(root: Path) -> Iterator[None]:
     """Convert errors into RtcfError with the file and the remedy."""
     try:
         yield

@@ -33,8 +33,8 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
             raise rtcf.RtcfError(f"{found.full_name} has no {name}; it has {known}")
         values = {name: values[name]}
     if not output.for_people:
-        told = {each: plain_value for each, (_, plain_value) in values.items()}
-        output.data(told[name] if dot else told)
+        data = {each: plain_value for each, (_, plain_value) in values.items()}
+        output.data(data[name] if dot else data)
         return
     for each, (text, _) in values.items():
         output.line(text if dot else f"{each}: {text}")
@@ -52,6 +52,6 @@ def _values(found: graph_pb2.ComponentInfo) -> dict[str, tuple[str, Any]]:
         text = words.port_value(port.value) if port.HasField("value") else "none yet"
         values.setdefault(port.name, (text, plain(port)["value"]))
     for state in found.states:
-        told = (state.value or "no answer in time", plain(state)["value"])
-        values[f"state.{state.name}" if state.name in values else state.name] = told
+        value = (state.value or "no answer in time", plain(state)["value"])
+        values[f"state.{state.name}" if state.name in values else state.name] = value
     return values

@@ -88,11 +88,11 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         _received(client, args.name) as (incident, file),
         rtcf.read_recording(file.name) as recording,
     ):
-        told = _told(incident, recording)
+        summary = _summary(incident, recording)
     if output.for_people:
-        _print(told, output)
+        _print(summary, output)
     else:
-        output.data(told)
+        output.data(summary)
 
 
 def export(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
@@ -139,7 +139,7 @@ def remove(client: rtcf.Client, args: argparse.Namespace, output: Output) -> Non
         output.data(gone)
 
 
-def _told(incident: incidents_pb2.Incident, recording: "rtcf.Recording") -> dict[str, Any]:
+def _summary(incident: incidents_pb2.Incident, recording: "rtcf.Recording") -> dict[str, Any]:
     about = recording.metadata.get("incident", {})
     cycles = recording.cycles
     cycle = int(about.get("cycle", 0))
@@ -201,42 +201,44 @@ def _listed(recording: "rtcf.Recording", name: str) -> list[Any]:
     return found if isinstance(found, list) else []
 
 
-def _print(told: dict[str, Any], output: Output) -> None:
-    output.line(f"{told['incident']}: {told['reason']}", "bold")
-    what = f"runner {told['runner']}, {told['time']}, cycle {told['cycle']}"
-    output.line(f"{what}, {counted(told['components'], 'component')}, rtcf {told['executor']}")
-    for note in told["notes"]:
+def _print(summary: dict[str, Any], output: Output) -> None:
+    output.line(f"{summary['incident']}: {summary['reason']}", "bold")
+    what = f"runner {summary['runner']}, {summary['time']}, cycle {summary['cycle']}"
+    output.line(
+        f"{what}, {counted(summary['components'], 'component')}, rtcf {summary['executor']}"
+    )
+    for note in summary["notes"]:
         output.line(note, "yellow")
-    cycles = told["last_cycles"]
-    print(f"\nup to cycle {told['cycle']}, of {counted(told['cycles'], 'cycle')}")
+    cycles = summary["last_cycles"]
+    print(f"\nup to cycle {summary['cycle']}, of {counted(summary['cycles'], 'cycle')}")
     output.table(
         ("cycle", "duration µs", "wake-up µs"),
         [(each["cycle"], microseconds(each["duration_us"] * 1e3),
           microseconds(each["latency_us"] * 1e3)) for each in cycles],
         right=("cycle", "duration µs", "wake-up µs"),
     )  # fmt: skip
-    print(f"\nvalues of {told['component'] or 'all components'}")
+    print(f"\nvalues of {summary['component'] or 'all components'}")
     output.table(
         ("signal", "cycle", "value"),
-        [(name, each["cycle"], _value(each["value"])) for name, each in told["values"].items()],
+        [(name, each["cycle"], _value(each["value"])) for name, each in summary["values"].items()],
         right=("cycle",),
     )
-    if told["values_left_out"]:
-        print(f"and {told['values_left_out']} more")
-    if told["parameters"]:
+    if summary["values_left_out"]:
+        print(f"and {summary['values_left_out']} more")
+    if summary["parameters"]:
         print("\nlast parameter changes")
-        for each in told["parameters"]:
+        for each in summary["parameters"]:
             when = _time(int(each.get("timeNs", 0)))
             name = f"{each.get('component')}.{each.get('parameter')}"
             values = f"{_parameter(each.get('before'))} -> {_parameter(each.get('value'))}"
             print(f"{when}  {name} {values} by {each.get('who')}, {each.get('how')}")
-    if told["events"]:
+    if summary["events"]:
         print("\nevents")
-        for each in told["events"]:
+        for each in summary["events"]:
             print(f"{_time(int(each.get('timeNs', 0)))}  {each.get('message')}")
-    if told["libraries"]:
+    if summary["libraries"]:
         print("\nlibraries")
-        for line in sorted(set(told["libraries"].values())):
+        for line in sorted(set(summary["libraries"].values())):
             print(line)
     sys.stdout.flush()
 

@@ -18,7 +18,7 @@ from rtcfctl.signals.termination import ended_by_signals
 from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.words import amount, counted
 
-_TOLD_S = 1.0
+_PRINT_PERIOD_S = 1.0
 _LONGEST = 1e9  # largest --duration in s, and --size in MiB
 _AROUND_S = 1.0  # default time before and after a trigger
 _KEPT_S = 1.0  # interval of flushes: the most that is lost if the recorder is killed
@@ -142,7 +142,7 @@ def _follow(
     args: argparse.Namespace,
     output: Output,
 ) -> None:
-    told = flushed = time.monotonic()
+    printed = flushed = time.monotonic()
     try:
         for batch in stream:
             for part in [batch] if moment is None else moment.take(batch):
@@ -153,8 +153,8 @@ def _follow(
             if now - flushed >= _KEPT_S or batch.last_of_loop:
                 files.flush()
                 flushed = now
-            if now - told >= _TOLD_S and sys.stderr.isatty():
-                told = now
+            if now - printed >= _PRINT_PERIOD_S and sys.stderr.isatty():
+                printed = now
                 waits = moment is not None and moment.cycle is None
                 print(
                     f"\r{counted(files.cycles, 'cycle')}, {files.size / 1e6:.1f} MB, "

@@ -13,7 +13,7 @@ _FORMATS = {"int8": "b", "byte": "b", "uint8": "B", "char": "B", "int16": "h", "
             "float64": "d"}  # fmt: skip
 _TIMES = {"time": "II", "duration": "ii"}
 _WORDS = {"true": True, "false": False, "1": True, "0": False}
-_MOST_TOLD = 60  # characters
+_MOST_SHOWN = 60  # characters
 _NANOSECONDS = 1_000_000_000
 
 
@@ -71,7 +71,7 @@ class _Writer:
         if isinstance(value, list) and len(value) == len(fields):
             return dict(zip(names, value, strict=True))
         raise ValueError(
-            f"{_at(path)}{_told(value)} is not a message: name its fields, as in "
+            f"{_at(path)}{_shown(value)} is not a message: name its fields, as in "
             f"{{{', '.join(f'{each}: …' for each in names)}}}"
         )
 
@@ -81,7 +81,7 @@ class _Writer:
         if value is None:
             value = [None] * (field.length or 0)
         if not isinstance(value, list):
-            raise ValueError(f"{_at(path)}{_told(value)} is not a list, as in [1, 2]")
+            raise ValueError(f"{_at(path)}{_shown(value)} is not a list, as in [1, 2]")
         if field.length is not None and len(value) != field.length:
             raise ValueError(f"{_at(path)}{len(value)} values, {field.length} are needed")
         count = b"" if field.length is not None else struct.pack("<I", len(value))
@@ -95,7 +95,7 @@ class _Writer:
         if kind in _TIMES and isinstance(value, dict):
             return self._time(kind, value, path)
         if isinstance(value, dict | list):
-            raise ValueError(f"{_at(path)}{_told(value)} is not a valid {kind}")
+            raise ValueError(f"{_at(path)}{_shown(value)} is not a valid {kind}")
         if kind == "string":
             data = ("" if value is None else str(value)).encode()
             return struct.pack("<I", len(data)) + data
@@ -103,7 +103,7 @@ class _Writer:
         try:
             return _packed(kind, text)
         except (KeyError, ValueError, OverflowError, struct.error):
-            raise ValueError(f"{_at(path)}{_told(value)} is not a valid {kind}") from None
+            raise ValueError(f"{_at(path)}{_shown(value)} is not a valid {kind}") from None
 
     def _time(self, kind: str, value: dict[str, Any], path: str) -> bytes:
         form = _TIMES[kind][0]
@@ -139,8 +139,8 @@ def _at(path: str) -> str:
     return f"{path}: " if path else ""
 
 
-def _told(value: Any) -> str:
+def _shown(value: Any) -> str:
     if isinstance(value, dict | list):
         return "a list" if isinstance(value, list) else "a mapping"
     text = " ".join(str(value).split())
-    return f'"{text}"' if len(text) <= _MOST_TOLD else f'"{text[:_MOST_TOLD]}…"'
+    return f'"{text}"' if len(text) <= _MOST_SHOWN else f'"{text[:_MOST_SHOWN]}…"'

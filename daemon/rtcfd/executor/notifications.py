@@ -62,7 +62,7 @@ class Listener(Protocol):
     def late(self, message: str) -> None:
         """Cycles ended late."""
 
-    def told(self, kind: "control_pb2.Event.Kind", event: wire.Event) -> None:
+    def event_occurred(self, kind: "control_pb2.Event.Kind", event: wire.Event) -> None:
         """An event has occurred; called after the specific method, if there is one."""
 
     def component_failed(self, component: str, reason: str) -> None:
@@ -172,7 +172,7 @@ class Notifications:
         elif event.kind == wire.Event.KIND_OVERRUNS:
             self._listener.late(event.message)
         if (kind := _KINDS.get(event.kind)) is not None:
-            self._listener.told(kind, event)
+            self._listener.event_occurred(kind, event)
 
 
 def logger_of(runner: str) -> "logging.LoggerAdapter[logging.Logger]":

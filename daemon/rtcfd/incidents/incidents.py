@@ -214,15 +214,15 @@ def _last_sequence(folder: Path) -> int:
 
 def _incident(file: Path) -> incidents_pb2.Incident:
     status = file.stat()
-    told = head.read(file)
+    fields = head.read(file)
     return incidents_pb2.Incident(
         name=file.stem,
-        runner=told.get("runner", ""),
-        time_ns=int(told.get("time_ns", status.st_mtime_ns)),
+        runner=fields.get("runner", ""),
+        time_ns=int(fields.get("time_ns", status.st_mtime_ns)),
         bytes=status.st_size,
         file=str(file),
-        reason=told.get("reason", ""),
-        sequence=int(told.get("sequence", 0)),
+        reason=fields.get("reason", ""),
+        sequence=int(fields.get("sequence", 0)),
     )
 
 

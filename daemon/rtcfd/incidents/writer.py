@@ -79,16 +79,16 @@ def _write(descriptor: int, file: Path, facts: dict[str, Any]) -> None:
 
 def _libraries(of: dict[str, Any]) -> dict[str, str]:
     """Return path and build id of each component's library, if the file has not changed since."""
-    told = {}
+    libraries = {}
     for component, (path, *identity) in of.items():
         try:
             status = os.stat(path)
             same = [status.st_ino, status.st_mtime_ns, status.st_size] == identity
             found = _build_id(Path(path)) if same else ""
-            told[component] = f"{path} {found or ('no build id' if same else 'changed since')}"
+            libraries[component] = f"{path} {found or ('no build id' if same else 'changed since')}"
         except (OSError, ValueError):
-            told[component] = f"{path} gone"
-    return told
+            libraries[component] = f"{path} gone"
+    return libraries
 
 
 def _build_id(file: Path) -> str:

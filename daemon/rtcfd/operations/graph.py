@@ -167,7 +167,7 @@ async def replace(
             parameters.note(runner, result.component, set_now, values, acting, "replace")
         else:
             kept.note(runner, result.component, acting, "replace")
-            kept.tell(result)
+            kept.add_to(result)
 
     return await runner.make(
         Change(

@@ -61,7 +61,7 @@ async def _keep(
     kept = await runner.shared.incidents.keep(descriptor, facts)
     runner.incident = kept.name
     runner.log.warning("incident %s kept in %s: %s", kept.name, kept.file, kept.reason)
-    runner.tell()
+    runner.notify_change()
     return kept
 
 
@@ -82,7 +82,9 @@ def _facts(
         "executor_version": executor.version,
         "graph": list(desired.components.values()),
         "settings": runner.settings(),
-        "parameters": [parameters.told(each) for each in desired.history.of()[-_CHANGES:]],
+        "parameters": [
+            parameters.change_message(each) for each in desired.history.of()[-_CHANGES:]
+        ],
         "events": [each for each in events if each.runner == runner.name][-_EVENTS:],
         "libraries": runner.code.files(),
     }

@@ -45,11 +45,11 @@ async def start_in_turn(
         await runner.begin_counting(reset=True)
         require_no_stop(runner, asked)
     request = wire.Request(start=wire.Start())
-    response = await runner.ask(request, progress, lambda _: runner.loop.told(True, asked))
+    response = await runner.ask(request, progress, lambda _: runner.loop.note_report(True, asked))
     if runner.loop.stops != asked:
         await _ask_to_stop(runner, None)
         require_no_stop(runner, asked)
-    runner.tell()
+    runner.notify_change()
     response.change.notes.extend(await runner.save())
     return response.change
 
@@ -81,7 +81,7 @@ async def stop(runner: RunnerCore, progress: Progress) -> control_pb2.ChangeResu
                 result = control_pb2.ChangeResult(notes=[f"no loop to stop: {runner.down_reason}"])
         finally:
             notes = await saving
-            runner.tell()
+            runner.notify_change()
         result.notes.extend(notes)
         return result
 
@@ -120,5 +120,7 @@ async def _ask_to_stop(
     runner: RunnerCore, progress: Progress | None, timeout_s: float = STOP_TIMEOUT_S
 ) -> control_pb2.ChangeResult:
     request = wire.Request(stop=wire.Stop())
-    response = await runner.ask(request, progress, lambda _: runner.loop.told(False), timeout_s)
+    response = await runner.ask(
+        request, progress, lambda _: runner.loop.note_report(False), timeout_s
+    )
     return response.change

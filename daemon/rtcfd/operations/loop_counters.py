@@ -16,7 +16,7 @@ _MUCH = 0.01  # share of late cycles from which on the status mentions them
 
 
 @dataclass
-class _Told:
+class _Report:
     at: float
     iteration: int
     overruns: int
@@ -28,7 +28,7 @@ class LoopCounters:
     def __init__(self) -> None:
         self.overruns = 0
         self.missed = 0
-        self._last: _Told | None = None
+        self._last: _Report | None = None
         self._late = ""
 
     def begin(self) -> None:
@@ -43,10 +43,10 @@ class LoopCounters:
         self.overruns = max(status.overruns - counted.overruns, 0)
         self.missed = max(status.missed - counted.missed, 0)
 
-    def told_of_late_cycles(self, status: runner_pb2.RunnerStatus, message: str) -> None:
+    def note_late_cycles(self, status: runner_pb2.RunnerStatus, message: str) -> None:
         """Note a report of late cycles; `message` has their cause and component."""
         before, now = self._last, time.monotonic()
-        self._last = _Told(now, status.iteration, status.overruns)
+        self._last = _Report(now, status.iteration, status.overruns)
         self._late = ""
         if before is None or now - before.at > _FRESH_S or status.iteration <= before.iteration:
             return

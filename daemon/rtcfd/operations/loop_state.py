@@ -35,7 +35,7 @@ class LoopState:
         self._desired.running = running
         self._desired.ended_boot = "" if running else this_boot()
 
-    def told(self, running: bool, asked: int | None = None) -> None:
+    def note_report(self, running: bool, asked: int | None = None) -> None:
         """Note an executor's report on its loop.
 
         If it is a response, `asked` is the stop count at the time of the request.

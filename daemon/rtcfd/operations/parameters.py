@@ -111,7 +111,7 @@ def history(
     changes: list[control_pb2.ParameterChange] = []
     room = _MOST_BYTES
     for each in reversed(found[-most:]):
-        change = told(each)
+        change = change_message(each)
         room -= change.ByteSize() + 8  # 8: the tag and the length of the field
         if room < 0 and changes:
             break
@@ -119,7 +119,7 @@ def history(
     return control_pb2.GetHistoryResponse(changes=reversed(changes))
 
 
-def told(change: ParameterChange) -> control_pb2.ParameterChange:
+def change_message(change: ParameterChange) -> control_pb2.ParameterChange:
     """Return a change as the client protocol has it."""
     return control_pb2.ParameterChange(
         component=change.component,

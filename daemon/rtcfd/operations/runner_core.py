@@ -115,7 +115,7 @@ class RunnerCore(ABC):
         self._executor: Executor | None = None
         self._changing_executor = asyncio.Lock()
         self._settled = asyncio.Event()  # not set while an executor is being started
-        self._told = (self.state, "")  # state and holder in the last events
+        self._notified = (self.state, "")  # state and holder in the last events
 
     # -- implemented by Runner ------------------------------------------------
 
@@ -131,11 +131,11 @@ class RunnerCore(ABC):
     def adopted(self) -> None:
         """Note that the executor of an earlier rtcfd was adopted."""
 
-    def tell(self) -> None:
+    def notify_change(self) -> None:
         """Notify systemd and event watchers; to be called after each change."""
         self.shared.on_change()
         holder = self.desired.hold.holder if self.desired.hold else ""
-        before, self._told = self._told, (self.state, holder)
+        before, self._notified = self._notified, (self.state, holder)
         if holder != before[1]:
             text = f"held by {holder}" if holder else f"given back by {before[1]}"
             self.happened(control_pb2.Event.KIND_RUNNER_SETTINGS, text)
@@ -391,14 +391,14 @@ class RunnerCore(ABC):
     ) -> Result:
         """Run one change in its turn; see Operations.take_turn()."""
 
-        async def told() -> Result:
+        async def work_and_notify() -> Result:
             self.require_ours()
             try:
                 return await work()
             finally:
-                self.tell()
+                self.notify_change()
 
-        return await self.operations.take_turn(name, told, timeout_s, runs_cycles)
+        return await self.operations.take_turn(name, work_and_notify, timeout_s, runs_cycles)
 
     async def save(self) -> list[str]:
         """Save the desired state; see Saver.save()."""

@@ -33,7 +33,7 @@ class Tuned:
         """Note the changes in the history; a value that stays keeps its author there."""
         parameters.note(runner, component, self.changed, self.before, acting, how)
 
-    def tell(self, result: control_pb2.ChangeResult) -> None:
+    def add_to(self, result: control_pb2.ChangeResult) -> None:
         """Add kept values and notes to the result of a change of this component."""
         result.kept.extend(self.kept)
         result.notes.extend(self.notes)

@@ -41,18 +41,18 @@ async def bring_up(runner: RunnerCore, only_left_over: bool = False, boot: bool 
         return False
     executor = runner.executor
     if executor is not None and executor.foreign:
-        runner.loop.told(runner.loop.wanted)  # its real state cannot be known
+        runner.loop.note_report(runner.loop.wanted)  # its real state cannot be known
         return True
     await runner.limit()
     if adopted:
         # A direct stop that it reports on adoption is older than the state of its loop then.
-        told = runner.loop.stopped_at_ns != stopped_at_ns
-        await _follow(runner, asked + told)
+        stopped = runner.loop.stopped_at_ns != stopped_at_ns
+        await _follow(runner, asked + stopped)
     else:
         await _restore(runner)
     if boot:
         await _start_at_boot(runner, asked, agreed)
-    runner.tell()
+    runner.notify_change()
     return True
 
 
@@ -66,7 +66,9 @@ async def _follow(runner: RunnerCore, asked: int) -> None:
     await _settle(runner)
     was_running = runner.loop.wanted
     request = wire.Request(get_status=wire.GetStatus())
-    answer = await runner.ask(request, None, lambda answer: _told(runner, answer.status, asked))
+    answer = await runner.ask(
+        request, None, lambda answer: _note_status(runner, answer.status, asked)
+    )
     status = answer.status
     listed = await runner.ask(wire.Request(list_components=wire.ListComponents()))
     await runner.begin_counting(reset=False)
@@ -93,9 +95,9 @@ async def _follow(runner: RunnerCore, asked: int) -> None:
     runner.adopted()
 
 
-def _told(runner: RunnerCore, status: runner_pb2.RunnerStatus, asked: int) -> None:
+def _note_status(runner: RunnerCore, status: runner_pb2.RunnerStatus, asked: int) -> None:
     """Note the state of a loop that an earlier rtcfd started; after a stop, it is not wanted."""
-    runner.loop.told(status.state == runner_pb2.RUNNER_STATE_RUNNING, asked)
+    runner.loop.note_report(status.state == runner_pb2.RUNNER_STATE_RUNNING, asked)
 
 
 def _follow_leased(runner: RunnerCore, found: Iterable[graph_pb2.ComponentInfo]) -> bool:
@@ -235,7 +237,7 @@ def _give_up(runner: RunnerCore, cause: str) -> None:
     """Report why there is no executor; rtcfd starts no other on its own."""
     runner.down_reason = f"{cause}; `rtcfctl -r {runner.name} start` tries again"
     runner.log.error("%s", runner.down_reason)
-    runner.tell()
+    runner.notify_change()
 
 
 def resumes(runner: RunnerCore, verdict: Verdict, crashes: Crashes) -> bool:

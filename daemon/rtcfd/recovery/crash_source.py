@@ -40,4 +40,4 @@ async def report_source(runner: RunnerCore, trace: Trace, verdict: Verdict) -> N
             known[verdict.culprit] = f"{verdict}: {place}"
     if not runner.closing:
         await runner.save()
-        runner.tell()
+        runner.notify_change()

@@ -74,7 +74,7 @@ class ComponentLeases:
         self._runner = runner
         self._alarm = alarm
         self._outboxes: dict[str, Outbox] = {}  # by component, of connected holders
-        self._told: set[str] = set()  # notes that holders of this launch have received
+        self._sent_notes: set[str] = set()  # notes that holders of this launch have received
         self._loading: set[str] = set()
         self._losing: set[str] = set()  # their holders have died, and `on_lost` is being applied
         self._leaving: dict[str, asyncio.Task[None]] = {}
@@ -155,9 +155,9 @@ class ComponentLeases:
     def _leave_out_told(self, result: control_pb2.ChangeResult) -> None:
         """Remove notes that another holder has received: launchers print to one screen."""
         if len(self._terms) <= 1:
-            self._told.clear()
-        fresh = [note for note in result.notes if note not in self._told]
-        self._told.update(fresh)
+            self._sent_notes.clear()
+        fresh = [note for note in result.notes if note not in self._sent_notes]
+        self._sent_notes.update(fresh)
         result.notes[:] = fresh
 
     def attach(self, request: control_pb2.OpenLease, outbox: Outbox) -> control_pb2.ChangeResult:
@@ -349,4 +349,4 @@ class ComponentLeases:
         for name in group:
             self._leaving.pop(name, None)
             self._outboxes.pop(name, None)
-        runner.tell()
+        runner.notify_change()

@@ -179,7 +179,7 @@ class Runner(RunnerCore):
             self.loop.want(was_running and resumes(self, verdict, self._crashes))
             if not self.loop.wanted:
                 self.loop.fault = died
-            self.tell()
+            self.notify_change()
             self.operations.in_background(
                 "the recovery of its executor", recover(self, verdict, self._crashes, died)
             )
@@ -187,7 +187,7 @@ class Runner(RunnerCore):
     def loop_ended(self, component: str, reason: str) -> None:
         """Handle the end of the loop by a fault."""
         self.loop.ended(reason)
-        self.tell()
+        self.notify_change()
         self.leases.failed(component, reason)
         self.operations.in_background("saving its state", self.save())
 
@@ -195,7 +195,7 @@ class Runner(RunnerCore):
         """Handle the failure of a component without which the loop goes on."""
         self.leases.failed(component, reason)
 
-    def told(self, kind: "control_pb2.Event.Kind", event: wire.Event) -> None:
+    def event_occurred(self, kind: "control_pb2.Event.Kind", event: wire.Event) -> None:
         """Handle an event, after its specific method: publish it, and write an incident."""
         self.happened(kind, event.message, event.component, event.iteration)
         if kind in _INCIDENTS and self.executor is not None:
@@ -207,7 +207,7 @@ class Runner(RunnerCore):
         async def look() -> None:
             with contextlib.suppress(RequestError):
                 answer = await self.query(wire.Request(get_status=wire.GetStatus()))
-                self.counters.told_of_late_cycles(answer.status, message)
+                self.counters.note_late_cycles(answer.status, message)
 
         self.operations.in_background("counting late cycles", look())
 
@@ -236,9 +236,9 @@ class Runner(RunnerCore):
                 control_pb2.LogRecord(level="LEVEL_ERROR", time_ns=time.time_ns(), message=text)
             )
 
-    def tell(self) -> None:
+    def notify_change(self) -> None:
         """Notify systemd, event watchers and holders; to be called after each change."""
-        super().tell()
+        super().notify_change()
         self.leases.settle()
         if self.hold_outbox is not None:
             loaded = sum(name not in self.desired.left_out for name in self.desired.components)
@@ -266,11 +266,11 @@ class Runner(RunnerCore):
             return  # repeated by a new connection
         self.loop.stopped_at_ns = stop.at_ns
         self.loop.stop()
-        self.loop.told(False)
+        self.loop.note_report(False)
         self.operations.withdraw(
             "the loop was stopped at its executor", errors_pb2.REASON_LOOP_STOPPED, only_cycles=True
         )
-        self.tell()
+        self.notify_change()
         self.operations.in_background("noting a stop", self._note_direct_stop(stop))
 
     async def _note_direct_stop(self, stop: wire.DirectStop) -> None:

@@ -53,7 +53,7 @@ class RunnerLease:
         else:
             runner = await self._take(name)
         self._outbox.say(taken=await runner.status())
-        runner.tell()
+        runner.notify_change()
 
     async def end(self) -> None:
         """Give the runner back, on request of its holder."""

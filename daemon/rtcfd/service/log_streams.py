@@ -60,13 +60,13 @@ async def watch(
     runners = set(request.runners)
     first = True
     async for piece in _follow(log, request, require_some):
-        told = [
+        events = [
             each for each in piece.entries
             if not runners or not each.runner or each.runner in runners
         ]  # fmt: skip
-        if first or told or piece.lost:
+        if first or events or piece.lost:
             yield control_pb2.WatchEventsResponse(
-                log_id=log.log_id, sequence=piece.last, lost=piece.lost, events=told
+                log_id=log.log_id, sequence=piece.last, lost=piece.lost, events=events
             )
         first = False
 
@@ -91,14 +91,14 @@ async def watch_logs(
     first = True
     async for piece in _follow(log, request, check):
         begin = piece.last - len(piece.entries) + 1
-        told = [
-            _told(record, number)
+        records = [
+            _numbered(record, number)
             for number, record in enumerate(piece.entries, begin)
             if record.level >= request.level and (not components or record.component in components)
         ]
-        if first or told or piece.lost:
+        if first or records or piece.lost:
             yield control_pb2.WatchLogsResponse(
-                log_id=log.log_id, sequence=piece.last, lost=piece.lost, records=told
+                log_id=log.log_id, sequence=piece.last, lost=piece.lost, records=records
             )
         first = False
 
@@ -121,7 +121,7 @@ def _check_known(runner: Runner, names: Iterable[str]) -> None:
                 )
 
 
-def _told(record: wire.LogRecord, number: int) -> control_pb2.LogRecord:
+def _numbered(record: wire.LogRecord, number: int) -> control_pb2.LogRecord:
     return control_pb2.LogRecord(
         level=wire.LogRecord.Level.Name(record.level),
         time_ns=record.time_ns,

@@ -66,11 +66,11 @@ class _CallerQueue:
         return response
 
     def _lose(self, batch: ports_pb2.PortBatch) -> None:
-        told = len(batch.stamps_ns)
+        count = len(batch.stamps_ns)
         before = 0 if self._lost is None else self._lost.lost
         self._lost = ports_pb2.PortBatch(
-            first_cycle=batch.first_cycle + told * self._every,
-            lost=before + batch.lost + (sum(batch.counts) if batch.counts else told),
+            first_cycle=batch.first_cycle + count * self._every,
+            lost=before + batch.lost + (sum(batch.counts) if batch.counts else count),
             values=[b""] * len(batch.values),
             places=[b""] * len(batch.places),
         )

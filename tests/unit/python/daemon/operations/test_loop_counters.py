@@ -80,19 +80,19 @@ def test_only_a_constantly_late_loop_raises_the_alarm(
     monkeypatch.setattr("rtcfd.operations.loop_counters.time.monotonic", lambda: clock[0])
     counts = LoopCounters()
     said = "400 cycles ended late in 10 s, most of them in /slow"
-    counts.told_of_late_cycles(status(1000, 1), "1 cycle ended late")
+    counts.note_late_cycles(status(1000, 1), "1 cycle ended late")
     assert shown(counts, status(1000, 1))[2] == ""
     clock[0] += 10
-    counts.told_of_late_cycles(status(2000, 401), said)
+    counts.note_late_cycles(status(2000, 401), said)
     assert shown(counts, status(2100, 420))[2] == f"40% of its cycles: {said}"
     stopped = status(2100, 420)
     stopped.state = runner_pb2.RUNNER_STATE_STOPPED
     assert shown(counts, stopped)[2] == ""
     # An occasional late cycle is not permanent.
     clock[0] += 10
-    counts.told_of_late_cycles(status(12000, 402), "1 cycle ended late")
+    counts.note_late_cycles(status(12000, 402), "1 cycle ended late")
     assert shown(counts, status(12000, 402))[2] == ""
     # It is on time again.
-    counts.told_of_late_cycles(status(13000, 902), said)
+    counts.note_late_cycles(status(13000, 902), said)
     clock[0] += 20
     assert shown(counts, status(20000, 902))[2] == ""
