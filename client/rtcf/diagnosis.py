@@ -30,7 +30,7 @@ class Finding:
     grade: Grade
     found: str
     wanted: str = ""
-    remedy: str = ""  # a command or an advice; empty if none is needed
+    remedy: str = ""  # a command or advice; empty if none is needed
 
 
 class Host:

@@ -30,18 +30,18 @@ class TrajectoryPoints {
     /// Time of the last point, ns. The list is not empty.
     [[nodiscard]] std::int64_t end() const noexcept RTCF_NONBLOCKING { return time(count_ - 1); }
     void clear() noexcept RTCF_NONBLOCKING { count_ = 0; }
-    /// Removes points that no time from the given one on needs.
+    /// Removes points that at() does not need for `time` and later times.
     void forgetBefore(std::int64_t time) noexcept RTCF_NONBLOCKING;
     /// Number of points before a time.
     [[nodiscard]] std::size_t countBefore(std::int64_t time) const noexcept RTCF_NONBLOCKING;
-    /// Removes the points from a time on.
+    /// Removes the points at and after a time.
     void truncate(std::int64_t time) noexcept RTCF_NONBLOCKING { count_ = countBefore(time); }
 
     /// Appends a point after end(). At most kCapacity points.
     /// @param kind of the segment that ends at the point
-    /// @return the motions of all joints at the point, to be set. Values that the kinds of both
-    ///         segments at the point do not name are ignored, but for those of the last point,
-    ///         which last() returns.
+    /// @return the motions of all joints at the point, which the caller sets. at() ignores values
+    ///         that neither of the adjacent segments uses; last() returns all values of the last
+    ///         point.
     Motion* append(std::int64_t time, PointKind kind) noexcept RTCF_NONBLOCKING;
     /// The kind of the segment that contains a time.
     [[nodiscard]] PointKind kindAt(std::int64_t time) const noexcept RTCF_NONBLOCKING;

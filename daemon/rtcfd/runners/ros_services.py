@@ -1,7 +1,7 @@
 """Serves calls of the ROS services of a runner's node.
 
-Called by the Runner.  ROS has no users: every peer that reaches the node may call.  So one
-setting of the runner gives all of them a right, in the words of `[access]`.
+Called by the Runner.  ROS has no users, and every peer that reaches the node can call a service.
+So one setting of the runner (`peers`) grants a right of `[access]` to all peers.
 """
 
 import logging
@@ -80,4 +80,4 @@ async def _change(runner: RunnerCore, call: wire.ServiceCall) -> control_pb2.Cha
 
 
 def _ignore(_line: str) -> None:
-    """Discard a line on the progress."""
+    """Discard a line of progress."""
