@@ -29,9 +29,9 @@ class Mixer final : public rtcf::Component {
         return true;
     }
     bool configure() override {
-        return unwilling.value() != "configure" || fail("told not to configure");
+        return unwilling.value() != "configure" || fail("set to fail in configure");
     }
-    bool start() override { return unwilling.value() != "start" || fail("told not to start"); }
+    bool start() override { return unwilling.value() != "start" || fail("set to fail in start"); }
 
     void update() override {
         in1.read();

@@ -1,5 +1,5 @@
-// Signals that a drawing must show: spikes of one cycle, stretches of NaN, and small changes of a
-// large value.
+// Signals that a plot must show: spikes of one cycle, ranges of NaN, and small changes of a large
+// value.
 #include <cmath>
 #include <cstdint>
 #include <limits>

@@ -1,4 +1,4 @@
-"""`rtcfctl scope` as a process, requests to it, and loops to look at."""
+"""`rtcfctl scope` as a process, requests to it, and loops to show."""
 
 import http.client
 import json

@@ -11,7 +11,7 @@
 //     gap       steps of position, velocity and acceleration between two samples, beyond those of
 //               the largest jerk
 //     rounding  the distance between the end of the last phase and the target
-// and of each axis the shortest duration of its own and the motion at the fraction of the duration.
+// and, for each axis, its own shortest duration and its motion at the fraction of the duration.
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -41,8 +41,8 @@ struct Findings {
 
 constexpr int kSamples = 400;
 
-// The largest velocity in one direction that the start makes unavoidable: easing the acceleration
-// leads to it.
+// The largest velocity that a motion may have in the positive direction: the limit, or the velocity
+// at the start, or the velocity when the acceleration at the start has been reduced to 0.
 double unavoidable(const Motion& begin, const AxisTask& task) {
     return std::max({task.limits.velocity, begin.velocity, begin.easedVelocity(task.limits.jerk)});
 }

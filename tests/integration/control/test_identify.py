@@ -58,7 +58,7 @@ def test_a_delay_is_found(daemon: Daemon, client: rtcf.Client) -> None:
     found = identify(daemon, "delay.in", "motor.velocity", *LIMITS)
     assert found["first_order"]["gain"] == pytest.approx(500.0, rel=MODEL)
     assert found["first_order"]["delay"] == pytest.approx(0.05, abs=1e-3)
-    # Åström & Hägglund's other rule needs no choice.
+    # The default method.
     assert found["method"] == "simc"
     assert found["margins"]["sensitivity"] < 1.8
 

@@ -70,7 +70,7 @@ def test_a_derivative_and_a_difference_of_a_loop_are_right(visit: Opener) -> Non
     )
     assert found["count"] > 1000
     assert (found["wrong"], found["odd"]) == (0, 0)
-    # It is listed, measured, and its value is told.
+    # It is listed and measured, and its value is shown.
     page.wait(
         "[...document.querySelectorAll('#tree .leaf')]"
         ".some((each) => each.title === '= d(/w0.phase)')"
@@ -114,7 +114,7 @@ def test_derived_signals_of_a_bookmark_are_shown_and_wrong_ones_are_named(visit:
         ("</b>", None),
     ],
 )
-def test_a_wrong_expression_is_told_in_one_line(
+def test_an_invalid_expression_is_reported_in_one_line(
     visit: Opener, text: str, error: str | None
 ) -> None:
     page = visit()
@@ -165,7 +165,7 @@ def test_functions_of_known_values_are_right(visit: Opener) -> None:
     assert found["slope"] == pytest.approx(1, abs=1e-3)
     assert found["twice"] == pytest.approx(-turn * turn, rel=1e-3)
     assert found["sum"] == pytest.approx(2 / turn, rel=1e-2)
-    # A step has come to 1 - 1/e of its height after the time constant.
+    # A step reaches 1 - 1/e of its height after the time constant.
     assert found["low"] == pytest.approx(1 - 1 / math.e, abs=0.01)
     assert found["high"] == pytest.approx(1 / math.e, abs=0.01)
     assert found["begin"] and found["gone"]
@@ -196,7 +196,7 @@ def test_a_derived_signal_starts_again_where_cycles_are_missing(visit: Opener) -
         })()"""
     )
     twos = [2] * 9
-    # The first cycle, the gap and its next cycle, and where the signal is not there, have no value.
+    # The first cycle, the gap, the cycle after it, and cycles without the signal have no value.
     assert found == [
         "blank", *twos, *[2] * 10, "blank", "blank", *twos, *["blank"] * 10, "blank", *twos,
     ]  # fmt: skip

@@ -91,7 +91,7 @@ def _press(page: Page, text: str) -> None:
 
 
 def _box(page: Page, element: str) -> tuple[float, float, float, float]:
-    """Return left, top, width and height of what an expression gives."""
+    """Return left, top, width and height of the element that an expression returns."""
     left, top, width, height = page.ask(
         f"(() => {{ const box = {element}.getBoundingClientRect();"
         " return [box.left, box.top, box.width, box.height]; })()"
@@ -117,13 +117,13 @@ def test_a_signal_is_shown_in_two_panes(visit: Opener) -> None:
     assert page.ask("scope.panes.map((pane) => pane.traces.map((each) => each.number))") == [
         [0], [1, 0],
     ]  # fmt: skip
-    # It is measured once, and each pane's cross takes it away there.
+    # It is measured once, and each pane's cross removes it from that pane.
     page.wait("document.querySelectorAll('.drawer tbody tr').length === 2")
     page.ask("scope.panes[1].legend.querySelectorAll('.chip > button')[1].click()")
     assert page.ask("scope.panes.map((pane) => pane.traces.map((each) => each.name))") == [
         ["/w1.wave"], ["/w0.wave"],
     ]  # fmt: skip
-    # A press in the list is about the pane with the bar.
+    # A click in the list changes the active pane.
     leaf = "[...document.querySelectorAll('#tree .leaf')].find((each) => each.title === '/w1.wave')"
     page.ask("scope.activate(scope.panes[1])")
     assert page.ask(f"{leaf}.getAttribute('aria-pressed')") == "false"
@@ -146,7 +146,7 @@ def test_a_trace_has_an_axis_of_its_own(visit: Opener, axis: str) -> None:
         """(async () => {
           scope.frame();
           const [pane] = scope.panes, [one, other] = pane.drawn.map((each) => each.sight);
-          // The part of the cycles that is not seen where its scale has it.
+          // The share of the cycles that are not drawn at the position on their scale.
           const seen = async (name, sight) => {
             const { traces, tiles } = pane, { live: store, view } = scope;
             const panes = [{ has: () => true, sight, traces, tiles }];
@@ -163,7 +163,7 @@ def test_a_trace_has_an_axis_of_its_own(visit: Opener, axis: str) -> None:
     # The second one is drawn over the first one.
     assert found["one"] < 0.1
     assert found["other"] == 0
-    # An exported plot has the same inks.
+    # An exported plot has the axes in the same colours.
     inks = page.ask(
         """(() => {
           const [pane] = scope.panes, { clientWidth: width, clientHeight: height } = pane.face;
@@ -240,7 +240,7 @@ def test_booleans_and_integers_are_tracks_below_each_other(visit: Opener) -> Non
           for (const trace of pane.drawn.filter(({ name }) => name.endsWith("above"))) {
             const values = live.column(trace.name), row = Math.round(trace.sight.row(1)) + 3;
             for (let x = sight.first + 20; x < sight.first + sight.width - 20; x++) {
-              // The value before a column and those in it: one that is true colours the ground.
+              // The value before a column and those in it: a true one colours the area.
               const [first, last] = [x, x + 1].map((each) => live.find(each * sight.seconds));
               const those = [];
               for (let at = first - 1; at < last; at++) those.push(values.get(at));
@@ -265,7 +265,7 @@ def test_booleans_and_integers_are_tracks_below_each_other(visit: Opener) -> Non
     assert found["alone"]["first"] == 0
     assert found["names"][:2] == ["/w0.above", "/w1.above"]
     assert re.fullmatch(r"/count\.out  \S+ … \S+", found["names"][2].replace("\u202f", ""))
-    # The line stays out of them, and one of them is a line where that is asked for.
+    # The line does not reach into the tracks, and a track becomes a line if that axis is chosen.
     _choose_axis(page, 0, 1, "left")
     assert page.ask("scope.panes[0].drawn[1].track") is None
     assert page.errors == []
@@ -334,7 +334,7 @@ def test_the_time_axis_shows_the_time_of_day_and_cycle_numbers(visit: Opener) ->
         told = int(hour) * 3600 + int(minute) * 60 + float(second)
         assert told == pytest.approx((here - midnight).total_seconds(), abs=2 * resolution)
         assert float(second) % 0.5 == 0
-    # A press on the unit goes on to the cycles.
+    # A click on the unit selects the next kind, cycle numbers.
     unit = "scope.panes[0].times.unit"
     assert page.ask(f"{unit}.textContent") == "clock"
     page.ask(f"{unit}.click(); scope.frame()")
@@ -360,7 +360,7 @@ def test_the_time_axis_shows_the_time_of_day_and_cycle_numbers(visit: Opener) ->
     assert page.errors == []
 
 
-def test_times_of_day_are_told_with_the_digits_of_their_step(visit: Opener) -> None:
+def test_times_of_day_have_the_digits_of_their_step(visit: Opener) -> None:
     page = visit()
     assert page.ask(
         """(async () => {
@@ -412,7 +412,7 @@ def test_the_values_under_the_pointer_are_those_of_its_cycle(visit: Opener) -> N
     assert re.search(r" s · \d\d:\d\d:\d\d\.\d+ · ", told["head"])
     # The line is in all panes, the box in one.
     assert (told["boxes"], told["lines"]) == (1, 2)
-    # It is within the pane at each corner, and goes where there is none.
+    # The box stays within the pane at each corner, and disappears outside of the panes.
     for part in ((0.02, 0.02), (0.98, 0.02), (0.02, 0.95), (0.98, 0.95)):
         _mouse(page, "mouseMoved", round(left + part[0] * width), round(top + part[1] * height))
         page.wait(f"!!{shown}")
@@ -461,7 +461,7 @@ def test_panes_list_and_drawer_are_resized_by_their_bars(visit: Opener) -> None:
         page.call("Input.dispatchKeyEvent", type=kind, key="ArrowDown", code="ArrowDown",
                   windowsVirtualKeyCode=40)  # fmt: skip
     assert page.ask(sizes) == [was[0] + 60, was[1] + 54]
-    # The browser keeps them, for the next page, too.
+    # The browser stores the sizes for the next page.
     other = visit()
     other.wait("scope.rate")
     assert other.ask(sizes) == [was[0] + 60, was[1] + 54]
@@ -489,7 +489,7 @@ def test_the_second_recording_is_shifted_against_the_first(visit: Opener) -> Non
     assert page.ask(first) == [0, 0]
     page.ask(f"{field}.value = '0.25'; {field}.onchange()")
     assert page.ask(first) == [0, 0.25]
-    # It is drawn there: the same as a recording whose times are so.
+    # The shifted recording is drawn at its new times.
     page.ask("scope.frame()")
     assert page.ask("drawing.differences(scope)") == []
     drawn = page.ask(
@@ -505,16 +505,16 @@ def test_the_second_recording_is_shifted_against_the_first(visit: Opener) -> Non
         })()"""
     )
     assert drawn == [True, True]
-    # A new trace does not lose it.
+    # A new trace keeps the shift.
     page.ask("scope.toggle('/w0.phase')")
     page.wait("scope.recordings.every((each) => each.store.column('/w0.phase'))")
     assert page.ask(first) == [0, 0.25]
-    # The value at A moves to B.
+    # The button moves the second recording from A to B.
     page.ask("scope.setCursor('a', 0.5); scope.setCursor('b', 0.9)")
     a, b = page.ask("[scope.cursors.a, scope.cursors.b]")
     _press(page, "A → B")
     assert page.ask(first)[1] == pytest.approx(0.25 + b - a)
-    # As the clock had it: the second one began later.
+    # The times of the clock: the second recording began later.
     _press(page, "Clock")
     assert page.ask(first)[1] > 1
     _press(page, "Beginning")
