@@ -197,7 +197,7 @@ class Pid final : public rtcf::Component {
         adoptGains(schedule);
         const double rest = terms(gains_) + forward;
         if (!std::isfinite(rest)) {
-            // Overflow, which the slopes would keep: begin anew from the last effort.
+            // After an overflow, restart from the last effort, because the slopes would keep it.
             effort.write(rest);  // rejected, as above
             begun_ = false;
             resume_ = true;

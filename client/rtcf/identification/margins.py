@@ -41,9 +41,9 @@ class Margins:
 
 
 def loop_response(gains: Gains, model: Model, period: float) -> Callable[[npt.ArrayLike], Any]:
-    """Return the frequency response of the opened loop, with the hold of a cycle.
+    """Return the frequency response of the opened loop, with the zero-order hold of a cycle.
 
-    A StateSpace includes the hold; for a Transfer, it is a delay of half a period.
+    A StateSpace includes the hold; for a Transfer, a delay of half a period stands for it.
     """
 
     def response(omega: npt.ArrayLike) -> Any:
@@ -72,7 +72,7 @@ def margins(gains: Gains, model: Model, period: float) -> Margins:
         at = np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0)
         return [float(optimize.brentq(function, omega[i], omega[i + 1], xtol=1e-12)) for i in at]
 
-    # Loops of the negative real axis: where the imaginary part is 0 and the real part negative.
+    # Crossings of the negative real axis: the imaginary part is 0, and the real part is negative.
     real_axis = refined(lambda w: float(response(w).imag), loop.imag)
     gains_there = [1.0 / abs(response(w)) for w in real_axis if response(w).real < 0]
     crossings = refined(lambda w: float(np.log(abs(response(w)))), np.log(np.abs(loop)))

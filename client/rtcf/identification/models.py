@@ -16,7 +16,7 @@ Array = npt.NDArray[np.float64]
 class Transfer:
     """K exp(-delay s) / (d0 s^n + ... + d(n-1) s + 1), of order n = 1 or 2.
 
-    gain         K, in units of the output by units of the input
+    gain         K, in output units per input unit
     denominator  d0 ... d(n-1), 1
     delay        in s
     """

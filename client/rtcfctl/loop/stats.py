@@ -77,7 +77,7 @@ def _watch(client: rtcf.Client, args: argparse.Namespace, output: Output) -> Non
         client.reset_statistics(args.runner)
     try:
         for found in client.watch_statistics(args.runner, args.watch):
-            output.begin_anew()
+            output.restart()
             _print(found, output)
             sys.stdout.flush()
     except KeyboardInterrupt:

@@ -80,7 +80,7 @@ class Output:
         for text_of_line in format_table(columns, cells, right, _width()):
             print("".join(styled(text, style, in_colours) for text, style in text_of_line).rstrip())
 
-    def begin_anew(self) -> None:
+    def restart(self) -> None:
         """Prepare for output that replaces the previous output: clear a terminal, or begin a YAML
         document (JSON documents need no separator)."""
         if not self.for_people:

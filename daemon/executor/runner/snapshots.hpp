@@ -36,7 +36,7 @@ class Snapshots {
     SnapshotOutcome take();
     /// Restores a snapshot at one boundary: parameters, declared state, and the values of
     /// connections. If the loop does not run, it is then paused, as after a step.
-    /// @throws Error and others; nothing has changed then
+    /// @throws Error or another exception; nothing has changed then
     ChangeOutcome restore(const Snapshot& snapshot, const Progress& progress);
 
    private:

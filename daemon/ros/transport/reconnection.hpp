@@ -6,7 +6,8 @@
 
 namespace rtcf::ros1 {
 
-/// Enables it for all later connections of this process. Once, before the node starts; any thread.
+/// Enables fast reconnection for all later connections of this process. Called once, before the
+/// node starts; any thread.
 void reconnectSoon() noexcept;
 
 }  // namespace rtcf::ros1

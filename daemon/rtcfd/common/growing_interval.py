@@ -8,7 +8,7 @@ import time
 
 class GrowingInterval:
     """The times of one message: at once, after `first_s`, then at intervals that double up to
-    `longest_s`.  Begins anew if due() was not called for a little more than 2 * `first_s`."""
+    `longest_s`.  Restarts if due() was not called for a little more than 2 * `first_s`."""
 
     def __init__(self, first_s: float, longest_s: float) -> None:
         self._first_s = first_s

@@ -149,10 +149,10 @@ class ComponentLeases:
         if note:
             runner.log.warning(note)
             result.notes.append(note)
-        self._leave_out_told(result)
+        self._remove_sent_notes(result)
         return result
 
-    def _leave_out_told(self, result: control_pb2.ChangeResult) -> None:
+    def _remove_sent_notes(self, result: control_pb2.ChangeResult) -> None:
         """Remove notes that another holder has received: launchers print to one screen."""
         if len(self._terms) <= 1:
             self._sent_notes.clear()

@@ -302,7 +302,7 @@ def _bool(value: Any) -> Any:
     if isinstance(value, types.Boolean):
         return lambda value: value
     if isinstance(value, types.Integer):
-        # numbers.py rejects it, after what made an int of bools.
+        # numbers.py rejects it later; an operation that made an int of bools is reported first.
         return lambda value: value != 0
     raise TypingError(f"RTCF:a bool is set to {words(value)}:compare it: x != 0")
 
@@ -1090,7 +1090,7 @@ def _changing(helper: Any, operation: Any) -> None:
             return lambda target, value: helper(plain_value(target), plain_value(value))
         numbers = operand(target), operand(value)
         plainly = None in numbers or not any(each.is_narrow for each in numbers if each)
-        # The plain division of a single number by zero gives infinity here (_OPTIONS): own raises.
+        # With _OPTIONS, dividing a single number by zero gives infinity; our own helper raises.
         is_division = operation in operators.DIVISIONS and not isinstance(target, types.Array)
         is_own = not plainly or (is_division and None not in numbers)
         operate = operators.OF[operation] if is_own else operation
