@@ -29,5 +29,5 @@ def sanitized_daemon(folder: Path, settings: str) -> Daemon:
 
 
 def reports(daemon: Daemon) -> list[Violation]:
-    """Return all reports so far; of an ended daemon, all."""
+    """Return the reports so far; after the end of the daemon, these are all reports."""
     return list(violations(daemon.log().splitlines()))

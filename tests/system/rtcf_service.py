@@ -38,7 +38,7 @@ class Service:
         """Call systemctl."""
         return self.machine.run("systemctl", *arguments, check=check)
 
-    def start_anew(self) -> None:
+    def stop_and_start(self) -> None:
         """Stop it with its loops, then start it."""
         self.systemctl("stop", "rtcfd.service")
         self.systemctl("start", "rtcfd.service")

@@ -27,7 +27,7 @@ def test_the_example_of_rtcfctl_runs(service: Service) -> None:
 def test_the_graph_of_the_example_is_applied_at_boot(service: Service) -> None:
     graph = service.machine.path("/etc/rtcfd/graphs.d/example.yaml")
     graph.write_text(pages.example("rtcf-graph.5"))
-    service.start_anew()
+    service.stop_and_start()
     assert service.ctl("order").stdout.split()[-1] == "/B"
 
 

@@ -92,7 +92,7 @@ def test_a_service_with_bad_settings_uses_the_last_good_ones(service: Service) -
 
 def test_graphs_d_is_loaded_at_boot(service: Service) -> None:
     service.machine.path("/etc/rtcfd/graphs.d/line.yaml").write_text(GRAPH)
-    service.start_anew()
+    service.stop_and_start()
     assert service.ctl("-o", "json", "order").stdout.count("/") == 2
     service.wait_until_said("runner rt_runner set up from /etc/rtcfd/graphs.d/line.yaml")
 
@@ -113,7 +113,7 @@ def test_a_bad_graph_is_reported_and_the_others_are_applied(service: Service) ->
     folder = service.machine.path("/etc/rtcfd/graphs.d")
     (folder / "a-bad.yaml").write_text("runner: other\ncomponentz: []\n")
     (folder / "line.yaml").write_text(GRAPH)
-    service.start_anew()
+    service.stop_and_start()
     assert "a-bad.yaml:2" in service.ctl("status").stdout
     assert service.status()["components"] == 2
 

@@ -112,7 +112,7 @@ def test_a_stop_is_final_on_a_read_only_disk(service: Service) -> None:
 
     def anew() -> str:
         service.systemctl("reset-failed", "rtcfd.service")  # many starts in a short time
-        service.start_anew()
+        service.stop_and_start()
         return str(service.status()["state"])
 
     service.configure('[runner]\non_boot = "resume"\n')
@@ -145,7 +145,7 @@ def test_a_read_only_etc_is_enough(service: Service) -> None:
     machine.run("mount", "--bind", "/etc", "/etc")
     machine.run("mount", "-o", "remount,bind,ro", "/etc")
     try:
-        service.start_anew()
+        service.stop_and_start()
         assert service.load_and_start()["state"] == "running"
         service.systemctl("reload", "rtcfd.service")
     finally:
@@ -186,7 +186,7 @@ def test_two_hundred_clients_at_once_are_served(service: Service) -> None:
 def test_the_state_survives_a_stop_and_a_start(service: Service) -> None:
     service.load_and_start()
     service.ctl("runner", "set", "--frequency", "500")
-    service.start_anew()
+    service.stop_and_start()
     status = service.status()
     assert (status["state"], status["components"]) == ("stopped", 1)
     assert status["settings"]["frequency_hz"] == 500

@@ -27,7 +27,7 @@ class Recorder : public rtcf::Component {
     bool prepare(const rtcf::Values& proposed) override {
         if (proposed[refuses] != "prepare") return true;
         RTCF_WARN(this, "refuses to prepare");
-        return fail("told to refuse prepare");
+        return fail("set to refuse prepare");
     }
     bool configure() override { return hook("configure"); }
     bool start() override { return hook("start"); }
@@ -55,7 +55,7 @@ class Recorder : public rtcf::Component {
     bool hook(const char* name) {
         note(name);
         if (throws.value() == name) throw std::runtime_error("as told");
-        return refuses.value() != name || fail("told to refuse {}", name);
+        return refuses.value() != name || fail("set to refuse {}", name);
     }
 
    private:

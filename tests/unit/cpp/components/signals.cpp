@@ -113,7 +113,7 @@ class Chatter final : public rtcf::Component {
 
     bool configure() override {
         RTCF_INFO(this, "configure at {}", time());
-        return refuses ? fail("told to refuse") : true;
+        return refuses ? fail("set to refuse") : true;
     }
     bool start() override {
         RTCF_INFO(this, "start in iteration {}", iteration());

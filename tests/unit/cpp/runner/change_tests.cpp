@@ -151,7 +151,7 @@ TEST_F(Change, FailingConfigureIsReportedAndUndone) {
     ComponentDefinition bad = recorder("B");
     bad.parameters = {{"refuses", std::string("configure")}};
     EXPECT_EQ(errorOf([&] { load(bad); }),
-              "/B (rtcf_unit_test/Recorder): configure failed: told to refuse configure");
+              "/B (rtcf_unit_test/Recorder): configure failed: set to refuse configure");
     expectUnchanged({"/A"}, before);
     EXPECT_EQ(journal().count("/B cleanup"), 1U);
     EXPECT_EQ(journal().count("/B start"), 0U);

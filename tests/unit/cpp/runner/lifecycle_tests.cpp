@@ -85,7 +85,7 @@ TEST_F(Lifecycle, FailedStartStopsTheStartedComponents) {
     loadChain();
     setParameters("/A", {{"refuses", std::string("start")}});
     const std::string text = errorOf([this] { start(); });
-    EXPECT_NE(text.find("/A (rtcf_unit_test/Recorder): start failed: told to refuse start"),
+    EXPECT_NE(text.find("/A (rtcf_unit_test/Recorder): start failed: set to refuse start"),
               std::string::npos)
         << text;
     EXPECT_EQ(state(), RunnerState::Stopped);

@@ -41,7 +41,7 @@ class Rollback : public RunnerFixture {
 TEST_F(Rollback, LogRecordsOfARejectedComponentAreForwarded) {
     ComponentDefinition refused = definition("Recorder", "A");
     refused.parameters = {{"refuses", std::string("prepare")}};
-    EXPECT_NE(errorOf([&] { load(refused); }).find("told to refuse prepare"), std::string::npos);
+    EXPECT_NE(errorOf([&] { load(refused); }).find("set to refuse prepare"), std::string::npos);
     const auto entries = handedOn();
     const auto said = std::find_if(entries.begin(), entries.end(), [](const LogEntry& entry) {
         return entry.message == "refuses to prepare";
