@@ -1,5 +1,5 @@
 #!/usr/bin/python3 -I
-"""Evaluates the recorded cycles of a loop, as in Fig. 2 of the paper: two histograms, statistics.
+"""Evaluates the recorded cycles of a loop, as in Fig. 2 of the paper: histograms and statistics.
 
 rosbag record -e '.*/rt_runner/cycles'
 rosrun rtcf evaluate_performance_rosbag BAG FREQUENCY

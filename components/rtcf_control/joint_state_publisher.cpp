@@ -109,7 +109,7 @@ class JointStatePublisher final : public rtcf::Component {
         state.publish();  // NaN is rejected by the check: readers keep the last message
     }
 
-    // Runs in the last cycle, too, since safe() does not change measured values.
+    // Runs in the last cycle, too, to publish its measured values.
     void safe() noexcept override { update(); }
 
     // One quantity of all joints.

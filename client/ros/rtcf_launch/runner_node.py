@@ -77,8 +77,8 @@ private parameters:
   sim_time                 follow /clock: auto (default: if /use_sim_time), never, always
   max_clock_jump           a larger forward jump of a simulated clock re-bases the loop, in s
                            (default: 10)
-  on_crash                 after a crash: hold the loop (hold, the default), or resume it without
-                           the crashed component if that is optional (resume)
+  on_crash                 after a crash: keep the loop stopped (hold, the default), or resume it
+                           without the crashed component if that is optional (resume)
   on_fault                 when the loop ends by a fault: exit (default), or stay
   daemon                   rtcfd to use: auto (default), system or private
 

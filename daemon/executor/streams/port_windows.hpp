@@ -1,6 +1,6 @@
 /// @file
-/// The open window of a stream of minima and maxima: the cycles whose minima and maxima become the
-/// next row of the stream. Main thread only.
+/// The open window of a stream of minima and maxima: consecutive cycles whose extreme values become
+/// the next row of the stream. Main thread only.
 #pragma once
 
 #include <cstdint>
