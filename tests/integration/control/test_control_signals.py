@@ -21,7 +21,7 @@ from scipy import signal
 
 DT = 0.001
 ROUNDING = 1e-9
-EDGE = 1e-7  # s: a time on an edge belongs to what follows
+EDGE = 1e-7  # s: a time on an edge counts as after the edge
 TIME = np.arange(5000) * DT
 SHAPES = (
     "step", "ramp", "sine", "square", "triangle", "linear_chirp", "log_chirp", "prbs", "multisine",
@@ -107,7 +107,7 @@ def test_multisine_has_equal_lines_and_its_amplitude_as_peak(blocks: Blocks, lin
     assert np.allclose(spectrum[1 : lines + 1], spectrum[1], rtol=1e-3, atol=0)
     assert np.allclose(spectrum[lines + 1 :], 0.0, rtol=0, atol=1e-3)
     assert np.max(np.abs(found)) <= 3.0
-    # Between the samples the peak is reached.
+    # The peak lies between two samples.
     assert np.max(np.abs(signal.resample(found, 100_000))) == pytest.approx(3.0, rel=1e-3)
     # Schroeder's phases: less than 2.1 times the RMS value.
     assert spectrum[1] * np.sqrt(lines / 2.0) > 3.0 / 2.1
