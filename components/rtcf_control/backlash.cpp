@@ -25,7 +25,7 @@ class Backlash final : public rtcf::Component {
         if (in.read() == rtcf::DataStatus::None) return;
         const double drive = in.value();
         if (!std::isfinite(drive)) {
-            out.write(drive);  // rejected by the check: readers keep the last output
+            out.write(drive);  // rejected as not finite: readers keep the last output
             return;
         }
         const double before = begun_ ? position_.value() : drive;

@@ -237,7 +237,7 @@ class Biquads final : public rtcf::Component {
         if (in.read() == rtcf::DataStatus::None) return;
         const double x = in.value();
         if (!std::isfinite(x)) {
-            out.write(x);  // rejected by the check: readers keep the last output
+            out.write(x);  // rejected as not finite: readers keep the last output
             return;
         }
         if (!begun_) {
@@ -248,7 +248,7 @@ class Biquads final : public rtcf::Component {
         Signals now{};
         const double y = filter(x, now) + offset_;
         out.write(y);
-        if (!std::isfinite(y)) return;  // too large a number: rejected by the check
+        if (!std::isfinite(y)) return;  // too large a number: rejected as not finite
         before_ = last_.value();
         last_ = now;
         output_ = y;

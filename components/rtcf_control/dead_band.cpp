@@ -21,7 +21,7 @@ class DeadBand final : public rtcf::Component {
     void update() override {
         if (in.read() == rtcf::DataStatus::None) return;
         const double value = in.value();
-        // A value that is not finite is rejected by the check: readers keep the last output.
+        // A value that is not finite is rejected: readers keep the last output.
         out.write(std::isfinite(value) ? value - std::clamp(value, lower.value(), upper.value())
                                        : value);
     }

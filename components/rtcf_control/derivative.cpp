@@ -33,7 +33,7 @@ class Derivative final : public rtcf::Component {
         const double value = in.value();
         if (!std::isfinite(value)) {
             gap_ += dt();
-            out.write(value);  // rejected by the check: readers keep the last output
+            out.write(value);  // rejected as not finite: readers keep the last output
             return;
         }
         if (begun_) rate_ = (filter_time * rate_ + value - last_) / (filter_time + gap_ + dt());

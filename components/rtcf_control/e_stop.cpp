@@ -94,7 +94,7 @@ class EStop final : public rtcf::Component {
         if (latch_.value().stopped()) {
             move(safe_value, stop_rate);
         } else if (!usable) {
-            if (command != rtcf::DataStatus::None) out.write(in.value());  // rejected by the check
+            if (command != rtcf::DataStatus::None) out.write(in.value());  // rejected as not finite
             publishState();
             return;
         } else {

@@ -165,7 +165,7 @@ class Excitation final : public rtcf::Component {
         return true;
     }
 
-    // Ends the excitation, and passes on the safe command of a component in front.
+    // Ends the excitation, and passes on the safe command of an upstream component.
     void safe() noexcept override {
         if (runs()) set(Progress::Stopped);
         pass(base());
@@ -266,7 +266,7 @@ class Excitation final : public rtcf::Component {
     }
 
     void pass(double command) noexcept {
-        out.write(command);  // rejected by the check if it is not finite
+        out.write(command);  // rejected if it is not finite
         signal.write(0.0);
         publish();
     }

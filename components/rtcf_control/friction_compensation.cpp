@@ -114,7 +114,7 @@ class FrictionCompensation final : public rtcf::Component {
         if (velocity.read() == rtcf::DataStatus::None) return;
         const double v = velocity.value();
         if (!std::isfinite(v)) {
-            effort.write(v);  // rejected by the check: readers keep the last output
+            effort.write(v);  // rejected as not finite: readers keep the last output
             return;
         }
         if (begun_ && rest_ > 0.0) rest_ = fade > 0.0 ? std::max(0.0, rest_ - dt() / fade) : 0.0;

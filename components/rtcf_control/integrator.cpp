@@ -51,7 +51,7 @@ class Integrator final : public rtcf::Component {
         const bool is_reset = reset.read() != rtcf::DataStatus::None && reset.value();
         const double rate = gain * in.value();
         if (has_value && !is_reset && !std::isfinite(rate)) {
-            out.write(rate);  // rejected by the check: readers keep the last output
+            out.write(rate);  // rejected as not finite: readers keep the last output
             return;
         }
         if (is_reset || !begun_) {

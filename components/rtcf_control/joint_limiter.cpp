@@ -108,7 +108,7 @@ class JointLimiter final : public rtcf::Component {
             case Command::Position:
                 // Begins at the measured position, so that the joint does not jump.
                 if (!begun_ && has_position && !std::isfinite(position.value())) {
-                    out.write(position.value());  // rejected by the check
+                    out.write(position.value());  // rejected as not finite
                     return;
                 }
                 if (begun_) {
@@ -149,7 +149,7 @@ class JointLimiter final : public rtcf::Component {
     // False without a value that is needed. A value that is not finite is reported as a fault.
     bool usable(const rtcf::Input<double>& measured, bool needed) {
         if (std::isfinite(measured.value())) return !needed || measured.hasValue();
-        out.write(measured.value());  // rejected by the check: readers keep the last output
+        out.write(measured.value());  // rejected as not finite: readers keep the last output
         return false;
     }
 

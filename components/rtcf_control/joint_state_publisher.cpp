@@ -106,7 +106,7 @@ class JointStatePublisher final : public rtcf::Component {
         if (found.kind == Kind::Waiting || found.kind == Kind::Missing) return;
         message.header.stamp.fromNSec(
             static_cast<std::uint64_t>(std::max<std::int64_t>(stamp(), 0)));
-        state.publish();  // NaN is rejected by the check: readers keep the last message
+        state.publish();  // NaN is rejected: readers keep the last message
     }
 
     // Runs in the last cycle, too, to publish its measured values.

@@ -97,7 +97,7 @@ class LookupTable final : public rtcf::Component {
     void update() override {
         if (in.read() == rtcf::DataStatus::None) return;
         if (!std::isfinite(in.value())) {
-            out.write(in.value());  // rejected by the check: readers keep the last output
+            out.write(in.value());  // rejected as not finite: readers keep the last output
             return;
         }
         const auto& points = table_->y;
@@ -159,7 +159,7 @@ class LookupTable2D final : public rtcf::Component {
         const bool has_y = in_y.read() != rtcf::DataStatus::None;
         if (!has_x || !has_y) return;
         if (!std::isfinite(in_x.value()) || !std::isfinite(in_y.value())) {
-            out.write(in_x.value() + in_y.value());  // rejected by the check
+            out.write(in_x.value() + in_y.value());  // rejected as not finite
             return;
         }
         const Table& table = *table_;

@@ -225,7 +225,7 @@ class Motor final : public rtcf::Component {
         const int steps = std::max(1, static_cast<int>(std::ceil(span / step - 1e-6)));
         for (int i = 0; i < steps; ++i) motion = advanced(motion, span / steps, wanted, load);
         if (!std::isfinite(wanted + load) || !motion.finite()) {
-            // Rejected by the check: readers keep the last outputs. The motor stands still.
+            // Rejected as not finite: readers keep the last outputs. The motor stands still.
             position.write(std::numeric_limits<double>::quiet_NaN());
             return;
         }

@@ -40,7 +40,7 @@ class MovingAverage final : public rtcf::Component {
         if (in.read() == rtcf::DataStatus::None) return;
         const double value = in.value();
         if (!std::isfinite(value)) {
-            out.write(value);  // rejected by the check: readers keep the last output
+            out.write(value);  // rejected as not finite: readers keep the last output
             return;
         }
         // State that was handed over or set by hand may not fit.

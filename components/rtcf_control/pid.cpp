@@ -186,7 +186,7 @@ class Pid final : public rtcf::Component {
             if (by_hand) {
                 driveBlind(by_hand_effort);
             } else if (complete) {
-                // Rejected by the check: readers keep the last effort. The state stays as it is.
+                // Rejected as not finite: readers keep the last effort. The state stays as it is.
                 effort.write(std::numeric_limits<double>::quiet_NaN());
                 gap_ += dt();
             }
@@ -238,7 +238,7 @@ class Pid final : public rtcf::Component {
         begun_ = false;
         resume_ = true;
         if (!std::isfinite(wanted)) {
-            effort.write(wanted);  // rejected by the check
+            effort.write(wanted);  // rejected as not finite
             return;
         }
         effort_ = limit(wanted, dt());

@@ -33,7 +33,7 @@ class RateLimiter final : public rtcf::Component {
         if (in.read() == rtcf::DataStatus::None) return;
         const double wanted = in.value();
         if (!std::isfinite(wanted)) {
-            out.write(wanted);  // rejected by the check: readers keep the last output
+            out.write(wanted);  // rejected as not finite: readers keep the last output
             return;
         }
         const double before = begun_ ? last_.value() : wanted;

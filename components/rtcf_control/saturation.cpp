@@ -26,7 +26,7 @@ class Saturation final : public rtcf::Component {
         if (in.read() == rtcf::DataStatus::None) return;
         const double value = in.value();
         if (!std::isfinite(value)) {
-            out.write(value);  // rejected by the check: readers keep the last output
+            out.write(value);  // rejected as not finite: readers keep the last output
             return;
         }
         const double limited = std::clamp(value, lower.value(), upper.value());

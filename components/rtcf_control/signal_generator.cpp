@@ -111,7 +111,7 @@ class SignalGenerator final : public rtcf::Component {
 
     void write(double signal) noexcept {
         const double value = offset + signal;
-        // NaN (overflow) is rejected by the check: readers keep the last output.
+        // NaN (overflow) is rejected: readers keep the last output.
         out.write(std::clamp(value, lower.value(), upper.value()));
     }
 

@@ -522,7 +522,7 @@ class StateSpace final : public rtcf::Component {
                            [](const auto& port) { return port->hasValue(); });
     }
 
-    // Rejected by the check: readers keep the last outputs.
+    // Rejected as not finite: readers keep the last outputs.
     void reject() {
         for (int i = 0; i < design_->outputs; ++i)
             out_[static_cast<std::size_t>(i)]->write(std::numeric_limits<double>::quiet_NaN());

@@ -56,7 +56,7 @@ class Switch final : public rtcf::Component {
         if (!selectable(active_)) return;
         const double value = inputs[static_cast<std::size_t>(active_.value())]->value();
         if (!std::isfinite(value)) {
-            out.write(value);  // rejected by the check: readers keep the last output
+            out.write(value);  // rejected as not finite: readers keep the last output
             return;
         }
         if (share_ < 1.0) share_ = fade > 0.0 ? std::min(1.0, share_ + dt() / fade) : 1.0;

@@ -67,7 +67,7 @@ KDL::Frame frameOf(const urdf::Pose& pose) {
 
 bool isMoving(const urdf::Joint& joint) { return joint.type != urdf::Joint::FIXED; }
 
-// Gravity needs mass and its centre only.
+// The effect of gravity depends only on the mass and its centre.
 KDL::RigidBodyInertia inertiaOf(const urdf::Link& link) {
     if (link.inertial == nullptr) return KDL::RigidBodyInertia::Zero();
     const double mass = link.inertial->mass;

@@ -47,14 +47,14 @@ class Biquad(Component):
         self.run()
 
     def safe(self):
-        self.run()  # passes on the safe command of a component in front
+        self.run()  # to pass on the safe command of an upstream component
 
     def run(self):
         if not self.u.valid:
             return
         x = self.u.value
         if not math.isfinite(x):
-            self.y.write(x)  # rejected by the check: readers keep the last output
+            self.y.write(x)  # rejected as not finite: readers keep the last output
             return
         b0, b1, b2 = self.analog()
         k = math.tan(math.pi * min(self.f, 0.49 * self.frequency) / self.frequency)

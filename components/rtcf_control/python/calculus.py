@@ -54,7 +54,7 @@ class Integrator(_Block):
         rate = self.gain * self.u.value if self.u.valid else 0.0
         is_reset = self.reset.valid and self.reset.value
         if not is_reset and not math.isfinite(rate):
-            self.y.write(rate)  # rejected by the check: readers keep the last output
+            self.y.write(rate)  # rejected as not finite: readers keep the last output
             return
         if is_reset or self.last is None:
             self.sum = self.initial
@@ -92,7 +92,7 @@ class Derivative(_Block):
         value = self.u.value
         if not math.isfinite(value):
             self.gap += self.dt
-            self.y.write(value)  # rejected by the check: readers keep the last output
+            self.y.write(value)  # rejected as not finite: readers keep the last output
             return
         if self.last is not None:
             self.rate = (self.filter_time * self.rate + value - self.last) / (
@@ -131,7 +131,7 @@ class MovingAverage(_Block):
             return
         value = self.u.value
         if not math.isfinite(value):
-            self.y.write(value)  # rejected by the check: readers keep the last output
+            self.y.write(value)  # rejected as not finite: readers keep the last output
             return
         if self.ring != self.length:
             self.ring = self.length

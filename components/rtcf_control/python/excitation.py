@@ -253,7 +253,7 @@ class Excitation(Component):
 
     def send(self, value, signal):
         """Write all outputs."""
-        self.y.write(value)  # rejected by the check if it is not finite
+        self.y.write(value)  # rejected if it is not finite
         self.signal.write(signal)
         self.state.write(self.progress)
         self.running.write(self.progress is Progress.running)

@@ -72,7 +72,7 @@ class FrictionCompensation(Component):
             return
         v = self.velocity.value
         if not math.isfinite(v):
-            self.effort.write(v)  # rejected by the check: readers keep the last output
+            self.effort.write(v)  # rejected as not finite: readers keep the last output
             return
         if self.begun and self.rest > 0.0:
             self.rest = max(0.0, self.rest - self.dt / self.fade) if self.fade > 0.0 else 0.0

@@ -34,7 +34,7 @@ class Saturation(_Block):
             return
         value = self.u.value
         if not math.isfinite(value):
-            self.y.write(value)  # rejected by the check: readers keep the last output
+            self.y.write(value)  # rejected as not finite: readers keep the last output
             return
         limited = np.clip(value, self.lower, self.upper)
         self.y.write(limited)
@@ -63,7 +63,7 @@ class RateLimiter(_Block):
             return
         value = self.u.value
         if not math.isfinite(value):
-            self.y.write(value)  # rejected by the check: readers keep the last output
+            self.y.write(value)  # rejected as not finite: readers keep the last output
             return
         before = value if self.last is None else self.last
         self.last = np.clip(value, before - self.falling * self.dt, before + self.rising * self.dt)
@@ -107,7 +107,7 @@ class Backlash(_Block):
             return
         drive = self.u.value
         if not math.isfinite(drive):
-            self.y.write(drive)  # rejected by the check: readers keep the last output
+            self.y.write(drive)  # rejected as not finite: readers keep the last output
             return
         before = drive if self.position is None else self.position
         self.position = np.clip(before, drive - self.width / 2.0, drive + self.width / 2.0)

@@ -236,7 +236,7 @@ class Motor(Component):
         wanted = self.command.value if self.command.valid else 0.0
         load = self.load_torque.value if self.load_torque.valid else 0.0
         if not math.isfinite(wanted + load):
-            self.position.write(math.nan)  # rejected by the check: readers keep the last outputs
+            self.position.write(math.nan)  # rejected as not finite: readers keep the last outputs
             return
         motion = self.motion.copy()
         if self.stiffness == 0.0:

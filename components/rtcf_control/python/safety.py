@@ -239,7 +239,7 @@ class JointLimiter(Component):
     def send(self, wanted, value):
         """Write the limited value of a command."""
         if not math.isfinite(wanted):
-            self.y.write(wanted)  # rejected by the check: readers keep the last output
+            self.y.write(wanted)  # rejected as not finite: readers keep the last output
             return
         self.y.write(value)
         self.limited.write(value != wanted)
