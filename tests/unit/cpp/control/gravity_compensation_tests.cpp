@@ -218,7 +218,7 @@ TEST(GravityCompensation, HandsOverToAnotherRobotWithoutAJump) {
         const double share = std::min(1.0, cycle / 100.0);
         EXPECT_NEAR(loaded.efforts()[0], before[0] + (after[0] - before[0]) * share, 1e-10);
     }
-    // Positions of other joints are of no use.
+    // A state with other joints is not used.
     Gravity other(kArm, {{"joints", std::string("elbow shoulder")}});
     other.bench.cycle();
     other.bench.takeOver(gravity.bench);

@@ -1,6 +1,6 @@
-// What inputs read, against a model, over random changes: a writer that comes, goes and is
-// replaced, loop breaks, topics, components that skip cycles, ends of the loop (its time then
-// begins anew) and snapshots.
+// The values that inputs read, compared with a model, over random changes: writers are added,
+// removed and replaced; loop breaks, topics, components that skip cycles, ends of the loop (which
+// restart its time) and snapshots.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -192,7 +192,7 @@ class Reading : public RunnerFixture, public ::testing::WithParamInterface<unsig
         }
     }
 
-    // Takes a snapshot, goes on, and restores it.
+    // Takes a snapshot, runs more cycles, and restores it.
     void goBack() {
         if (state() != RunnerState::Stepping) return;
         const Model before = model_;

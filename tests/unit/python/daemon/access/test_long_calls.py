@@ -1,4 +1,4 @@
-"""Lasting calls: each message is checked, and a client that loses a right is told."""
+"""Lasting calls: each message is checked, and a client that loses a right gets an error."""
 
 from collections.abc import Iterator
 from pathlib import Path
