@@ -88,8 +88,7 @@ class Injector {
         if ((middle_.load(std::memory_order_relaxed) & kFresh) == 0) return false;
         front_ = middle_.exchange(front_, std::memory_order_acq_rel) & ~kFresh;
         SlotHeader& slot = *slots_[front_];
-        const std::int64_t stamp = clock.time_ns - slot.stamp;
-        slot.stamp = stamp != 0 ? stamp : -1;
+        slot.stamp = stampOf(clock.time_ns - slot.stamp);
         return true;
     }
 

@@ -48,7 +48,7 @@ void Probe::take(Item& item, const LoopClock& clock) noexcept {
 
 Probe::Value Probe::value(std::size_t index) const {
     const Item& item = items_[index];
-    Value value{item.header.stamp != 0, item.now_ns - item.header.stamp, {}};
+    Value value{item.header.stamp != 0, item.now_ns - timeOf(item.header.stamp), {}};
     if (value.written && allocatesMessage(*item.type)) {
         value.text = "(not shown: its message would be allocated in the cycle)";
     } else if (item.copied) {

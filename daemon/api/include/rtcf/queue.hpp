@@ -68,7 +68,7 @@ class QueueBase : public InputBase {
         SlotHeader* const to = claim();
         if (to == nullptr) return;
         type().exchange(*to, from);
-        to->stamp = time_ns;
+        to->stamp = stampOf(time_ns);
     }
     /// Ignores the present value of the source, so that a reloaded component does not get an old
     /// trajectory again.

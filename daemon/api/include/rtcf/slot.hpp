@@ -17,16 +17,17 @@ struct SlotHeader {
     std::int64_t stamp = 0;
 };
 
-/// The loop time of a stamp, ns. Stamps of the times up to 0 are 1 lower, as 0 is none. Real-time
+/// The stamp of a loop time, ns. Stamps of the times up to 0 are 1 lower, as 0 is none. Real-time
 /// safe.
+constexpr std::int64_t stampOf(std::int64_t time) noexcept { return time > 0 ? time : time - 1; }
+
+/// The loop time of a stamp, ns. Real-time safe.
 constexpr std::int64_t timeOf(std::int64_t stamp) noexcept { return stamp > 0 ? stamp : stamp + 1; }
 
 /// A stamp after the loop's time was moved by `by` ns: a reader sees the same values as new, and of
 /// the same age. Real-time safe.
 constexpr std::int64_t movedStamp(std::int64_t stamp, std::int64_t by) noexcept {
-    if (stamp == 0) return 0;
-    const std::int64_t time = timeOf(stamp) + by;
-    return time > 0 ? time : time - 1;
+    return stamp == 0 ? 0 : stampOf(timeOf(stamp) + by);
 }
 
 /// A value with its header.

@@ -125,12 +125,26 @@ TEST(Injector, StampsWithTheLoopsClock) {
     }
 }
 
-// A message that is as old as the loop is not taken for a value that was never written.
-TEST(Injector, ItsValueAlwaysHasAStamp) {
-    Injector injector("/x", typeInfo<double>());
-    deliver(injector, 1.0);
-    ASSERT_TRUE(injector.adopt(LoopClock{}));
-    EXPECT_NE(injector.front()->stamp, 0);
+// Loop time begins near 0, and its stamp 0 means "never written".
+TEST(Injector, KeepsTheAgesOfMessagesOlderThanTheLoop) {
+    for (const std::int64_t age : {99, 100, 101, 102}) {
+        Injector injector("/x", typeInfo<double>());
+        BareComponent component;
+        Queue<double, 1> queue(&component, "queue");
+        const auto backlog = std::make_shared<executor::Backlog>(queue);
+        injector.setBacklogs({backlog});
+        injector.setQueueing(true);
+        const auto bytes = bytesOf(1.0);
+        ASSERT_TRUE(injector.deliver(bytes.data(), static_cast<std::uint32_t>(bytes.size()), 1));
+        injector.deliverUntil(1 + age, 1.0);
+        component.loop_clock.time_ns = 100;
+        component.setTime(100);
+        ASSERT_TRUE(injector.adopt(component.loop_clock));
+        EXPECT_NE(injector.front()->stamp, 0);
+        EXPECT_EQ(100 - timeOf(injector.front()->stamp), age);
+        backlog->enter(100);
+        EXPECT_EQ(queue.age(), age);
+    }
 }
 
 TEST(Injector, RejectsInvalidMessagesAndKeepsTheLastOne) {
