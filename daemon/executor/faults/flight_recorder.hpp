@@ -146,4 +146,20 @@ inline FlightRecorder::RealtimeNotes FlightRecorder::realtimeNotes() noexcept {
     return RealtimeNotes(page_);
 }
 
+/// Notes a hook of the real-time thread other than update() while it runs. Real-time safe.
+class RealtimeHookNote {
+   public:
+    RealtimeHookNote(const FlightRecorder::RealtimeNotes& notes, std::uint32_t slot,
+                     Hook hook) noexcept
+        : notes_(notes) {
+        notes_.enterHook(slot, hook);
+    }
+    ~RealtimeHookNote() { notes_.leaveHook(); }
+    RealtimeHookNote(const RealtimeHookNote&) = delete;
+    RealtimeHookNote& operator=(const RealtimeHookNote&) = delete;
+
+   private:
+    const FlightRecorder::RealtimeNotes& notes_;
+};
+
 }  // namespace rtcf::executor

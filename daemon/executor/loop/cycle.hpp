@@ -12,6 +12,7 @@
 #include "faults/flight_recorder.hpp"
 #include "frames/cycle_record.hpp"
 #include "frames/frame_ring.hpp"
+#include "loop/adoption.hpp"
 #include "loop/boundary.hpp"
 #include "loop/faults.hpp"
 #include "loop/schedule.hpp"

@@ -14,6 +14,7 @@
 #include <string>
 
 #include "faults/flight_recorder.hpp"
+#include "loop/adoption.hpp"
 #include "loop/cycle.hpp"
 #include "loop/probe.hpp"
 #include "loop/schedule.hpp"

@@ -10,6 +10,7 @@
 
 #include "bridge/bridge.hpp"
 #include "graph/graph.hpp"
+#include "loop/adoption.hpp"
 #include "loop/schedule.hpp"
 #include "ordering/wiring.hpp"
 
