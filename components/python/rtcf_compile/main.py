@@ -44,9 +44,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         classes = _classes(args.sources)
         # Importing numba takes a second: import it only after the cheap checks.
         from rtcf_compile.library import build, log_text
-        from rtcf_compile.machine_code import lowering
+        from rtcf_compile.machine_code import object_file
 
-        compiled = [lowering.compile_component(each) for each in classes]
+        compiled = [object_file.compile_component(each) for each in classes]
         for each in compiled:
             log_text.check(each.logs)
         if args.verify is not None and not _verified(classes, compiled, args):

@@ -31,11 +31,11 @@ from rtcf.component.interpreter import QueuePort
 from rtcf.component.value_type import ValueType
 
 from rtcf_compile.comparison.inside import Inside
-from rtcf_compile.machine_code.lowering import Compiled
+from rtcf_compile.machine_code.object_file import Compiled
 from rtcf_compile.rewriting import operators
+from rtcf_compile.rewriting.common_rewriting import CommonRewriting
 from rtcf_compile.rewriting.functions import HELPERS, drop_types, operator_functions
 from rtcf_compile.rewriting.functions import made as made_of
-from rtcf_compile.rewriting.products import Products
 from rtcf_compile.source.mistake import display, source_line
 from rtcf_compile.source.modules import Source, is_own, read
 from rtcf_compile.source.processor_time import HOOK_S, TimeLimitError, loop_line
@@ -491,11 +491,11 @@ def _with_helpers(
     if function in known:
         return known[function]
     source = read(function)
-    products = Products(source, operator_functions(function, narrow) | operators.COMPARED)
+    rewriting = CommonRewriting(source, operator_functions(function, narrow) | operators.COMPARED)
     tree = source.tree
-    tree.body = products.statements(tree.body)
+    tree.body = rewriting.statements(tree.body)
     drop_types(tree)
-    scope = {**function.__globals__, **HELPERS, **products.constants}
+    scope = {**function.__globals__, **HELPERS, **rewriting.constants}
     for name, value in scope.items():
         if isinstance(value, type) and copies and value in copies:
             scope[name] = copies[value]

@@ -13,9 +13,9 @@ from rtcf.component import Component, Fault
 from rtcf.component.declaration import HOOKS, REALTIME_HOOKS, Description
 
 from rtcf_compile.rewriting import helpers, numpy_functions, operators
+from rtcf_compile.rewriting.common_rewriting import ARENA, CommonRewriting
 from rtcf_compile.rewriting.logs import Logs
 from rtcf_compile.rewriting.methods import Method, Methods
-from rtcf_compile.rewriting.products import ARENA, Products
 from rtcf_compile.rewriting.rewrite import Hook
 from rtcf_compile.source.checks import check, resolve
 from rtcf_compile.source.mistake import Mistake, at, written
@@ -185,18 +185,18 @@ class Functions:
         if self._making:
             self._calls.setdefault(self._making[-1], set()).add(function)
 
-    def _note_calls(self, products: Products) -> None:
-        file = products.source.file
-        for node in products.others:
+    def _note_calls(self, rewriting: CommonRewriting) -> None:
+        file = rewriting.source.file
+        for node in rewriting.others:
             self.other_calls.append(
                 (file, node.lineno, written(file, node), written(file, node.func))
             )
-        self._note_large(products)
+        self._note_large(rewriting)
 
-    def _note_large(self, products: Products) -> None:
-        for node in products.large:
-            self._large[products.source.function] = at(
-                products.source.file,
+    def _note_large(self, rewriting: CommonRewriting) -> None:
+        for node in rewriting.large:
+            self._large[rewriting.source.function] = at(
+                rewriting.source.file,
                 node,
                 f"is larger than the memory for temporary arrays, {ARENA // 1024} KiB",
                 "declare a State, or make it smaller",
@@ -219,11 +219,11 @@ class Functions:
         source = read(function)
         self._begin(function, source)
         check(source)
-        products = Products(source, operator_functions(function, self._narrow))
-        source.tree.body = products.statements(source.tree.body)
+        rewriting = CommonRewriting(source, operator_functions(function, self._narrow))
+        source.tree.body = rewriting.statements(source.tree.body)
         drop_types(source.tree)
-        self._note_calls(products)
-        plain = made(source.tree, self._scope(source, source.tree, products.constants), source)
+        self._note_calls(rewriting)
+        plain = made(source.tree, self._scope(source, source.tree, rewriting.constants), source)
         own = self._compiler(plain)
         self._making.pop()
         self._made[function] = own

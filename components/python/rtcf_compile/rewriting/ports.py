@@ -12,8 +12,8 @@ from rtcf.component.declaration import PORTS, Description, Input, Member, Output
 from rtcf.component.message_type import MessageType
 from rtcf.component.value_type import ValueType
 
+from rtcf_compile.rewriting.common_rewriting import CommonRewriting, call_of, like, loaded
 from rtcf_compile.rewriting.operators import is_narrow
-from rtcf_compile.rewriting.products import Products, call_of, like, loaded
 from rtcf_compile.source.checks import check_index
 from rtcf_compile.source.modules import Source
 
@@ -22,13 +22,13 @@ _INPUT_FIELDS["connected"] = "__connected"
 _QUEUE_FIELDS = {"size": "__count", "dropped": "__dropped", "connected": "__connected"}
 
 
-class Ports(Products):
+class Ports(CommonRewriting):
     """Replaces ports by fields of the record."""
 
     def __init__(
         self, source: Source, description: Description, functions: frozenset[type[ast.AST]]
     ) -> None:
-        """Rewrite a method of a class with these members; see Products."""
+        """Rewrite a method of a class with these members; see CommonRewriting."""
         self._description = description
         self._self = source.tree.args.args[0].arg if source.tree.args.args else ""
         super().__init__(source, functions)

@@ -27,10 +27,10 @@ from rtcf.component.declaration import (
 )
 from rtcf.component.value_type import ValueType
 
+from rtcf_compile.rewriting.common_rewriting import call_of, changed_elements, like, loaded
 from rtcf_compile.rewriting.logs import Logs, with_name
 from rtcf_compile.rewriting.methods import Method, Methods
 from rtcf_compile.rewriting.ports import Ports, a_kind
-from rtcf_compile.rewriting.products import call_of, changed_elements, like, loaded
 from rtcf_compile.source.checks import METHODS, check_arguments, resolve
 from rtcf_compile.source.modules import Source
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rtcf_compile.comparison.inside import Inside
-from rtcf_compile.machine_code.lowering import compile_component
+from rtcf_compile.machine_code.object_file import compile_component
 from rtcf_compile.source.modules import components, load
 
 HEAD = """\

@@ -11,7 +11,7 @@ from unittest import mock
 import pytest
 from crash_traces import find, trace_of
 from daemon_process import BUILD_TREE
-from rtcf_compile.machine_code import lowering, source_lines
+from rtcf_compile.machine_code import object_file, source_lines
 from rtcf_compile.source import modules
 
 COMMAND = BUILD_TREE / "bin" / "rtcf-compile"
@@ -156,7 +156,7 @@ def test_gdb_stops_at_source_lines(source: Path, library: Path) -> None:
 def test_a_stack_trace_includes_the_component(source: Path, tmp_path: Path) -> None:
     cls = modules.components(modules.load(source))[-1]
     files = [tmp_path / f"{i}.o" for i in range(2)]
-    compiled = lowering.compile_component(cls)
+    compiled = object_file.compile_component(cls)
     for file, content in zip(files, compiled.objects, strict=True):
         file.write_bytes(content)
     (tmp_path / "logged.cpp").write_text(LOGGED)
@@ -180,7 +180,7 @@ def test_the_machine_code_is_the_same_as_without_lines(source: Path, tmp_path: P
 
     def listings() -> list[str]:
         found = []
-        for content in lowering.compile_component(cls).objects:
+        for content in object_file.compile_component(cls).objects:
             (tmp_path / "one.o").write_bytes(content)
             found.append(run("objdump", "-d", "-r", tmp_path / "one.o"))
         return found
@@ -229,7 +229,7 @@ def test_lines_of_faults_are_correct_with_mapped_paths(
     (cls,) = modules.components(modules.load(source))
 
     def faults() -> set[tuple[str, int, str]]:
-        raises = lowering.compile_component(cls).raises.values()
+        raises = object_file.compile_component(cls).raises.values()
         return {(each.file, each.line, each.text) for each in raises}
 
     plain = faults()

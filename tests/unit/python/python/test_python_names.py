@@ -8,7 +8,7 @@ import pytest
 from daemon_process import BUILD_TREE
 from rtcf.component import DeclarationError
 from rtcf_compile.comparison import verify
-from rtcf_compile.machine_code import lowering
+from rtcf_compile.machine_code import object_file
 from rtcf_compile.source import modules
 from rtcf_compile.source.mistake import Mistake
 
@@ -114,8 +114,8 @@ class {name}(Component):
 """
 
 
-def compiled(file: Path) -> list[lowering.Compiled]:
-    return [lowering.compile_component(each) for each in modules.components(modules.load(file))]
+def compiled(file: Path) -> list[object_file.Compiled]:
+    return [object_file.compile_component(each) for each in modules.components(modules.load(file))]
 
 
 def written(tmp_path: Path, source: str, name: str = "source") -> Path:
@@ -216,7 +216,7 @@ def test_similar_names_of_classes_and_methods_do_not_collide(tmp_path: Path) -> 
     classes = modules.components(modules.load(file))
     assert [each.__name__ for each in classes] == ["A", "A_update", "log_A"]
     for cls in classes:
-        found = verify.compare(cls, lowering.compile_component(cls), 3, 1)
+        found = verify.compare(cls, object_file.compile_component(cls), 3, 1)
         assert found.differences == []
     assert compile_to(tmp_path / "lib.so", file).stderr == ""
 

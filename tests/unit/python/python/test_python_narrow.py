@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from rtcf_compile.comparison import verify
 from rtcf_compile.comparison.inside import Inside
-from rtcf_compile.machine_code import lowering
+from rtcf_compile.machine_code import object_file
 from rtcf_compile.source import modules
 from rtcf_compile.source.mistake import Mistake
 
@@ -220,7 +220,7 @@ def test_numbers_of_other_types_match_numpy(begin: int, tmp_path: Path) -> None:
     ways = [*VALUES, *STEPS][begin : begin + TOGETHER]
     ways = [_set(each, tmp_path) if each in VALUES else each for each in ways]
     cls = _component(tmp_path, ways)
-    compiled = lowering.compile_component(cls)
+    compiled = object_file.compile_component(cls)
     inside = Inside(compiled)
     draw = np.random.default_rng(1)
     for which in [*range(len(ways))] * 20:
@@ -241,7 +241,7 @@ def test_numbers_of_other_types_match_numpy(begin: int, tmp_path: Path) -> None:
 def test_expressions_on_which_numpy_releases_differ_are_rejected(text: str, tmp_path: Path) -> None:
     cls = _component(tmp_path, [f"value = {text}\nself.counts[0] += 1"])
     with pytest.raises(Mistake, match=REFUSED[text]) as raised:
-        lowering.compile_component(cls)
+        object_file.compile_component(cls)
     assert raised.value.text in (f"value = {text}", text)
 
 
@@ -249,13 +249,13 @@ def test_expressions_on_which_numpy_releases_differ_are_rejected(text: str, tmp_
 def test_an_assignment_that_numpy_rejects_is_rejected(text: str, tmp_path: Path) -> None:
     cls = _component(tmp_path, [text])
     with pytest.raises(Mistake, match=REFUSED_STEPS[text]) as raised:
-        lowering.compile_component(cls)
+        object_file.compile_component(cls)
     assert raised.value.text == text.split("\n")[-1]
 
 
 def test_a_number_that_does_not_fit_is_a_fault(tmp_path: Path) -> None:
     cls = _component(tmp_path, list(FAULTS))
-    inside = Inside(lowering.compile_component(cls))
+    inside = Inside(object_file.compile_component(cls))
     for which, words in enumerate(FAULTS.values()):
         for n, fits in ((7, True), (255, True), (256, False), (-1, False)):
             record = cls()._record
@@ -270,7 +270,7 @@ def test_a_uint64_beyond_int64_is_a_fault(tmp_path: Path) -> None:
     file = tmp_path / "tried.py"
     file.write_text(f"{source}\n    def update(self):\n        self.out[0] = self.t.value >> 1\n")
     (cls,) = modules.components(modules.load(file))
-    inside = Inside(lowering.compile_component(cls))
+    inside = Inside(object_file.compile_component(cls))
     component: Any = cls()
     component.t.put(2**63 - 1)
     record = component._record.copy()
@@ -321,7 +321,7 @@ def test_sums_of_any_length_match_numpy(tmp_path: Path) -> None:
     file = tmp_path / "sums.py"
     file.write_text(SUMS)
     (cls,) = modules.components(modules.load(file))
-    inside = Inside(lowering.compile_component(cls))
+    inside = Inside(object_file.compile_component(cls))
     draw = np.random.default_rng(1)
     for n in (*range(1, 40), 127, 128, 129, 136, 255, 256, 257, 300, 511, 513, 640, 700):
         for step in (1, 3):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rtcf_compile.comparison import verify
 from rtcf_compile.comparison.inside import Inside
-from rtcf_compile.machine_code import lowering
+from rtcf_compile.machine_code import object_file
 from rtcf_compile.source import modules
 from rtcf_compile.source.mistake import Mistake
 
@@ -54,7 +54,7 @@ def inside(tmp_path_factory: pytest.TempPathFactory) -> Any:
     file = tmp_path_factory.mktemp("numbers") / "numbers.py"
     file.write_text("\n".join(lines) + "\n")
     (cls,) = modules.components(modules.load(file))
-    return cls, Inside(lowering.compile_component(cls))
+    return cls, Inside(object_file.compile_component(cls))
 
 
 def by_python(text: str, x: float, y: float, n: int) -> Any:
@@ -125,7 +125,7 @@ def test_powers_of_arrays_match_numpy(tmp_path: Path) -> None:
     file = tmp_path / "powers.py"
     file.write_text("\n".join(lines) + "\n")
     (cls,) = modules.components(modules.load(file))
-    compiled = Inside(lowering.compile_component(cls))
+    compiled = Inside(object_file.compile_component(cls))
     for number, text in enumerate(OF_ARRAYS):
         for numbers in ((0, 0, 0), (0, 1, 2), (3, -2, 0), (-1, -3, 5)):
             component = cls()
@@ -147,7 +147,7 @@ def test_a_bound_of_nan_gives_nan_compiled_and_interpreted(tmp_path: Path) -> No
     file.write_text(ARRAYS + "        self.out[:] = np.clip(self.a, self.low.value, 1.0)\n"
                     "        self.out[0] = np.clip(0.5, -1.0, self.high.value)\n")  # fmt: skip
     (cls,) = modules.components(modules.load(file))
-    compiled = lowering.compile_component(cls)
+    compiled = object_file.compile_component(cls)
     component: Any = cls()
     component.low.put(math.nan)
     component.high.put(math.nan)
@@ -171,7 +171,7 @@ def test_sums_of_unsigned_ints_are_ints(tmp_path: Path) -> None:
     component.small.put(np.array([255, 255, 255, 255], np.uint8))
     component.table.put(np.full((3, 2), 2**32 - 1, np.uint32))
     record = component._record.copy()
-    assert Inside(lowering.compile_component(cls)).call("update", record) is None
+    assert Inside(object_file.compile_component(cls)).call("update", record) is None
     component.update()
     for name in ("k", "out"):
         assert np.array_equal(record[name], component._record[name])
@@ -231,7 +231,7 @@ def shifts(tmp_path_factory: pytest.TempPathFactory) -> Any:
     file = tmp_path_factory.mktemp("shifts") / "shifts.py"
     file.write_text("\n".join(lines) + "\n")
     (cls,) = modules.components(modules.load(file))
-    return cls, Inside(lowering.compile_component(cls)), steps
+    return cls, Inside(object_file.compile_component(cls)), steps
 
 
 COUNTS = (0, 1, 7, 8, 62, 63, 64, 65, 127, 128, 1000, -1, -64)
@@ -398,7 +398,7 @@ def _class(folder: Path, ways: list[str]) -> Any:
 @pytest.mark.parametrize("ways", [WITH_BOOLS, SMALL], ids=["bools", "small ints"])
 def test_numbers_match_python(ways: list[str], tmp_path: Path) -> None:
     cls = _class(tmp_path, ways)
-    compiled = Inside(lowering.compile_component(cls))
+    compiled = Inside(object_file.compile_component(cls))
     draw = np.random.default_rng(1)
     for which in [*range(len(ways))] * 8:
         component: Any = cls()
@@ -421,7 +421,7 @@ def test_numbers_match_python(ways: list[str], tmp_path: Path) -> None:
 def test_results_that_differ_from_python_are_rejected(way: str, tmp_path: Path) -> None:
     cls = _class(tmp_path, [way])
     with pytest.raises(Mistake, match={**REFUSED_BOOLS, **LARGE}[way]) as raised:
-        lowering.compile_component(cls)
+        object_file.compile_component(cls)
     text = (tmp_path / "tried.py").read_text().splitlines()
     marked = next((i for i, line in enumerate(text, 1) if line.endswith("# here")), 0)
     first = text.index("    def way_0(self):") + 4
@@ -478,7 +478,7 @@ def test_single_numbers_are_not_divided_by_zero(tmp_path: Path) -> None:
     file = tmp_path / "divisions.py"
     file.write_text("\n".join(lines) + "\n")
     (cls,) = modules.components(modules.load(file))
-    compiled = Inside(lowering.compile_component(cls))
+    compiled = Inside(object_file.compile_component(cls))
     for which, text in enumerate(DIVIDING):
         for y, m, on in ((0.0, 0, False), (-0.0, 0, False), (0.75, -3, True)):
             component: Any = cls()
@@ -541,7 +541,7 @@ def test_arrays_of_ints_are_divided_as_by_numpy(tmp_path: Path) -> None:
     record = cls()._record
     for kind_name, pairs, _ in steps:
         record[f"a_{kind_name}"], record[f"b_{kind_name}"] = pairs[:, 0], pairs[:, 1]
-    assert Inside(lowering.compile_component(cls)).call("update", record) is None
+    assert Inside(object_file.compile_component(cls)).call("update", record) is None
     for kind_name, pairs, texts in steps:
         for found, text in zip(record[f"out_{kind_name}"], texts, strict=True):
             names = {"a": pairs[:, 0], "b": pairs[:, 1], "np": np}

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from rtcf_compile.comparison import verify
 from rtcf_compile.comparison.inside import Inside
-from rtcf_compile.machine_code import lowering
+from rtcf_compile.machine_code import object_file
 from rtcf_compile.source import modules
 from rtcf_compile.source.mistake import Mistake
 
@@ -87,7 +87,7 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Any]:
     file: Path = tmp_path_factory.mktemp("order") / "order.py"
     file.write_text("".join(lines))
     (cls,) = modules.components(modules.load(file))
-    return cls, lowering.compile_component(cls)
+    return cls, object_file.compile_component(cls)
 
 
 @pytest.mark.parametrize("text", STATEMENTS)
@@ -127,7 +127,7 @@ def test_statements_needing_another_order_are_rejected(
     file.write_text(f"{HEAD}        {text}\n")
     (cls,) = modules.components(modules.load(file))
     with pytest.raises(Mistake, match=remedy):
-        lowering.compile_component(cls)
+        object_file.compile_component(cls)
 
 
 @pytest.mark.parametrize(
@@ -141,4 +141,4 @@ def test_unchanged_members_may_be_read_in_any_order(text: str, tmp_path: Path) -
     file = tmp_path / "order.py"
     file.write_text(f"{HEAD}        {text}\n")
     (cls,) = modules.components(modules.load(file))
-    assert verify.compare(cls, lowering.compile_component(cls), 50).differences == []
+    assert verify.compare(cls, object_file.compile_component(cls), 50).differences == []

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from rtcf_compile.comparison import verify
 from rtcf_compile.comparison.inside import Inside
-from rtcf_compile.machine_code import lowering
+from rtcf_compile.machine_code import object_file
 from rtcf_compile.source import modules
 
 SIZE = 8
@@ -58,14 +58,14 @@ def test_rows_are_assigned_from_columns_as_in_numpy(tmp_path: Path) -> None:
     file = tmp_path / "rows.py"
     file.write_text(ROWS)
     (cls,) = modules.components(modules.load(file))
-    assert verify.compare(cls, lowering.compile_component(cls), 300).differences == []
+    assert verify.compare(cls, object_file.compile_component(cls), 300).differences == []
 
 
 def test_overlapping_slices_are_assigned_as_in_numpy(tmp_path: Path) -> None:
     file = tmp_path / "overlap.py"
     file.write_text(SOURCE)
     (cls,) = modules.components(modules.load(file))
-    inside = Inside(lowering.compile_component(cls))
+    inside = Inside(object_file.compile_component(cls))
     interpreted: Any = cls()
     values = np.arange(1.0, SIZE + 1.0)
     sizes = {part: len(values[slice(*part)]) for part in PARTS}

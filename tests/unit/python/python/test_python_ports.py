@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 from rtcf_compile.comparison.inside import Inside
-from rtcf_compile.machine_code import lowering
+from rtcf_compile.machine_code import object_file
 from rtcf_compile.source import modules
 
 # Sizes copied element by element, and sizes copied as a whole.
@@ -55,7 +55,7 @@ def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Inside]:
     file: Path = tmp_path_factory.mktemp("ports") / "ports.py"
     file.write_text(SOURCE.format(declarations=DECLARATIONS, writes=WRITES))
     (cls,) = modules.components(modules.load(file))
-    return cls(), Inside(lowering.compile_component(cls))
+    return cls(), Inside(object_file.compile_component(cls))
 
 
 def test_elements_keep_their_positions(both: tuple[Any, Inside]) -> None:

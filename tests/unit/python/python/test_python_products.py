@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 import pytest
 from rtcf_compile.comparison.inside import Inside
-from rtcf_compile.machine_code import lowering
+from rtcf_compile.machine_code import object_file
 from rtcf_compile.rewriting.helpers import rtcf_matmul
 from rtcf_compile.source import modules
 
-# Products of a (15 x 11), b (11 x 15), v (11), w (15), all of float64, and of other types.
+# CommonRewriting of a (15 x 11), b (11 x 15), v (11), w (15), all of float64, and of other types.
 PRODUCTS = [
     *("a @ v", "w @ a", "a @ b", "a.T @ w", "v @ a.T", "a @ a.T", "b.T @ b", "b.T @ a.T"),
     *("a[:, ::2] @ v[::2]", "w[::-1] @ a[:, 1:8]", "a[2:9] @ b[:, 3:8]", "a @ b[:, ::3]"),
@@ -30,7 +30,7 @@ import numpy as np
 from rtcf.component import Component, State
 
 
-class Products(Component):
+class CommonRewriting(Component):
     which: State[int]
     a: State[np.float64, 15, 11]
     b: State[np.float64, 11, 15]
@@ -74,7 +74,7 @@ def inside(tmp_path_factory: pytest.TempPathFactory) -> Any:
     file = tmp_path_factory.mktemp("products") / "products.py"
     file.write_text("\n".join(lines) + "\n")
     (cls,) = modules.components(modules.load(file))
-    return cls, Inside(lowering.compile_component(cls))
+    return cls, Inside(object_file.compile_component(cls))
 
 
 @pytest.mark.parametrize("text", PRODUCTS)

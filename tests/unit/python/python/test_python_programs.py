@@ -11,7 +11,7 @@ from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from programs import Program, module
 from rtcf_compile.comparison import verify
-from rtcf_compile.machine_code import lowering
+from rtcf_compile.machine_code import object_file
 from rtcf_compile.source import modules
 
 TOGETHER = 25  # programs per component
@@ -24,7 +24,7 @@ def same(seed: int, folder: Path) -> None:
     file = folder / f"programs_{seed}.py"
     file.write_text(module({number: Program(draw) for number in range(TOGETHER)}))
     (cls,) = modules.components(modules.load(file))
-    found = verify.compare(cls, lowering.compile_component(cls), TOGETHER * TIMES, seed)
+    found = verify.compare(cls, object_file.compile_component(cls), TOGETHER * TIMES, seed)
     assert found.cycles == TOGETHER * TIMES
     assert found.differences == [], f"seed {seed}: {found}"
 

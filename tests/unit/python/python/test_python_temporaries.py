@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rtcf_compile.comparison import verify
 from rtcf_compile.comparison.inside import Inside
-from rtcf_compile.machine_code import lowering
+from rtcf_compile.machine_code import object_file
 from rtcf_compile.source import modules
 
 HEAD = """\
@@ -100,13 +100,13 @@ def component(folder: Path, body: str) -> Any:
 @pytest.mark.parametrize("body", BODIES.values(), ids=BODIES)
 def test_temporaries_match_the_interpreter(body: str, tmp_path: Path) -> None:
     cls = component(tmp_path, body)
-    found = verify.compare(cls, lowering.compile_component(cls), 2000)
+    found = verify.compare(cls, object_file.compile_component(cls), 2000)
     assert found.differences == []
 
 
 def test_arrays_of_constant_size_do_not_use_the_arena(tmp_path: Path) -> None:
     cls = component(tmp_path, BODIES["parts of others"])
-    inside = Inside(lowering.compile_component(cls, arena_bytes=128))
+    inside = Inside(object_file.compile_component(cls, arena_bytes=128))
     record = cls()._record
     record["a"], record["b"] = (1.0, 2.0, 3.0), (4.0, 5.0, 6.0)
     assert inside.call("update", record) is None

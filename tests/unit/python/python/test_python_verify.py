@@ -12,7 +12,7 @@ import pytest
 from pages import TREE
 from rtcf_compile import main
 from rtcf_compile.comparison import inside, verify, watched
-from rtcf_compile.machine_code import lowering
+from rtcf_compile.machine_code import object_file
 from rtcf_compile.rewriting.functions import HELPERS
 from rtcf_compile.source import modules as source
 
@@ -29,20 +29,22 @@ CLASSES = {
 
 
 @pytest.fixture(scope="module")
-def compiled() -> dict[str, lowering.Compiled]:
+def compiled() -> dict[str, object_file.Compiled]:
     """Cache compiled components."""
     return {}
 
 
-def compared(name: str, compiled: dict[str, lowering.Compiled], cycles: int) -> verify.Comparison:
+def compared(
+    name: str, compiled: dict[str, object_file.Compiled], cycles: int
+) -> verify.Comparison:
     if name not in compiled:
-        compiled[name] = lowering.compile_component(CLASSES[name])
+        compiled[name] = object_file.compile_component(CLASSES[name])
     return verify.compare(CLASSES[name], compiled[name], cycles)
 
 
 @pytest.mark.parametrize("name", CLASSES)
 def test_machine_code_and_interpreter_agree(
-    name: str, compiled: dict[str, lowering.Compiled]
+    name: str, compiled: dict[str, object_file.Compiled]
 ) -> None:
     found = compared(name, compiled, 10_000)
     assert found.differences == []
@@ -53,7 +55,7 @@ def test_machine_code_and_interpreter_agree(
 @pytest.mark.long
 @pytest.mark.parametrize("name", CLASSES)
 def test_they_agree_over_a_million_cycles(
-    name: str, compiled: dict[str, lowering.Compiled]
+    name: str, compiled: dict[str, object_file.Compiled]
 ) -> None:
     assert compared(name, compiled, 1_000_000).differences == []
 
@@ -259,7 +261,7 @@ def test_an_endless_hook_is_reported_with_its_loop(
 def test_an_endless_loop_does_not_block_compiling(tmp_path: Path) -> None:
     # Compiling runs some cycles in the interpreter, too.
     (tried,) = source.components(source.load(Path(written(tmp_path, ENDLESS_PREPARE))))
-    assert lowering.compile_component(tried).hooks == ["prepare", "update"]
+    assert object_file.compile_component(tried).hooks == ["prepare", "update"]
 
 
 def test_seconds_are_processor_time_after_the_minimum_of_cycles(
@@ -286,7 +288,7 @@ def test_a_crash_of_compiled_code_is_reported(monkeypatch: pytest.MonkeyPatch) -
         os.kill(os.getpid(), signal.SIGKILL)
 
     monkeypatch.setattr(inside.Inside, "call", die)
-    ramp = lowering.compile_component(CLASSES["Ramp"])
+    ramp = object_file.compile_component(CLASSES["Ramp"])
     (found,) = watched.compare_all([CLASSES["Ramp"]], [ramp], watched.Amount(cycles=10))
     assert found.differences == ["update, cycle 0: SIGKILL compiled, none in the interpreter"]
 

@@ -36,9 +36,9 @@ from rtcf_compile.machine_code import (
 )
 from rtcf_compile.machine_code.raises import Raise, raises_in
 from rtcf_compile.rewriting import log_calls
+from rtcf_compile.rewriting.common_rewriting import ARENA
 from rtcf_compile.rewriting.functions import Compiler, Functions
 from rtcf_compile.rewriting.logs import Logs
-from rtcf_compile.rewriting.products import ARENA
 from rtcf_compile.source.mistake import Mistake
 
 warnings.filterwarnings("ignore", category=errors.NumbaWarning)

@@ -35,7 +35,7 @@ _DTYPES = {float: np.float64, int: np.int64, bool: np.bool_}
 _TYPED = {np.zeros: 1, np.ones: 1, np.empty: 1, np.full: 2, np.zeros_like: 1, np.ones_like: 1}
 
 
-class Products(ast.NodeTransformer):
+class CommonRewriting(ast.NodeTransformer):
     """Replaces `@`, np.linalg and assignment to slices by calls of helpers."""
 
     def __init__(
