@@ -28,7 +28,7 @@ from rtcfd.configuration import options
 from rtcfd.executor import left_over
 from rtcfd.executor.command import ExecutorCommand, claims_folder_of_user
 from rtcfd.executor.link import MAX_MESSAGE
-from rtcfd.incidents.incidents import Incidents
+from rtcfd.incidents.incident_files import Incidents
 from rtcfd.notify import Notify, machine_goes_down
 from rtcfd.operations.runner_core import SharedContext
 from rtcfd.reload import Reloads

@@ -30,8 +30,8 @@ from rtcfd.common.limits import Limits
 from rtcfd.executor import executor, left_over
 from rtcfd.executor.command import ExecutorCommand
 from rtcfd.executor.link import Link
-from rtcfd.executor.process import End
-from rtcfd.incidents.incidents import Incidents
+from rtcfd.executor.watched_process import End
+from rtcfd.incidents.incident_files import Incidents
 from rtcfd.operations.runner_core import SharedContext
 from rtcfd.runners.runner_leases import await_holder
 from rtcfd.runners.runners import Runners

@@ -19,7 +19,7 @@ from rtcfd.common import regular_files
 from rtcfd.common.background import WorkerThreads
 from rtcfd.common.errors import RequestError
 from rtcfd.executor.command import ExecutorCommand
-from rtcfd.executor.process import describe_exit
+from rtcfd.executor.watched_process import describe_exit
 
 TIMEOUT_S = 10.0
 FAILURE_KEPT_S = 5.0

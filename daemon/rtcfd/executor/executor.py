@@ -36,7 +36,7 @@ from rtcfd.executor.link import (
     Progress,
     Unasked,
 )
-from rtcfd.executor.process import Child, End, Process
+from rtcfd.executor.watched_process import Child, End, Process
 
 log = logging.getLogger(__name__)
 

@@ -26,8 +26,8 @@ from rtcfd.executor.command import ExecutorCommand
 from rtcfd.executor.executor import CONNECT_TIMEOUT_S, QUERY_TIMEOUT_S, Executor
 from rtcfd.executor.link import OnAnswer, OnPorts, Progress
 from rtcfd.executor.notifications import logger_of
-from rtcfd.executor.process import End
-from rtcfd.incidents.incidents import Incidents
+from rtcfd.executor.watched_process import End
+from rtcfd.incidents.incident_files import Incidents
 from rtcfd.operations.loaded_code import LoadedCode
 from rtcfd.operations.loop_counters import LoopCounters
 from rtcfd.operations.loop_state import LoopState

@@ -1,11 +1,10 @@
 """Brings up a runner's executor with its graph.
 
 If the executor is adopted, the desired state follows it; a new executor gets the desired
-graph; after a crash, the graph without the culprit.  Functions on a RunnerCore; each runs
-in a turn of it, except recover().
+graph, without the components that crash.py left out.  Functions on a RunnerCore; each runs in a
+turn of it.
 """
 
-import time
 from collections.abc import Container, Iterable
 
 from rtcf.executor.v1 import executor_pb2 as wire
@@ -18,7 +17,6 @@ from rtcfd.common.errors import FailedPrecondition, InvalidArgument, RequestErro
 from rtcfd.operations.loop import start_in_turn
 from rtcfd.operations.runner_core import RunnerCore
 from rtcfd.recovery.follow import follow_components, follow_settings
-from rtcfd.recovery.verdict import MOST_ATTEMPTS, MOST_CRASHES, WINDOW_S, Crashes, Verdict
 
 _WORDS = {
     runner_pb2.RUNNER_STATE_STOPPED: "stopped",
@@ -165,51 +163,9 @@ async def _start_at_boot(runner: RunnerCore, asked: int, agreed: set[str]) -> No
         await runner.save()
 
 
-async def recover(runner: RunnerCore, verdict: Verdict, crashes: Crashes, cause: str) -> None:
-    """Start a new executor after an unexpected end, with the graph without the culprit.
-
-    `cause` is the cause of the end, for messages.
-    """
-    begin = time.monotonic()
-    asked = runner.loop.stops
-
-    async def work() -> None:
-        # First of all, so that the culprit is not loaded again even if rtcfd dies now.
-        await runner.save()
-        if runner.up or runner.closing:
-            return
-        if crashes.recent >= MOST_ATTEMPTS:
-            _give_up(runner, f"{cause}, the last of {crashes.recent} in {WINDOW_S:g} s")
-            return
-        agreed = {*runner.desired.left_out, verdict.culprit}
-        await bring_up(runner)
-        if not runner.up:
-            return  # the new executor died too, and its own recovery follows
-        not_resumed = ""
-        missing = _missing(runner, agreed)
-        if runner.loop.wanted and missing:
-            not_resumed = f"; not resumed: left out of its loop: {listing(missing)}"
-            runner.loop.want(False)
-            await runner.save()
-        elif runner.loop.wanted:
-            try:
-                await start_in_turn(runner, asked)
-            except RequestError as error:
-                not_resumed = f"; not resumed: {error}"
-        runner.loop.held = _held(runner, verdict, cause) + not_resumed
-        took = time.monotonic() - begin
-        runner.log.warning("executor restarted in %.2f s: %s", took, runner.loop.held)
-
-    try:
-        await runner.change("the recovery of its executor", work)
-    except RequestError as error:
-        if not runner.up and not runner.closing:
-            _give_up(runner, f"{cause}; not recovered: {error}")
-
-
 def require_whole(runner: RunnerCore, agreed: Container[str]) -> None:
     """Raise FailedPrecondition if a left-out component is neither optional nor in `agreed`."""
-    missing = _missing(runner, agreed)
+    missing = missing_parts(runner, agreed)
     if not missing:
         return
     first = missing[0]
@@ -224,46 +180,14 @@ def require_whole(runner: RunnerCore, agreed: Container[str]) -> None:
     )
 
 
-def _missing(runner: RunnerCore, agreed: Container[str]) -> list[str]:
+def missing_parts(runner: RunnerCore, agreed: Container[str]) -> list[str]:
+    """Return the left-out components that are neither optional nor in `agreed`."""
     components = runner.desired.components
     return [
         name
         for name in sorted(runner.desired.left_out)
         if name in components and not components[name].optional and name not in agreed
     ]
-
-
-def _give_up(runner: RunnerCore, cause: str) -> None:
-    """Report why there is no executor; rtcfd starts no other on its own."""
-    runner.down_reason = f"{cause}; `rtcfctl -r {runner.name} start` tries again"
-    runner.log.error("%s", runner.down_reason)
-    runner.notify_change()
-
-
-def resumes(runner: RunnerCore, verdict: Verdict, crashes: Crashes) -> bool:
-    """Return whether a loop that ran resumes without the culprit."""
-    culprit = runner.desired.components.get(verdict.culprit)
-    return (
-        runner.settings().on_crash == runner_pb2.ON_CRASH_RESUME
-        and culprit is not None
-        and bool(culprit.optional)
-        and crashes.recent <= MOST_CRASHES
-    )
-
-
-def _held(runner: RunnerCore, verdict: Verdict, cause: str) -> str:
-    """Return the text of the status after a recovery."""
-    name, culprit = runner.name, verdict.culprit
-    if culprit not in runner.desired.quarantined:
-        loop = "its loop goes on" if runner.loop.running else f"held: `rtcfctl -r {name} start`"
-        return f"{cause}; {loop} with all its components"
-    again = f"`rtcfctl -r {name} release {culprit}` loads again"
-    if runner.loop.running:
-        return f"{cause}; its loop goes on without {culprit}, which {again}"
-    spec = runner.desired.components.get(culprit)
-    agreed = "" if spec is None or spec.optional else f" --without {culprit}"
-    start = f"`rtcfctl -r {name} start{agreed}`"
-    return f"{cause}; held: {start} runs it without {culprit}, which {again}"
 
 
 async def _settle(runner: RunnerCore) -> None:

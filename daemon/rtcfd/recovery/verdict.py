@@ -10,7 +10,7 @@ from collections import deque
 from dataclasses import dataclass, replace
 
 from rtcfd.executor.flight_recorder import Note, Thread
-from rtcfd.executor.process import End, describe_signal
+from rtcfd.executor.watched_process import End, describe_signal
 
 # After more than MOST_CRASHES deaths in WINDOW_S the loop is held under any policy; after
 # MOST_ATTEMPTS no new executor is started.

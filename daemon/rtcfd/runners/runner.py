@@ -17,11 +17,12 @@ from rtcfd.common.event_log import NumberedLog
 from rtcfd.executor.command import settings_error
 from rtcfd.executor.executor import Executor
 from rtcfd.executor.notifications import Notifications
-from rtcfd.executor.process import End
-from rtcfd.operations.incidents import keep
+from rtcfd.executor.watched_process import End
+from rtcfd.operations.keep_incident import keep
 from rtcfd.operations.parameters import follow_ros, note_unanswered
 from rtcfd.operations.runner_core import RunnerCore, SharedContext
-from rtcfd.recovery.bring_up import bring_up, recover, resumes
+from rtcfd.recovery.bring_up import bring_up
+from rtcfd.recovery.crash import recover, resumes
 from rtcfd.recovery.crash_source import report_source
 from rtcfd.recovery.verdict import Crashes, judge
 from rtcfd.runners.component_leases import ComponentLeases

@@ -13,7 +13,7 @@ from rtcfd.common import runner_settings
 from rtcfd.common.errors import AlreadyExists, NotFound, RequestError, Silent, Unavailable
 from rtcfd.common.names import DEFAULT_RUNNER, check_base_name, check_graph, full_name
 from rtcfd.executor.link import Progress
-from rtcfd.incidents.incidents import Incidents
+from rtcfd.incidents.incident_files import Incidents
 from rtcfd.operations import graph
 from rtcfd.operations.operations import Operations
 from rtcfd.operations.runner_core import SharedContext

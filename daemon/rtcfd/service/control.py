@@ -29,7 +29,7 @@ from rtcfd.common.event_log import EventLog
 from rtcfd.common.names import DEFAULT_RUNNER, absolute
 from rtcfd.common.status_codes import abort
 from rtcfd.executor.link import Progress
-from rtcfd.operations import graph, incidents, parameters, snapshots
+from rtcfd.operations import graph, keep_incident, parameters, snapshots
 from rtcfd.operations.loop import stop
 from rtcfd.recovery import cycles
 from rtcfd.runners.component_leases import ComponentLease
@@ -346,7 +346,7 @@ class Control(control_pb2_grpc.ControlServicer):
     @unary
     async def TakeIncident(self, request: incidents_pb2.TakeIncidentRequest) -> Any:
         """Write an incident with the last cycles now."""
-        taken = await incidents.take(self.runners.get(request.runner), request.reason)
+        taken = await keep_incident.take(self.runners.get(request.runner), request.reason)
         return incidents_pb2.TakeIncidentResponse(incident=taken)
 
     @unary

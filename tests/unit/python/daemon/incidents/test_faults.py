@@ -11,7 +11,7 @@ from flight_writer import FlightWriter
 from rtcf import reasons
 from rtcf.v1 import graph_pb2, runner_pb2
 from rtcfd.executor.flight_recorder import FlightRecorder, Note
-from rtcfd.executor.process import End
+from rtcfd.executor.watched_process import End
 from rtcfd.recovery.verdict import judge
 
 

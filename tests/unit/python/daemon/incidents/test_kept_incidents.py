@@ -14,9 +14,9 @@ from daemon_process import DEADLINE_S
 from rtcf.v1 import control_pb2
 from rtcf_shared.mcap_writer import McapWriter
 from rtcfd.common.limits import Limits
-from rtcfd.incidents import frame_file, frame_memory, head, incidents
-from rtcfd.incidents.incidents import Incidents
-from rtcfd.operations.incidents import keep
+from rtcfd.incidents import frame_file, frame_memory, head, incident_files
+from rtcfd.incidents.incident_files import Incidents
+from rtcfd.operations.keep_incident import keep
 from rtcfd_in_process import Rtcfd, until
 
 
@@ -38,7 +38,7 @@ def test_frames_are_copied_while_the_file_of_another_incident_is_written(
         written.append(os.pread(frozen, 100, 0))
         file.write_bytes(b"")
 
-    monkeypatch.setattr(incidents, "_write", slow_write)
+    monkeypatch.setattr(incident_files, "_write", slow_write)
     # The loop continues to fill these frames.
     frames = _frames(b"before")
 
@@ -81,7 +81,7 @@ def held_writing(monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[threading.Ev
         may_write.wait()
         file.write_bytes(b"")
 
-    monkeypatch.setattr(incidents, "_write", held)
+    monkeypatch.setattr(incident_files, "_write", held)
     yield begun, may_write
     may_write.set()
 
@@ -201,7 +201,7 @@ def test_stored_incidents_are_listed_while_another_is_written(
 
     async def play() -> None:
         kept = Incidents(tmp_path / "incidents", Limits)
-        monkeypatch.setattr(incidents, "_write", _written)
+        monkeypatch.setattr(incident_files, "_write", _written)
         first = await kept.keep(_frames(b"one"), {"runner": "one", "time_ns": 1})
 
         def slow_write(frozen: int, file: Path, facts: dict[str, Any]) -> None:
@@ -209,7 +209,7 @@ def test_stored_incidents_are_listed_while_another_is_written(
             may_write.wait()
             _written(frozen, file, facts)
 
-        monkeypatch.setattr(incidents, "_write", slow_write)
+        monkeypatch.setattr(incident_files, "_write", slow_write)
         second = asyncio.create_task(kept.keep(_frames(b"two"), {"runner": "two", "time_ns": 2}))
         try:
             await until(writing.is_set, "the second file")
@@ -229,7 +229,7 @@ def test_stored_incidents_are_listed_while_another_is_written(
 def test_incidents_are_ordered_by_number_not_by_clock(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(incidents, "_write", _written)
+    monkeypatch.setattr(incident_files, "_write", _written)
     hour_ns = 3600 * 10**9
 
     async def play() -> None:
@@ -248,7 +248,7 @@ def test_incidents_are_ordered_by_number_not_by_clock(
         assert await kept.get("") == found[-1]
         # The oldest incident is removed first.
         size = found[-1].bytes
-        incidents._tidy(tmp_path / "incidents", 3 * size, Path(found[-1].file))
+        incident_files._tidy(tmp_path / "incidents", 3 * size, Path(found[-1].file))
         assert [each.sequence for each in await kept.all()] == [4, 5, 6]
 
     asyncio.run(play())
