@@ -7,9 +7,11 @@ thousands of sequences take minutes.
 
 import asyncio
 import contextlib
+import contextvars
 import json
 import logging
 import signal
+import weakref
 from collections.abc import AsyncIterator, Callable, Coroutine
 from pathlib import Path
 from typing import Any
@@ -106,7 +108,8 @@ class PeerProcess:
         self.peer = SlowPeer(runner, machine)
         self._machine, self._socket = machine, socket
         self._ended = asyncio.Event()
-        self._task = asyncio.create_task(self._run())
+        # In an own context: it outlives the rtcfd that starts it.
+        self._task = asyncio.create_task(self._run(), context=contextvars.Context())
 
     async def wait(self) -> End:
         await self._ended.wait()
@@ -119,20 +122,50 @@ class PeerProcess:
         """Stop watching it."""
 
     async def _run(self) -> None:
-        server = await asyncio.start_unix_server(self.peer.serve, self._socket)
-        self._machine.peers[self._socket] = self
         try:
-            await self.peer.end.wait()
+            server = await asyncio.start_unix_server(self.peer.serve, self._socket)
+            self._machine.peers[self._socket] = self
+            try:
+                await self.peer.end.wait()
+            finally:
+                server.close()
+                if self.peer.connections:
+                    self.peer.writer.close()
+                with contextlib.suppress(OSError):
+                    Path(self._socket).unlink()
+                del self._machine.peers[self._socket]
         finally:  # also at the end of the event loop, whose tasks wait for this
-            server.close()
-            if self.peer.connections:
-                self.peer.writer.close()
-            with contextlib.suppress(OSError):
-                Path(self._socket).unlink()
-            del self._machine.peers[self._socket]
             self.end = End(0)
             self._ended.set()
             self.peer.recorder.close()
+
+
+class Lives:
+    """The lives of rtcfd, and the tasks of each."""
+
+    def __init__(self) -> None:
+        self._life = contextvars.ContextVar("life", default=0)
+        self._tasks: dict[int, weakref.WeakSet[asyncio.Task[Any]]] = {}
+        asyncio.get_running_loop().set_task_factory(self._make)
+
+    def begin(self) -> None:
+        """Begin the next life in the calling task and the tasks that it starts."""
+        self._life.set(self._life.get() + 1)
+
+    async def end(self) -> None:
+        """Cancel all tasks that this life has started, like the end of a process's event loop."""
+        tasks = [task for task in self._tasks.get(self._life.get(), ()) if not task.done()]
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    def _make(
+        self, loop: asyncio.AbstractEventLoop, work: Any, context: Any = None
+    ) -> "asyncio.Task[Any]":
+        task = asyncio.Task(work, loop=loop, context=context)
+        life = (context or contextvars.copy_context()).get(self._life, 0)
+        self._tasks.setdefault(life, weakref.WeakSet()).add(task)
+        return task
 
 
 class Refused(Exception):
@@ -279,4 +312,14 @@ def quiet() -> None:
     logging.disable(logging.CRITICAL)
 
 
-__all__ = ["Machine", "Refused", "Rtcfd", "called_by", "control_pb2", "quiet", "spec", "until"]
+__all__ = [
+    "Lives",
+    "Machine",
+    "Refused",
+    "Rtcfd",
+    "called_by",
+    "control_pb2",
+    "quiet",
+    "spec",
+    "until",
+]

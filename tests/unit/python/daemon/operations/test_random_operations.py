@@ -24,7 +24,7 @@ from hypothesis import strategies as st
 from rtcf.v1 import control_pb2, runner_pb2
 from rtcfd.runners import component_leases, runner_leases
 from rtcfd.state import saver
-from rtcfd_in_process import Machine, Refused, Rtcfd, quiet, spec
+from rtcfd_in_process import Lives, Machine, Refused, Rtcfd, quiet, spec
 
 SEED = int(os.environ.get("RTCF_SEED", "1"))
 RUNNERS = ("rt_runner", "arm")
@@ -58,10 +58,12 @@ class Sequence:
         # Runners whose last answered call was a stop.
         self._stopped: set[str] = set(RUNNERS)
         self._starts = dict.fromkeys(RUNNERS, 0)
+        self._lives = Lives()
         self.rtcfd = Rtcfd(folder, packages, machine)
 
     async def play(self, sequence: list[Any]) -> None:
         watching = asyncio.create_task(self._watch())
+        self._lives.begin()
         await self.rtcfd.start()
         for action, caller, delay in sequence:
             self._machine.delay = delay
@@ -154,7 +156,9 @@ class Sequence:
         else:
             await self.rtcfd.runners.leave()
         await self._let_all_go()
+        await self._lives.end()
         self._world.disk.next_life()
+        self._lives.begin()
         self.rtcfd = Rtcfd(self._folder, self._packages, self._machine)
         await self.rtcfd.start()
 
