@@ -123,6 +123,7 @@ bool Cycle::restore(Restoration& restoration) noexcept {
     total_elapsed_ns_ = saved.total_elapsed_ns;
     if (restoration.sets_time) {
         clock_.time_ns = saved.time_ns;
+        monotonic_ = false;  // the snapshot may be of another boot
         clock_.stamp_ns = saved.stamp_ns;
         clock_.elapsed_ns = saved.elapsed_ns;
         setStampOffset(saved.stamp_ns - saved.time_ns);

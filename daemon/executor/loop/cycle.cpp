@@ -32,8 +32,11 @@ class DeviceLoan {
 Cycle::Cycle(FlightRecorder& recorder)
     : schedule_(&empty_), notes_(recorder.realtimeNotes()), counter_(CycleCounter::calibrate()) {}
 
-void Cycle::begin(std::int64_t period_ns, std::uint64_t warmup_cycles, std::int64_t time_ns) {
-    if (time_ns < clock_.time_ns) moveTime(time_ns - clock_.time_ns);
+void Cycle::begin(std::int64_t period_ns, std::uint64_t warmup_cycles, std::int64_t time_ns,
+                  bool monotonic) {
+    // The time between two loops counts only if one clock has measured it.
+    if (!monotonic || !monotonic_ || time_ns < clock_.time_ns) moveTime(time_ns - clock_.time_ns);
+    monotonic_ = monotonic;
     clock_.iteration = 0;
     clock_.time_ns = time_ns;
     clock_.stamp_ns = 0;

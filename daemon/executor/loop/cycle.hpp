@@ -64,9 +64,11 @@ class Cycle {
     /// @name Graph thread
     /// @{
     /// Resets clock and counters, so that the next cycle is number 0. While no cycle runs.
-    /// @param time_ns loop time; the cycles' times are later. If it is earlier than before, the
-    /// stamps of all values move with it.
-    void begin(std::int64_t period_ns, std::uint64_t warmup_cycles, std::int64_t time_ns);
+    /// @param time_ns loop time; the cycles' times are later
+    /// @param monotonic CLOCK_MONOTONIC is the loop time, not a count of periods from 0. Unless it
+    /// was that before, too, all values keep the ages of the last cycle.
+    void begin(std::int64_t period_ns, std::uint64_t warmup_cycles, std::int64_t time_ns,
+               bool monotonic);
     /// Undoes begin() if no thread can run the cycles.
     void abandon() noexcept { active_ = false; }
     Boundary& boundary() noexcept { return boundary_; }
@@ -173,6 +175,7 @@ class Cycle {
     // Owned by the cycle thread, too.
     std::int64_t boundary_time_ns_ = 0;  // loop time of the cycle after the present boundary
     std::int64_t total_elapsed_ns_ = 0;  // sum of elapsed_ns of all cycles
+    bool monotonic_ = false;             // loop time is CLOCK_MONOTONIC of this boot
     CycleMarks marks_;
     std::vector<Waiting> waiting_;  // inputs that wait for a new writer, in schedule order
     std::size_t next_waiting_ = 0;  // the first one whose component has not run in this cycle

@@ -75,13 +75,14 @@ Loop::~Loop() {
     log_.setIteration(nullptr);
 }
 
-void Loop::reset(const LoopSettings& settings, std::uint64_t stops_known, std::int64_t time_ns) {
+void Loop::reset(const LoopSettings& settings, std::uint64_t stops_known, bool real_time) {
     stops_known_ = stops_known;
     if (stopRequested()) {
         throw Error(ErrorKind::LoopStopped,
                     "the loop is not started: a stop was requested after the start");
     }
-    cycle_.begin(settings.period_ns, settings.warmup_cycles, time_ns);
+    cycle_.begin(settings.period_ns, settings.warmup_cycles, real_time ? monotonicNow() : 0,
+                 real_time);
     bucket_ = 0;
     cycles_on_time_ = 0;
     caught_up_ = 0;
@@ -92,7 +93,7 @@ void Loop::reset(const LoopSettings& settings, std::uint64_t stops_known, std::i
 RealtimeProblems Loop::start(const LoopSettings& settings, std::uint64_t stops_known) {
     RealtimeProblems problems;
     retune(settings);
-    reset(settings, stops_known, settings.clock == nullptr ? monotonicNow() : 0);
+    reset(settings, stops_known, settings.clock == nullptr);
     simulation_ = settings.clock;
     if (simulation_ == nullptr) {
         refreshWallClock();
@@ -267,7 +268,7 @@ void Loop::run() noexcept {
 
 void Loop::beginStepping(const LoopSettings& settings, std::uint64_t stops_known,
                          std::int64_t stamp_ns) {
-    reset(settings, stops_known, 0);
+    reset(settings, stops_known, false);
     cycle_.setStampOffset(stamp_ns - nextStep());
 }
 

@@ -169,7 +169,7 @@ class Loop {
         std::int64_t missed = 0;  ///< beats of a device missed before this one
     };
 
-    void reset(const LoopSettings& settings, std::uint64_t stops_known, std::int64_t time_ns);
+    void reset(const LoopSettings& settings, std::uint64_t stops_known, bool real_time);
     RealtimeSettings placed(RealtimeSettings settings, RealtimeProblems& problems);
     void leaveCpu();
     bool perform(BoundaryWork& work, std::int64_t timeout_ns);

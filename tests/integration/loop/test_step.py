@@ -5,6 +5,7 @@ import itertools
 import re
 import signal
 import subprocess
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -75,6 +76,21 @@ def test_time_advances_by_a_period_each_cycle(client: rtcf.Client) -> None:
     client.step(10)
     (out,) = (port for port in client.get_component("sink").ports if port.name == "out")
     assert out.age_ns == 1_000_000_000
+
+
+def test_a_start_in_real_time_keeps_the_ages_of_stepped_values(client: rtcf.Client) -> None:
+    client.load(rtcf.component("rtcf_examples", "Mimo", name="source", remaps=["out1:=/x"]))
+    client.load(rtcf.component("rtcf_examples", "Identity", name="sink", remaps=["in:=/x"]))
+    client.step(10)
+    client.unload(["source"])
+    client.step(1000)
+    begin_ns = time.monotonic_ns()
+    client.start()
+    wait_until_after(client, 10)
+    client.stop()
+    passed_ns = time.monotonic_ns() - begin_ns
+    (out,) = (port for port in client.get_component("sink").ports if port.name == "out")
+    assert 1_000_000_000 < out.age_ns <= 1_000_000_000 + passed_ns
 
 
 def test_the_highest_frequency_can_be_stepped_and_run(client: rtcf.Client) -> None:
