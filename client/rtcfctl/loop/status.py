@@ -107,8 +107,7 @@ def _details(runner: runner_pb2.RunnerStatus, output: Output) -> None:
         )
     if runner.incident:
         output.line(
-            f"{runner.runner}: the cycles before its last fault: "
-            f"`rtcfctl incident show {runner.incident}`"
+            f"{runner.runner}: its newest incident: `rtcfctl incident show {runner.incident}`"
         )
     for library in runner.libraries_changed:
         output.line(

@@ -13,7 +13,7 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -65,14 +65,24 @@ class Incidents:
         self._kept[runner] = now
         return True
 
-    async def keep(self, descriptor: int, facts: dict[str, Any]) -> incidents_pb2.Incident:
-        """Write a file with the frames of `descriptor`, which is closed, and with the facts."""
+    async def keep(
+        self,
+        descriptor: int,
+        facts: dict[str, Any],
+        complete: Callable[[], Awaitable[None]] | None = None,
+    ) -> incidents_pb2.Incident:
+        """Write a file with the frames of `descriptor`, which is closed, and with the facts.
+
+        `complete` is called after the frames are copied, and may change the facts.
+        """
         try:
             folder = self._place()
             frozen = await self._in_thread(frame_memory.copied, descriptor, threads=self._copier)
         finally:
             os.close(descriptor)
         try:
+            if complete is not None:
+                await complete()
             async with self._writing:
                 await self._in_thread(_make, folder)
                 stamp = time.strftime("%Y%m%d-%H%M%S", time.gmtime(facts["time_ns"] / 1e9))

@@ -122,6 +122,11 @@ class Operations:
             return ""
         return f"busy with {self._current.name} for {taken_s:.0f} s"
 
+    async def wait_for_current(self, timeout_s: float) -> None:
+        """Wait until the operation that has the turn has ended, at most `timeout_s`."""
+        if self._current is not None:
+            await asyncio.wait({self._current.done}, timeout=timeout_s)
+
     async def drain(self) -> None:
         """Wait until all operations have ended, including those that they begin."""
         while self._tasks:

@@ -13,10 +13,12 @@ import pytest
 from daemon_process import DEADLINE_S
 from rtcf.v1 import control_pb2
 from rtcf_shared.mcap_writer import McapWriter
+from rtcfd.common.errors import Unavailable
 from rtcfd.common.limits import Limits
 from rtcfd.incidents import frame_file, frame_memory, head, incident_files
 from rtcfd.incidents.incident_files import Incidents
-from rtcfd.operations.keep_incident import keep
+from rtcfd.operations import keep_incident
+from rtcfd.operations.keep_incident import keep, take
 from rtcfd_in_process import Rtcfd, until
 
 
@@ -138,6 +140,66 @@ def test_a_runner_is_removed_while_its_incident_is_written(
         await daemon.runners.close(in_order=True)
         (incident,) = await kept.all()
         assert incident.file.endswith("-arm.mcap")
+
+    asyncio.run(play())
+
+
+def test_an_incident_names_the_change_that_caused_it(
+    rtcfd: Callable[[], Rtcfd], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    written: list[dict[str, Any]] = []
+
+    def note(_: int, file: Path, facts: dict[str, Any]) -> None:
+        written.append(facts)
+        file.write_bytes(b"")
+
+    monkeypatch.setattr(incident_files, "_write", note)
+
+    async def play() -> None:
+        daemon = rtcfd()
+        await daemon.start()
+        runner = daemon.runners.get("rt_runner")
+        executor = runner.alive()
+        executor.frames = _frames(b"")
+        answered = asyncio.Event()
+
+        async def work() -> None:
+            await answered.wait()
+            runner.happened(control_pb2.Event.KIND_PARAMETERS, "gain = nan", "/a")
+
+        change = asyncio.create_task(runner.change("the set", work))
+        await asyncio.sleep(0)
+        keep(runner, executor, "the fault that it causes")
+        await asyncio.sleep(0.05)
+        assert written == []
+        answered.set()
+        await change
+        await until(lambda: written, "the incident")
+        await daemon.runners.close(in_order=True)
+
+    asyncio.run(play())
+    assert [each.message for each in written[0]["events"]][-1] == "gain = nan"
+
+
+def test_taking_an_incident_is_answered_while_the_disk_hangs(
+    rtcfd: Callable[[], Rtcfd],
+    held_writing: tuple[threading.Event, Any],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    _, may_write = held_writing
+    monkeypatch.setattr(keep_incident, "TAKE_TIMEOUT_S", 0.1)
+
+    async def play() -> None:
+        daemon = rtcfd()
+        await daemon.start()
+        runner = daemon.runners.get("rt_runner")
+        runner.alive().frames = _frames(b"")
+        with pytest.raises(Unavailable, match=r"not written after 0\.1 s: does the disk"):
+            await take(runner, "a test")
+        may_write.set()
+        # rtcfd ends with a complete file.
+        await daemon.runners.close(in_order=True)
+        assert len(await daemon.runners.incidents.all()) == 1
 
     asyncio.run(play())
 
