@@ -208,5 +208,5 @@ def _problem(text: str) -> wire.LibraryDescription:
 
 
 def _last_line(output: bytes) -> str:
-    lines = os.fsdecode(output).strip().splitlines()
+    lines = output.decode(errors="replace").strip().splitlines()
     return f": {lines[-1][:_MAX_STDERR_LINE]}" if lines else ""

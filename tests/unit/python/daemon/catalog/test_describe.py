@@ -79,6 +79,7 @@ def test_a_failed_library_is_loaded_again_even_if_unchanged(
         ("kill -KILL $$", "was killed by SIGKILL", False),
         ("kill -BUS $$", "was killed by SIGBUS", False),
         ("echo libneeded.so: cannot open >&2; exit 1", "libneeded.so: cannot open", False),
+        (r"printf 'Stromst\344rke' >&2; exit 1", "Stromst\ufffdrke", False),
         ("echo nonsense", "wrote no valid description", False),
         ("exec sleep 3600", "did not end within", False),
     ],
