@@ -10,8 +10,10 @@
 #include <cerrno>
 #include <exception>
 #include <memory>
+#include <string_view>
 #include <system_error>
 
+#include "common/serialized.hpp"
 #include "messages/to_wire.hpp"
 #include "plugins/library.hpp"
 
@@ -27,6 +29,15 @@ void dropCapabilities() {
     std::array<__user_cap_data_struct, _LINUX_CAPABILITY_U32S_3> none{};
     if (::syscall(SYS_capset, &header, none.data()) != 0)
         throw std::system_error(errno, std::generic_category(), "cannot drop capabilities");
+}
+
+bool writeToOutput(std::string_view bytes) {
+    while (!bytes.empty()) {
+        const ssize_t count = ::write(STDOUT_FILENO, bytes.data(), bytes.size());
+        if (count < 0 && errno != EINTR) return false;
+        if (count > 0) bytes.remove_prefix(static_cast<std::size_t>(count));
+    }
+    return true;
 }
 
 }  // namespace
@@ -52,7 +63,7 @@ int describeLibrary(const std::string& library, const std::string& package,
     } catch (const std::exception& error) {
         description.set_problem(error.what());
     }
-    return description.SerializeToFileDescriptor(STDOUT_FILENO) ? 0 : 1;
+    return writeToOutput(serialized(description)) ? 0 : 1;
 }
 
 }  // namespace rtcf::executor

@@ -7,6 +7,7 @@
 #include <cstring>
 
 #include "common/error.hpp"
+#include "common/serialized.hpp"
 #include "messages/parameter_value.hpp"
 #include "rtcf/executor/v1/snapshot.pb.h"
 
@@ -171,7 +172,7 @@ std::string snapshotToFile(const Snapshot& snapshot) {
         *to.mutable_type() = typeTo(topic.type);
         *to.mutable_value() = valueTo(topic.value);
     }
-    const std::string body = message.SerializeAsString();
+    const std::string body = serialized(message);
     std::string file(kMagic);
     append(file, kVersion);
     append(file, checksum(body));

@@ -47,8 +47,7 @@ bool Connection::receive(std::vector<v1::Request>& requests) {
     return true;
 }
 
-bool Connection::send(const v1::Response& response) {
-    const std::string body = response.SerializeAsString();
+bool Connection::send(const std::string& message) {
     if (out_.size() - written_ > kLargestBacklog) return false;
     // Removes sent bytes, as a slow peer may never empty the queue.
     if (written_ > out_.size() / 2) {
@@ -56,8 +55,8 @@ bool Connection::send(const v1::Response& response) {
         written_ = 0;
     }
     for (std::size_t i = 0; i < kHeader; ++i)
-        out_ += static_cast<char>((body.size() >> (8 * i)) & 0xff);
-    out_ += body;
+        out_ += static_cast<char>((message.size() >> (8 * i)) & 0xff);
+    out_ += message;
     return flush();
 }
 

@@ -34,8 +34,9 @@ class Connection {
     /// @return false if the peer has disconnected or sent invalid data
     bool receive(std::vector<v1::Request>& requests);
     /// Queues a message and sends as much as the socket accepts.
+    /// @param message from serialized()
     /// @return false if the peer has disconnected, or if too many bytes wait for it
-    bool send(const v1::Response& response);
+    bool send(const std::string& message);
     /// Continues sending.
     /// @return false if the peer has disconnected
     bool flush();

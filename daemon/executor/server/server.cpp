@@ -15,6 +15,7 @@
 #include <system_error>
 #include <utility>
 
+#include "common/serialized.hpp"
 #include "common/time_units.hpp"
 #include "messages/errors.hpp"
 #include "messages/from_wire.hpp"
@@ -255,7 +256,13 @@ void Server::drop(std::uint64_t id) {
 }
 
 void Server::respond(std::uint64_t connection, const v1::Response& response) {
-    if (const std::size_t size = response.ByteSizeLong(); size > Connection::kLargestFrame) {
+    std::size_t size = response.ByteSizeLong();
+    std::string message;
+    if (size <= Connection::kLargestFrame) {
+        message = serialized(response);
+        size = message.size();  // may be larger, as it has valid texts only
+    }
+    if (size > Connection::kLargestFrame) {
         // rtcfd would close the connection, reconnect and repeat the request.
         const std::string kind = v1::Response::descriptor()
                                      ->FindFieldByNumber(static_cast<int>(response.kind_case()))
@@ -272,7 +279,7 @@ void Server::respond(std::uint64_t connection, const v1::Response& response) {
         return;
     }
     const auto found = connections_.find(connection);
-    if (found != connections_.end() && !found->second->send(response)) drop(connection);
+    if (found != connections_.end() && !found->second->send(message)) drop(connection);
 }
 
 // Sends messages from other threads. Unsolicited messages wait for a connection.

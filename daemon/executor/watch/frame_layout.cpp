@@ -2,6 +2,7 @@
 
 #include <map>
 
+#include "common/serialized.hpp"
 #include "rtcf/executor/v1/executor.pb.h"
 
 namespace rtcf::executor {
@@ -49,7 +50,7 @@ std::string frameLayout(const FrameRing& ring, const std::vector<FrameColumn>& c
         value.set_output(known->second);
     }
     for (const std::string& note : notes) layout.add_notes(note);
-    return layout.SerializeAsString();
+    return serialized(layout);
 }
 
 }  // namespace rtcf::executor

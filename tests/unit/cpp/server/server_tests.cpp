@@ -398,6 +398,21 @@ TEST_F(ServerTest, LogRecordsWaitForADaemon) {
     }
 }
 
+TEST_F(ServerTest, TextsThatAreNotUtf8ArriveWithReplacements) {
+    ExecutorClient client(socket_);
+    client.hello();
+    log_.write(LogLevel::Info, "/A", "Stromst\xE4rke");
+    server_.publish(executor::RunnerEvent{executor::RunnerEvent::Kind::ComponentFailed,
+                                          "broken: \xFF", "/A", 1});
+    const auto next = [&client] {
+        const auto response = client.receive();
+        return response.has_value() ? *response : Response();
+    };
+    EXPECT_EQ(next().log().message(), "Stromst\uFFFDrke");
+    EXPECT_EQ(next().event().message(), "broken: \uFFFD");
+    EXPECT_TRUE(client.ask(getStatus()).has_status());
+}
+
 TEST_F(ServerTest, StatisticsRestartWithEachStart) {
     ExecutorClient client(socket_);
     client.hello();
