@@ -6,6 +6,7 @@
 #include <cctype>
 
 #include "common/error.hpp"
+#include "common/utf8.hpp"
 
 namespace rtcf::executor {
 
@@ -33,7 +34,8 @@ void requireLength(const char* what, const std::string& text, std::size_t longes
     constexpr std::size_t kShown = 40;
     throw Error(ErrorKind::TextTooLong,
                 fmt::format("{} '{}…' has {} characters: at most {} are allowed", what,
-                            text.substr(0, kShown), text.size(), longest));
+                            wholeCharacters(std::string_view(text).substr(0, kShown)), text.size(),
+                            longest));
 }
 
 bool isBaseName(const std::string& name) {

@@ -3,16 +3,26 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <string_view>
 #include <utility>
 
 #include "common/time_units.hpp"
+#include "common/utf8.hpp"
 
 namespace rtcf::executor {
 
 namespace {
 
+// The text of a fault. The cycle cuts it at the size of its array.
+template <std::size_t Size>
+std::string textOf(const std::array<char, Size>& array) {
+    const std::string_view text(array.data());
+    return std::string(text.size() < Size - 1 ? text : wholeCharacters(text));
+}
+
 std::string whatFailed(const LoopFault& fault) {
-    const char* const text = fault.text.data();
+    const std::string text = textOf(fault.text);
     switch (fault.kind) {
         case LoopFault::Kind::NotFinite:
             return fmt::format("output {} is not finite", text);
@@ -65,7 +75,7 @@ void FaultReports::report(Instance& instance) {
     ComponentFaults& faults = instance.statistics()->faults;
     const auto say = [&](const ComponentFault* fault, const char* text, std::uint64_t more) {
         if (fault == nullptr) return;
-        const char* of = fault->text.data();
+        const std::string of = textOf(fault->text);
         std::string what = fmt::vformat(text, fmt::make_format_args(of));
         if (more > 1) what += fmt::format("; {} times since the last report", more);
         instance.setFault(fmt::format("iteration {}: {}", fault->iteration, what));

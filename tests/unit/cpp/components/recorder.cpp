@@ -20,6 +20,7 @@ class Recorder : public rtcf::Component {
     rtcf::Parameter<std::string> throws{this, "throws", "", rtcf::Doc("hook that throws")};
     rtcf::Parameter<std::int64_t> throws_at{this, "throws_at", -1,
                                             rtcf::Doc("update, from 0, that throws")};
+    rtcf::Parameter<std::string> text{this, "text", "as told", rtcf::Doc("of its exceptions")};
     rtcf::Parameter<double> gain{this, "gain", 1.0, rtcf::Min(0.0), rtcf::Max(10.0)};
 
     rtcf::Parameter<double> limit{this, "limit", std::numeric_limits<double>::infinity()};
@@ -36,7 +37,7 @@ class Recorder : public rtcf::Component {
 
     // Its output counts its updates, which shows whether its state was kept.
     void update() override {
-        if (static_cast<std::int64_t>(count_) == throws_at) throw std::runtime_error("as told");
+        if (static_cast<std::int64_t>(count_) == throws_at) throw std::runtime_error(text);
         if (count_ == 0.0) note("update");
         in.read();
         count_ += 1.0;
@@ -54,7 +55,7 @@ class Recorder : public rtcf::Component {
 
     bool hook(const char* name) {
         note(name);
-        if (throws.value() == name) throw std::runtime_error("as told");
+        if (throws.value() == name) throw std::runtime_error(text);
         return refuses.value() != name || fail("set to refuse {}", name);
     }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "common/utf8.hpp"
 #include "support/runner_fixture.hpp"
 
 namespace rtcf::test {
@@ -205,6 +206,31 @@ TEST_F(Fault, LongExceptionTextIsCut) {
     ASSERT_TRUE(waitForFault());
     ASSERT_EQ(ends().size(), 1U);
     EXPECT_NE(ends()[0].message.find("as told"), std::string::npos);
+}
+
+TEST_F(Fault, CutTextEndsWithAWholeCharacter) {
+    std::string text;
+    for (int i = 0; i < 300; ++i) text += "\u00E4";  // 2 bytes; the arrays hold an odd number
+    ComponentDefinition optional = recorder("A", 3);
+    optional.optional = true;
+    optional.parameters.emplace_back("text", text);
+    load(optional);
+    ComponentDefinition culprit = recorder("B", 6);
+    culprit.parameters.emplace_back("text", text);
+    load(culprit);
+    start();
+    ASSERT_TRUE(waitForFault());
+    std::vector<std::string> messages;
+    EXPECT_TRUE(eventually([&] {
+        messages.clear();
+        for (const RunnerEvent& event : events()) {
+            if (event.message.find("\u00E4\u00E4") != std::string::npos)
+                messages.push_back(event.message);
+        }
+        return messages.size() == 2;
+    }));
+    for (const std::string& message : messages) EXPECT_TRUE(executor::isUtf8(message)) << message;
+    EXPECT_TRUE(executor::isUtf8(runner().graph()->get("/B").fault));
 }
 
 TEST_F(Fault, StatesAreNumbered) {
