@@ -7,6 +7,8 @@
 #include <string_view>
 #include <utility>
 
+#include "common/utf8.hpp"
+
 namespace rtcf::ros1 {
 
 namespace {
@@ -52,26 +54,11 @@ std::optional<ParameterValue> fromXmlRpc(XmlRpc::XmlRpcValue& value, const std::
 bool canBeSent(const ParameterValue& value) {
     const auto* const text = std::get_if<std::string>(&value);
     if (text == nullptr) return true;
-    int following = 0;  // remaining bytes of the present character
-    for (const char each : *text) {
+    const auto carried = [](char each) {
         const auto byte = static_cast<unsigned char>(each);
-        const bool follows = (byte & 0xC0U) == 0x80U;
-        if (follows != (following > 0)) return false;
-        if (follows) {
-            --following;
-        } else if (byte >= 0xF0U) {
-            following = byte < 0xF5U ? 3 : -1;
-        } else if (byte >= 0xE0U) {
-            following = 2;
-        } else if (byte >= 0xC2U) {
-            following = 1;
-        } else if (byte >= 0x80U || byte == 0x7FU ||
-                   (byte < 0x20U && each != '\t' && each != '\n')) {
-            return false;
-        }
-        if (following < 0) return false;
-    }
-    return following == 0;
+        return byte == '\t' || byte == '\n' || (byte >= 0x20U && byte != 0x7FU);
+    };
+    return executor::isUtf8(*text) && std::all_of(text->begin(), text->end(), carried);
 }
 
 constexpr std::size_t kMost = 400;  // most calls in one reconcile()

@@ -35,6 +35,16 @@ class ParameterMirrorTest : public RosFixture {
         set->parameters.push_back({declaration, value});
         return {set, true};
     }
+    static ParameterMirror::Component textComponent(const std::string& text) {
+        auto set = std::make_shared<ParameterSet>();
+        set->full_name = "/C";
+        rtcf::ParameterDeclaration declaration;
+        declaration.name = "name";
+        declaration.type = "string";
+        declaration.default_value = std::string();
+        set->parameters.push_back({declaration, text});
+        return {set, true};
+    }
     std::vector<rtcf::ros1::MasterAnswer> ask(const char* method,
                                               const XmlRpc::XmlRpcValue& arguments) {
         return calls().run({MasterCall{method, arguments}}, 1000ms,
@@ -107,6 +117,31 @@ TEST_F(ParameterMirrorTest, HandlesAKeyOfSlashesLikeAnyOther) {
     mirror.noteWritten("/C" + std::string(kLong, '/'));
     mirror.reconcile(calls(), caller_, {component(2.0)});
     EXPECT_EQ(asked, 1);
+}
+
+TEST_F(ParameterMirrorTest, WritesNoTextThatXmlCannotCarry) {
+    const auto problemOf = [this](const std::string& text) {
+        ParameterMirror mirror;
+        mirror.serve([](const std::string&, const rtcf::executor::ParameterBatch&,
+                        const std::function<void(const std::string&)>& done) { done({}); });
+        mirror.reconcile(calls(), caller_, {textComponent(text)});
+        return mirror.problem();
+    };
+    // Latin-1, cut, overlong, a surrogate, above U+10FFFF, control characters.
+    for (const std::string text : {"\xE4", "\xC3", "\xE0\x80\xAF", "\xF0\x80\x80\xAF",
+                                   "\xED\xA0\x80", "\xF4\x90\x80\x80", "\x01", "\r", "\x7F"}) {
+        EXPECT_NE(problemOf("a" + text).find("/C/name on the parameter server: it contains"),
+                  std::string::npos)
+            << text;
+        auto answers = ask("hasParam", texts({"/test", "/C/name"}));
+        ASSERT_TRUE(answers[0]);
+        EXPECT_FALSE(static_cast<bool>(answers[0].value)) << text;
+    }
+    const std::string carried = "a\u00E4\u20AC\U0001F916\t\n";
+    EXPECT_EQ(problemOf(carried), "");
+    auto answers = ask("getParam", texts({"/test", "/C/name"}));
+    ASSERT_TRUE(answers[0]);
+    EXPECT_EQ(static_cast<std::string>(answers[0].value), carried);
 }
 
 // NaN is a valid default; that it does not equal itself is no change.
