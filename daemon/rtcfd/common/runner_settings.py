@@ -171,6 +171,22 @@ def check(settings: runner_pb2.RunnerSettings) -> None:
             )
 
 
+def check_stored(settings: runner_pb2.RunnerSettings) -> None:
+    """Raise InvalidArgument if a number is out of range on any machine.
+
+    For settings that were checked when they were stored: a CPU that rtcfd may not use any more does
+    not make them invalid, because the runner can get another one.
+    """
+    _check_ranges(settings, quantities.RUNNER)
+    _check_ranges(settings.ros, quantities.ROS)
+    if settings.HasField("cpu") and settings.cpu < LAST_CPU:
+        raise InvalidArgument(
+            f"CPU {settings.cpu} does not exist: choose a number from 0, or -1 for the last CPU",
+            errors_pb2.REASON_VALUE_INVALID,
+            setting="cpu",
+        )
+
+
 def _check_ranges(message: Any, known: Mapping[str, Quantity]) -> None:
     for field, quantity in known.items():
         if message.HasField(field) and not quantity.holds(value := getattr(message, field)):

@@ -15,7 +15,7 @@ from google.protobuf import json_format
 from rtcf.v1 import runner_pb2
 from rtcf_shared import whole_files
 
-from rtcfd.common import enumerators, regular_files
+from rtcfd.common import enumerators, regular_files, runner_settings
 from rtcfd.common.errors import RequestError
 from rtcfd.common.regular_files import PARSE_ERRORS
 
@@ -41,6 +41,7 @@ def read(folder: Path) -> Handover | None:
             document["defaults"], runner_pb2.RunnerSettings(), ignore_unknown_fields=True
         )
         enumerators.check(defaults)
+        runner_settings.check_stored(defaults)
         return Handover(defaults, {str(k): str(v) for k, v in document["graphs"].items()})
     except FileNotFoundError:
         return None

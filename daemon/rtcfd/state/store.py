@@ -23,7 +23,7 @@ from google.protobuf import json_format
 from rtcf.v1 import control_pb2, errors_pb2, graph_pb2, runner_pb2
 from rtcf_shared import whole_files
 
-from rtcfd.common import enumerators, regular_files
+from rtcfd.common import enumerators, regular_files, runner_settings
 from rtcfd.common.errors import FailedPrecondition, RequestError
 from rtcfd.common.names import check_base_name, full_name
 from rtcfd.common.regular_files import PARSE_ERRORS
@@ -417,9 +417,9 @@ def _parse(runner: str, document: _Document) -> Desired:
             hold["token"], hold["holder"], desired.chosen, hold["added"]
         )
         desired.chosen = json_format.ParseDict(hold["settings"], runner_pb2.RunnerSettings())
-    for message in (desired.chosen, desired.hold and desired.hold.parked):
-        if message is not None:
-            enumerators.check(message)
+    for settings in (desired.chosen, *([desired.hold.parked] if desired.hold else [])):
+        enumerators.check(settings)
+        runner_settings.check_stored(settings)
     for name, reason in document["quarantined"].items():
         desired.quarantine(name, str(reason))
     for name, reason in document["left_out"].items():

@@ -114,3 +114,25 @@ def test_a_state_with_an_unknown_value_is_set_aside(
     assert f"it is corrupt ({what} 99 is not known: choose one of " in stopped_daemon.log()
     with stopped_daemon.client() as client:
         assert client.get_status().runners[0].settings.realtime == runner_pb2.REALTIME_PREFERRED
+
+
+@pytest.mark.parametrize("value", [-5, 0, "NaN", 1e9])
+def test_a_state_with_a_number_out_of_range_disables_no_call(
+    stopped_daemon: DaemonUnderTest, value: object
+) -> None:
+    stopped_daemon.start()
+    with stopped_daemon.client() as client:
+        client.set_runner(runner_pb2.RunnerSettings(priority=70))
+    assert stopped_daemon.end() == 0
+    state = stopped_daemon.saved()
+    state["settings"]["frequencyHz"] = value
+    (stopped_daemon.state / "rt_runner.json").write_text(json.dumps(state))
+    stopped_daemon.start()
+    assert "is set aside as rt_runner.corrupt-" in stopped_daemon.log()
+    with stopped_daemon.client() as client:
+        client.start()
+        client.set_runner(runner_pb2.RunnerSettings(frequency_hz=500.0))
+        status = client.get_status()
+    assert status.runners[0].state == runner_pb2.RUNNER_STATE_RUNNING
+    assert status.runners[0].settings.frequency_hz == 500.0
+    assert "Hz is out of range: 0.1 to 50000 Hz" in " ".join(status.notes)

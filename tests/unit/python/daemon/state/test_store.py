@@ -1,15 +1,23 @@
 """State on disk after a power cut or on a full disk."""
 
 import errno
+import json
 import os
 import stat
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import odd_files
 import pytest
-from rtcf.v1 import graph_pb2
+from google.protobuf import json_format
+from google.protobuf.descriptor import FieldDescriptor
+from rtcf.v1 import graph_pb2, runner_pb2
+from rtcf_shared import quantities
+from rtcfd.common import runner_settings
+from rtcfd.state import handover
 from rtcfd.state.desired import Desired, this_boot
+from rtcfd.state.handover import Handover
 from rtcfd.state.store import Store
 
 Value = graph_pb2.ParameterValue
@@ -267,6 +275,76 @@ def test_a_state_with_huge_numbers_or_depth_is_set_aside(tmp_path: Path, text: s
     store = Store(tmp_path)
     assert [state.runner for state in store.load()] == ["leg"]
     assert "it is corrupt" in store.problems[0]
+
+
+def numbers() -> Iterator[tuple[str, runner_pb2.RunnerSettings]]:
+    """Yield each numeric setting, once with a number below its range and once with one above."""
+    for field, quantity in quantities.RUNNER.items():
+        for value in beyond(quantity, runner_pb2.RunnerSettings.DESCRIPTOR.fields_by_name[field]):
+            yield field, runner_pb2.RunnerSettings(**{field: value})
+    for field, quantity in quantities.ROS.items():
+        for value in beyond(quantity, runner_pb2.RosSettings.DESCRIPTOR.fields_by_name[field]):
+            ros = runner_pb2.RosSettings(**{field: value})
+            yield field, runner_pb2.RunnerSettings(ros=ros)
+    yield "cpu", runner_pb2.RunnerSettings(cpu=-2)
+
+
+def beyond(quantity: quantities.Quantity, field: FieldDescriptor) -> list[Any]:
+    if field.cpp_type == FieldDescriptor.CPPTYPE_DOUBLE:
+        return [quantity.low - 1, quantity.high * 2, float("nan"), float("inf")]
+    low, high = {
+        FieldDescriptor.CPPTYPE_INT32: (-(2**31), 2**31 - 1),
+        FieldDescriptor.CPPTYPE_UINT32: (0, 2**32 - 1),
+        FieldDescriptor.CPPTYPE_INT64: (-(2**63), 2**63 - 1),
+        FieldDescriptor.CPPTYPE_UINT64: (0, 2**64 - 1),
+    }[field.cpp_type]
+    wanted = [int(quantity.low) - 1, int(quantity.high) + 1]
+    return [value for value in wanted if low <= value <= high]
+
+
+@pytest.mark.parametrize("held", [False, True])
+@pytest.mark.parametrize(("field", "settings"), numbers())
+def test_a_state_with_a_number_out_of_range_is_set_aside(
+    tmp_path: Path, field: str, settings: runner_pb2.RunnerSettings, held: bool
+) -> None:
+    saved(tmp_path, "leg")
+    document = json.loads(saved(tmp_path, "arm"))
+    bad = json_format.MessageToDict(settings, preserving_proto_field_name=True)
+    if held:
+        document["hold"] = {"token": "t", "holder": "h", "added": False, "settings": bad}
+    else:
+        document["settings"] = bad
+    (tmp_path / "arm.json").write_text(json.dumps(document))
+    store = Store(tmp_path)
+    assert [state.runner for state in store.load()] == ["leg"]
+    (problem,) = store.problems
+    assert problem.startswith(f"state {tmp_path}/arm.json is set aside as arm.corrupt-")
+    assert "is out of range: " in problem or "CPU -2 does not exist" in problem
+    assert field.split("_")[0] in problem.lower() and "\n" not in problem
+
+
+def test_a_state_keeps_a_cpu_that_this_machine_does_not_have(tmp_path: Path) -> None:
+    document = json.loads(saved(tmp_path, "arm"))
+    document["settings"] = {"cpu": 999}
+    (tmp_path / "arm.json").write_text(json.dumps(document))
+    store = Store(tmp_path)
+    (state,) = store.load()
+    assert (state.chosen.cpu, store.problems) == (999, [])
+
+
+@pytest.mark.parametrize("value", [-5, 0, "NaN", 1e9])
+def test_a_handover_with_a_number_out_of_range_is_not_used(
+    tmp_path: Path, value: object, caplog: pytest.LogCaptureFixture
+) -> None:
+    defaults = runner_settings.defaults(runner_pb2.REALTIME_REQUIRED)
+    handover.write(tmp_path, Handover(defaults))
+    assert handover.read(tmp_path) == Handover(defaults)
+    (file,) = tmp_path.iterdir()
+    document = json.loads(file.read_text())
+    document["defaults"]["frequency_hz"] = value
+    file.write_text(json.dumps(document))
+    assert handover.read(tmp_path) is None
+    assert f"cannot use {file}: runners stay as they are" in caplog.text
 
 
 def test_an_invalid_history_line_does_not_invalidate_the_state(tmp_path: Path) -> None:
