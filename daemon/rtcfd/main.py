@@ -299,10 +299,10 @@ async def _run(given: options.Options, read_options: Callable[[], options.Option
     await Daemon(given, read_options).run()
 
 
-def _reload(socket: Path) -> int:
+def _reload(wanted: options.Reload) -> int:
     """Make the running rtcfd reload its settings, and print the result."""
     try:
-        with grpc.insecure_channel(f"unix:{socket}") as channel:
+        with grpc.insecure_channel(f"unix:{wanted.socket}") as channel:
             daemon = control_pb2_grpc.ControlStub(channel)  # type: ignore[no-untyped-call]
             response = control_pb2.ReloadResult()
             for message in daemon.Reload(control_pb2.ReloadRequest()):
@@ -314,8 +314,17 @@ def _reload(socket: Path) -> int:
                 print(f"rtcfd: not applied: {line}", file=sys.stderr)
     except grpc.RpcError as error:
         print(f"rtcfd: not reloaded: {error.details()}", file=sys.stderr)
+        if wanted.problem and error.code() == grpc.StatusCode.UNAVAILABLE:
+            print(f"rtcfd: {wanted.problem}", file=sys.stderr)
         return REFUSED
-    return REFUSED if response.refused else 0
+    if wanted.problem:
+        # It has read another file, or the file as another user.
+        print(
+            f"rtcfd: the rtcfd at {wanted.socket} has reloaded its own settings, but "
+            f"{wanted.problem}",
+            file=sys.stderr,
+        )
+    return REFUSED if response.refused or wanted.problem else 0
 
 
 def _check(arguments: Sequence[str] | None, build_tree: Path | None) -> int:
@@ -346,8 +355,8 @@ def end(status: int) -> NoReturn:
 def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None) -> int:
     """Run rtcfd; return its exit status: 0 after an orderly end, 1 if it cannot start."""
     try:
-        if socket := options.reload_wanted(arguments):
-            return _reload(socket)
+        if wanted := options.reload_wanted(arguments):
+            return _reload(wanted)
         if options.check_wanted(arguments):
             return _check(arguments, build_tree)
         given = options.parse(arguments, build_tree, last_good=True)

@@ -73,6 +73,14 @@ def test_a_reload_of_bad_settings_is_rejected_with_the_line(service: Service) ->
     service.machine.path(SETTINGS).write_text('[daemon]\nrealtime = "preferred"\nsokcet = "/x"\n')
     assert service.systemctl("reload", "rtcfd.service", check=False).returncode != 0
     service.wait_until_said(f'{SETTINGS}:3: unknown key "daemon.sokcet"; did you mean "socket"?')
+    error = f'{SETTINGS}:3: unknown key "daemon.sokcet"'
+    assert f"settings not reloaded: {error}" in service.ctl("status").stdout
+    # Another error replaces it.
+    service.machine.path(SETTINGS).write_text("[runner]\nfrequency_hz = -1\n")
+    assert service.systemctl("reload", "rtcfd.service", check=False).returncode != 0
+    notes = service.ctl("status").stdout
+    assert f"settings not reloaded: {SETTINGS}:2: frequency of -1 Hz is out of range" in notes
+    assert "sokcet" not in notes
     assert service.status()["pid"] == before["pid"]
     assert service.status()["state"] == "running"
 

@@ -53,6 +53,16 @@ class Settings:
                 settings_file.read(copy), f"{error}; the last good settings are used instead"
             )
 
+    @staticmethod
+    def socket_in_bad(file: Path, folder: Path | None) -> Path | None:
+        """Return the control socket that a bad file names; of a file that is no TOML, the one that
+        the copy in `folder` names.  None = it names none."""
+        for each in (file, folder / _NAME if folder else None):
+            if each is not None:
+                with contextlib.suppress(RequestError):
+                    return settings_file.read_socket(each)
+        return None
+
     def keep(self) -> None:
         """Write the copy, if these settings are good."""
         if self._copy is None or self.problem:

@@ -15,6 +15,7 @@ from rtcfd import VERSION
 from rtcfd.access.rights import Access
 from rtcfd.catalog.catalog import Folder
 from rtcfd.common import regular_files, runner_settings
+from rtcfd.common.errors import RequestError
 from rtcfd.common.limits import Limits
 from rtcfd.configuration import settings_file
 from rtcfd.configuration.last_good import Settings
@@ -65,16 +66,13 @@ def parse(
     With `last_good`, the service uses the last good settings instead of bad ones.
     """
     args = _parser(build_tree).parse_args(arguments)
-    kept = None
-    if not args.foreground:
-        kept = _absolute(args.state_dir or _from_systemd("STATE_DIRECTORY", _STATE_DIR))
 
     def executor(file: settings_file.Config) -> Path:
         return _absolute(args.executor or file.executor or _executor_of(build_tree))
 
     settings = Settings.read(
         _file(args),
-        kept,
+        _kept_folder(args),
         last_good,
         lambda file: settings_error(executor(file), file.runner),
     )
@@ -229,12 +227,30 @@ def _parser(build_tree: Path | None) -> argparse.ArgumentParser:
     return parser
 
 
-def reload_wanted(arguments: Sequence[str] | None) -> Path | None:
-    """Return the socket of the rtcfd to reload; None without --reload."""
+@dataclass(frozen=True)
+class Reload:
+    """A wanted reload."""
+
+    socket: Path  # of the rtcfd to reload
+    problem: str = ""  # the error in the settings file, which that rtcfd reads again and reports
+
+
+def reload_wanted(arguments: Sequence[str] | None) -> Reload | None:
+    """Return what --reload wants; None without --reload.
+
+    Also of a bad file, because the running rtcfd has to report the error in its status.
+    """
     args = _parser(None).parse_args(arguments)
     if not args.reload:
         return None
-    return _socket(args, Settings.read(_file(args), None, last_good=False).found)
+    if args.socket:
+        return Reload(_absolute(args.socket))
+    file = _file(args)
+    try:
+        return Reload(_socket(args, Settings.read(file, None, last_good=False).found))
+    except RequestError as error:
+        named = Settings.socket_in_bad(file, _kept_folder(args)) if file else None
+        return Reload(_socket(args, settings_file.Config(socket=named)), str(error))
 
 
 def _file(args: argparse.Namespace) -> Path | None:
@@ -248,6 +264,13 @@ def _file(args: argparse.Namespace) -> Path | None:
         except OSError:
             pass  # the file exists, and reading it raises the error
     return chosen
+
+
+def _kept_folder(args: argparse.Namespace) -> Path | None:
+    """Return the folder of the last good settings; a private rtcfd has none."""
+    if args.foreground:
+        return None
+    return _absolute(args.state_dir or _from_systemd("STATE_DIRECTORY", _STATE_DIR))
 
 
 def _socket(args: argparse.Namespace, file: settings_file.Config) -> Path:

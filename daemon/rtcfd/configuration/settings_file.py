@@ -79,30 +79,7 @@ def read(file: Path, settings_error: SettingsError = lambda _: "") -> Config:
 
     `settings_error` asks an executor whether it accepts the settings of runners.
     """
-    try:
-        # Some editors write a byte order mark.
-        text = regular_files.read_text(file, encoding="utf-8-sig")
-        document = tomllib.loads(text)
-    except OSError as error:
-        raise InvalidArgument(
-            f"cannot read {file}: {error.strerror}", errors_pb2.REASON_SETTINGS_FILE_INVALID
-        ) from None
-    except UnicodeDecodeError:
-        raise InvalidArgument(
-            f"{file}: it is not UTF-8 text", errors_pb2.REASON_SETTINGS_FILE_INVALID
-        ) from None
-    except tomllib.TOMLDecodeError as error:
-        raise InvalidArgument(f"{file}: {error}", errors_pb2.REASON_SETTINGS_FILE_INVALID) from None
-    except ValueError:
-        # Python rejects integers of thousands of digits.
-        digits = _ENDLESS.search(text)
-        place = f":{text.count(chr(10), 0, digits.start()) + 1}" if digits else ""
-        raise InvalidArgument(
-            f"{file}{place}: an integer does not fit into 64 bits",
-            errors_pb2.REASON_SETTINGS_FILE_INVALID,
-        ) from None
-    except RecursionError:
-        raise _too_deep(file) from None
+    text, document = _document(file)
     config = Config(text=text)
     try:
         _check_numbers(document, "")
@@ -125,6 +102,48 @@ def read(file: Path, settings_error: SettingsError = lambda _: "") -> Config:
     except RecursionError:
         raise _too_deep(file) from None
     return config
+
+
+def read_socket(file: Path) -> Path | None:
+    """Return the control socket that a file names, whatever else is wrong in it; None = none.
+
+    Raises RequestError for a file that cannot be read or is no TOML.
+    """
+    _, document = _document(file)
+    try:
+        table = _table(document, "daemon")
+        return _absolute_path("daemon.socket", table["socket"]) if "socket" in table else None
+    except _InvalidKey:
+        return None
+
+
+def _document(file: Path) -> tuple[str, dict[str, Any]]:
+    """Return the text of a file, and its content; raises RequestError."""
+    text = ""
+    try:
+        # Some editors write a byte order mark.
+        text = regular_files.read_text(file, encoding="utf-8-sig")
+        return text, tomllib.loads(text)
+    except OSError as error:
+        raise InvalidArgument(
+            f"cannot read {file}: {error.strerror}", errors_pb2.REASON_SETTINGS_FILE_INVALID
+        ) from None
+    except UnicodeDecodeError:
+        raise InvalidArgument(
+            f"{file}: it is not UTF-8 text", errors_pb2.REASON_SETTINGS_FILE_INVALID
+        ) from None
+    except tomllib.TOMLDecodeError as error:
+        raise InvalidArgument(f"{file}: {error}", errors_pb2.REASON_SETTINGS_FILE_INVALID) from None
+    except ValueError:
+        # Python rejects integers of thousands of digits.
+        digits = _ENDLESS.search(text)
+        place = f":{text.count(chr(10), 0, digits.start()) + 1}" if digits else ""
+        raise InvalidArgument(
+            f"{file}{place}: an integer does not fit into 64 bits",
+            errors_pb2.REASON_SETTINGS_FILE_INVALID,
+        ) from None
+    except RecursionError:
+        raise _too_deep(file) from None
 
 
 def _too_deep(file: Path) -> InvalidArgument:

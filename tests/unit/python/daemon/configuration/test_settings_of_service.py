@@ -250,6 +250,115 @@ def test_a_failed_reload_is_reported_until_one_succeeds(
         assert not client.get_status().notes
 
 
+@pytest.fixture
+def reloading(
+    stopped_daemon: DaemonUnderTest,
+) -> tuple[DaemonUnderTest, Callable[[], subprocess.CompletedProcess[str]]]:
+    """A service, and `systemctl reload`: it gets the same file, and no socket."""
+    daemon = stopped_daemon
+    daemon.settings.write_text(f'[daemon]\nsocket = "{daemon.socket}"\n' + GOOD)
+    daemon.start_service()
+
+    def reload() -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [
+                *(str(BUILD_TREE / "bin" / "rtcfd"), "--reload"),
+                *("--config", str(daemon.settings), "--state-dir", str(daemon.state)),
+            ],
+            env={name: value for name, value in os.environ.items() if name != "RTCF_SOCKET"},
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+
+    return daemon, reload
+
+
+def text(content: str) -> Callable[[Path], None]:
+    def write(place: Path) -> None:
+        place.write_text(content)
+
+    return write
+
+
+@pytest.mark.parametrize(
+    ("bad", "said"),
+    [
+        (text("[daemon]\nsocket = '{socket}'\n[runner]\nfrequency_hz = -1\n"),
+         "frequency of -1 Hz is out of range"),
+        (text("[nope]\n[daemon]\nsocket = '{socket}'\n"), 'unknown key "nope"'),
+        # The socket is from the last good settings.
+        (text("x = \n"), "Invalid value"),
+        (odd_files.folder, "it is a folder"),
+        (odd_files.dangling, "symbolic link that leads nowhere"),
+        (odd_files.pipe, "it is a named pipe"),
+    ],
+    ids=["value", "key", "syntax", "folder", "link", "pipe"],
+)  # fmt: skip
+def test_each_rejected_reload_replaces_the_error_in_the_status(
+    reloading: tuple[DaemonUnderTest, Callable[[], subprocess.CompletedProcess[str]]],
+    bad: Callable[[Path], None],
+    said: str,
+) -> None:
+    daemon, reload = reloading
+    good = daemon.settings.read_text()
+    daemon.settings.write_text(good + "[runner.ros]\nwhitelist = '*'\n")
+    assert reload().returncode == 1
+    with daemon.client() as client:
+        (note,) = client.get_status().notes
+        assert "whitelist: bad regular expression" in note
+        daemon.settings.unlink()
+        bad(daemon.settings)
+        if daemon.settings.is_file():
+            content = daemon.settings.read_text()
+            daemon.settings.write_text(content.replace("{socket}", str(daemon.socket)))
+        with odd_files.deadline():
+            done = reload()
+        assert (done.returncode, done.stdout) == (1, "")
+        (note,) = client.get_status().notes
+        assert done.stderr == f"rtcfd: not reloaded: {note.partition('not reloaded: ')[2]}\n"
+    assert note.startswith("settings not reloaded: ")
+    assert str(daemon.settings) in note and said in note
+    assert f"rtcfd: {note}" in daemon.ctl("status").stdout
+    doctor = " ".join(daemon.ctl("doctor", "--seconds", "0").stdout.split())
+    assert note in doctor and "whitelist" not in doctor
+    daemon.settings.rmdir() if daemon.settings.is_dir() else daemon.settings.unlink()
+    daemon.settings.write_text(good)
+    assert reload().returncode == 0
+    with daemon.client() as client:
+        assert not client.get_status().notes
+
+
+def test_a_reload_without_a_daemon_names_the_error_in_the_file(
+    reloading: tuple[DaemonUnderTest, Callable[[], subprocess.CompletedProcess[str]]],
+) -> None:
+    daemon, reload = reloading
+    daemon.end()
+    daemon.settings.write_text("x = \n")
+    done = reload()
+    assert (done.returncode, done.stdout) == (1, "")
+    first, second = done.stderr.splitlines()
+    assert first.startswith("rtcfd: not reloaded: ")
+    assert second.startswith(f"rtcfd: {daemon.settings}: Invalid value")
+
+
+def test_a_reload_by_an_rtcfd_with_another_file_names_the_error_in_ours(
+    reloading: tuple[DaemonUnderTest, Callable[[], subprocess.CompletedProcess[str]]],
+    tmp_path: Path,
+) -> None:
+    daemon, _ = reloading
+    other = tmp_path / "other.toml"
+    other.write_text(f'[daemon]\nsocket = "{daemon.socket}"\n' + BAD)
+    done = subprocess.run(
+        [str(BUILD_TREE / "bin" / "rtcfd"), "--reload", "--config", str(other)],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert done.stderr.startswith(
+        f"rtcfd: the rtcfd at {daemon.socket} has reloaded its own settings, but {other}:4: "
+        "runner.frequency_hz must be a number"
+    )
+    assert done.stderr.count("\n") == 1
+
+
 def test_a_reload_restores_folder_permissions_changed_by_systemd(
     stopped_daemon: DaemonUnderTest,
 ) -> None:
