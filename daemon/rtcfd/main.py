@@ -28,6 +28,7 @@ from rtcfd.configuration import options
 from rtcfd.executor import left_over
 from rtcfd.executor.command import ExecutorCommand, claims_folder_of_user
 from rtcfd.executor.link import MAX_MESSAGE
+from rtcfd.executor.runtime_lock import RuntimeLock
 from rtcfd.incidents.incident_files import Incidents
 from rtcfd.notify import Notify, machine_goes_down
 from rtcfd.operations.runner_core import SharedContext
@@ -51,6 +52,8 @@ _LAST_WORDS_S = 0.1  # for the responses to them
 _OTHERS_MESSAGE_KB = 1024
 _OTHERS_STREAMS = 16
 _LAST_ANSWERS_S = 1.0  # for clients to read the last responses
+_EXIT_S = 2.0  # for the process of an rtcfd to exit after its last message
+_LOOK_S = 0.05
 _LAST_LOOK_S = 5.0  # for a check of the settings, which only gives a warning
 
 
@@ -78,6 +81,7 @@ class Daemon:
         self._endpoint = Endpoint(given.socket, private=given.foreground)
         folder = self._command.folder
         self._sockets = GrpcSockets(folder / "control", folder / "control-others")
+        self._runtime_lock = RuntimeLock(self._command, self._sockets.trusted)
         self._admission = admission = Admission(given.access)
         self._clients = Clients(self._sockets, given.limits, admission.level)
         admission.clients = self._clients
@@ -153,6 +157,7 @@ class Daemon:
 
     async def _serve(self, listener: socket.socket, end: asyncio.Event) -> None:
         """Run with the control socket, see run()."""
+        await self._runtime_lock.take(end)
         self._command.prepare()
         try:
             self._store.prepare()
@@ -161,7 +166,7 @@ class Daemon:
                 f"cannot make the state folder {self._options.state_dir}: {error.strerror}",
                 errors_pb2.REASON_DAEMON_FAILED,
             ) from None
-        self._store.lock()
+        await self._lock_state(end)
         self._options.settings.keep()
         self._serve_privately()
         self._shared.rules = await self._reloads.rules()
@@ -189,6 +194,22 @@ class Daemon:
         await asyncio.gather(starting, return_exceptions=True)
         if not self._leaving:
             handover.remove(self._command.folder)
+
+    async def _lock_state(self, end: asyncio.Event) -> None:
+        """Lock the state folder, see Store.lock().
+
+        Waits for the process of an rtcfd that has ended its work and is about to exit.
+        """
+        loop = asyncio.get_running_loop()
+        deadline = loop.time() + _EXIT_S
+        while True:
+            try:
+                return self._store.lock()
+            except FailedPrecondition:
+                if end.is_set() or loop.time() > deadline:
+                    raise
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(end.wait(), _LOOK_S)
 
     def _leave(self, end: asyncio.Event) -> None:
         self._leaving = True
@@ -261,8 +282,9 @@ class Daemon:
     def _clean_up(self) -> None:
         self._notify.close()
         self._endpoint.remove()
-        # Folders that are not empty stay.
-        self._command.remove_folders()
+        if self._runtime_lock.held:
+            # Folders that are not empty stay.
+            self._command.remove_folders()
         if self._options.own_runtime_dir:
             with contextlib.suppress(OSError):
                 self._options.runtime_dir.rmdir()

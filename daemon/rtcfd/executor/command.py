@@ -57,18 +57,30 @@ class ExecutorCommand:
 
         systemd resets the modes of all of them with each command of the unit that it runs.
         """
-        _make(self.folder, 0o700)
+        self.make_folder()
         if self.stop_folder is not None:
             _make(self.stop_folder, self.stop_mode)
         if self.claims_folder is not None:
             _make(self.claims_folder, 0o700)
 
+    def make_folder(self) -> None:
+        """Create the folder of the executors' sockets, and restrict it to our user."""
+        _make(self.folder, 0o700)
+
+    @property
+    def lock_file(self) -> Path:
+        """The file that RuntimeLock locks."""
+        return self.folder / "lock"
+
     def remove_folders(self) -> None:
-        """Remove our folders if they are empty."""
-        for folder in (self.folder, self.stop_folder, self.claims_folder):
+        """Remove our folders if they are empty.  Only for the holder of the RuntimeLock."""
+        for folder in (self.stop_folder, self.claims_folder, self.folder):
             # Several daemons may share the folder of claims, which is elsewhere then.
             if folder is not None and folder.parent == self.folder.parent:
                 with contextlib.suppress(OSError):
+                    if folder == self.folder:
+                        # Last: from now on another rtcfd may make the folders again.
+                        self.lock_file.unlink(missing_ok=True)
                     folder.rmdir()
 
     def socket(self, runner: str) -> Path:

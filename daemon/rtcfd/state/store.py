@@ -8,7 +8,6 @@ for a downgrade.
 import contextlib
 import dataclasses
 import errno
-import fcntl
 import itertools
 import json
 import logging
@@ -23,7 +22,7 @@ from google.protobuf import json_format
 from rtcf.v1 import control_pb2, errors_pb2, graph_pb2, runner_pb2
 from rtcf_shared import whole_files
 
-from rtcfd.common import enumerators, regular_files, runner_settings
+from rtcfd.common import enumerators, locks, regular_files, runner_settings
 from rtcfd.common.errors import FailedPrecondition, RequestError
 from rtcfd.common.names import check_base_name, full_name
 from rtcfd.common.regular_files import PARSE_ERRORS
@@ -312,15 +311,7 @@ def _lock(folder: Path) -> None:
     except OSError:
         return  # the reader of the folder reports it
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        holder = _holder(descriptor)
-        os.close(descriptor)
-        raise FailedPrecondition(
-            f"state folder {folder} is in use by another rtcfd{holder and f' (pid {holder})'}: "
-            "end that, or choose another --state-dir",
-            errors_pb2.REASON_DAEMON_FAILED,
-        ) from None
+        locked = locks.try_lock(descriptor)
     except OSError as error:
         os.close(descriptor)
         log.warning(
@@ -328,20 +319,15 @@ def _lock(folder: Path) -> None:
             folder,
             error.strerror,
         )
-
-
-def _holder(descriptor: int) -> str:
-    """Return the pid of the process that has locked an open file, if known (proc_locks(5))."""
-    inode = f":{os.fstat(descriptor).st_ino}"
-    try:
-        lines = Path("/proc/locks").read_text().splitlines()
-    except OSError:
-        return ""
-    for line in lines:
-        fields = line.split()
-        if "FLOCK" in fields and fields[-3].endswith(inode) and fields[-4].isdigit():
-            return fields[-4]
-    return ""
+        return
+    if not locked:
+        user = locks.holder(descriptor)
+        os.close(descriptor)
+        raise FailedPrecondition(
+            f"state folder {folder} is in use by another rtcfd{user}: end that, or choose another "
+            "--state-dir",
+            errors_pb2.REASON_DAEMON_FAILED,
+        )
 
 
 def _is_mark(mark: Path) -> bool:

@@ -2,13 +2,15 @@
 
 import os
 import signal
+import socket
+import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 import rtcf
-from daemon_process import Daemon, is_gone, wait_for
+from daemon_process import DEADLINE_S, Daemon, is_gone, stopped, wait_for
 from values import iteration
 
 HOOKS = ["configure", "start", "update", "safe", "stop", "cleanup"]
@@ -22,6 +24,15 @@ def _hooks(daemon: Daemon) -> list[str]:
 
 def _executor(client: rtcf.Client) -> int:
     return int(client.get_status("rt_runner").runners[0].pid)
+
+
+def _accepts(path: Path) -> bool:
+    with socket.socket(socket.AF_UNIX) as probe:
+        try:
+            probe.connect(str(path))
+        except OSError:
+            return False
+    return True
 
 
 @pytest.mark.parametrize(
@@ -62,6 +73,39 @@ def test_a_killed_executor_leaves_no_folder(tmp_path: Path) -> None:
     os.kill(executor, signal.SIGKILL)
     assert daemon.end() == 0
     assert not daemon.socket.with_name(daemon.socket.name + ".d").exists()
+
+
+def test_a_successor_waits_for_the_end_of_its_predecessor(tmp_path: Path) -> None:
+    daemon = Daemon(tmp_path)
+    (tmp_path / "b").mkdir()
+    run = daemon.socket.with_name(daemon.socket.name + ".d")
+    successor = Daemon(tmp_path / "b", arguments=("--runtime-dir", str(run)))
+    successor.log_file.touch()
+    file = tmp_path / "file"
+    slow = rtcf.component("rtcf_test", "ConfiguresOnceThereIs", parameters=[f"file:={file}"])
+    daemon.start()
+    waits = f"waiting for the end of the rtcfd (pid {daemon.pid}) that uses {run}"
+    with rtcf.Client(daemon.socket) as client, ThreadPoolExecutor() as pool:
+        executor = _executor(client)
+        progress = threading.Event()
+        loading = pool.submit(client.load, slow, on_progress=lambda _: progress.set())
+        assert progress.wait(DEADLINE_S)
+        os.kill(daemon.pid, signal.SIGTERM)
+        wait_for(lambda: not _accepts(run / "executors" / "control"), "the end to begin")
+        with stopped(daemon.pid):  # it cannot end now
+            starting = pool.submit(successor.start)
+            wait_for(lambda: waits in successor.log(), "its line")
+        file.touch()
+        assert daemon.end() == 0
+        loading.exception()
+        starting.result()
+    try:
+        with rtcf.Client(successor.socket) as client:
+            assert _executor(client) != executor
+    finally:
+        assert successor.end() == 0
+    assert is_gone(executor)
+    assert list(run.iterdir()) == []
 
 
 def test_stop_ends_the_loop_in_order_and_keeps_the_executor(
