@@ -329,12 +329,19 @@ class Runner(RunnerCore):
                 await self.ask(wire.Request(configure=effect))
             else:
                 await self._require_acceptable(change)
+                self._note_untried_settings()
             self.desired.choose(change)
             self.happened(control_pb2.Event.KIND_RUNNER_SETTINGS, "settings changed")
             await self.save()
             self.log.info("settings changed")
 
         await self.change("a change of settings", work)
+
+    def _note_untried_settings(self) -> None:
+        # The reason stays, because it may have nothing to do with the settings.
+        untried = f"settings changed since then: `rtcfctl runner restart {self.name}` tries them"
+        if untried not in self.down_reason:
+            self.down_reason += f"; {untried}"
 
     async def _require_acceptable(self, change: runner_pb2.RunnerSettings) -> None:
         # Otherwise the next executor would reject them, and the runner would have none.

@@ -136,6 +136,13 @@ def test_an_executor_that_ends_immediately_shows_in_the_status(
         assert "exit status 7" in status.status
         with pytest.raises(rtcf.RefusedError, match="exit status 7"):
             client.get_order()
+        # Changed settings are no attempt to start another one.
+        for priority in (70, 71):
+            client.set_runner(runner_pb2.RunnerSettings(priority=priority))
+        said = client.get_status().runners[0].status
+    assert said.startswith(status.status)
+    note = "; settings changed since then: `rtcfctl runner restart rt_runner` tries them"
+    assert said.count(note) == 1
 
 
 def test_an_executor_that_does_not_answer_is_stuck(
