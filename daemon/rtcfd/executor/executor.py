@@ -21,7 +21,7 @@ from rtcfd import VERSION
 from rtcfd.common.background import log_failure
 from rtcfd.common.errors import FailedPrecondition, RequestError, Silent, Unavailable
 from rtcfd.common.limits import Limits
-from rtcfd.executor import left_over
+from rtcfd.executor import left_over, stop_socket
 from rtcfd.executor.command import ExecutorCommand
 from rtcfd.executor.flight_recorder import FlightRecorder, Note, Trace
 from rtcfd.executor.link import (
@@ -385,6 +385,17 @@ def _belongs(pid: int, to: int) -> bool:
         return pid == to or os.getsid(pid) == to
     except OSError:
         return False
+
+
+async def stop_left_over(runner: str, command: ExecutorCommand, patience_s: float) -> bool:
+    """Stop the loop of an executor that was not adopted, at its stop socket.
+
+    Returns whether the executor confirms that the loop has ended.  A frozen one stops it when it
+    continues.
+    """
+    _, *sockets = command.sockets(runner)
+    stopped = [await stop_socket.stop(each, patience_s) for each in sockets]
+    return bool(stopped) and all(stopped)
 
 
 async def _end(process: Process, peer: str) -> None:

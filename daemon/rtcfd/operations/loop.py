@@ -11,13 +11,14 @@ from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, errors_pb2
 
 from rtcfd.access import caller
-from rtcfd.common.errors import FailedPrecondition, RequestError, Unavailable
+from rtcfd.common.errors import FailedPrecondition, RequestError, Silent, Unavailable
 from rtcfd.executor.executor import Executor
 from rtcfd.executor.link import Progress
 from rtcfd.operations.runner_core import RunnerCore
 
 STOP_TIMEOUT_S = 30.0
 _FROZEN_S = 1.0
+_SILENT_S = 3.0  # longer than an executor's own timeout for a component that does not return
 
 
 def asked_now(runner: RunnerCore) -> int:
@@ -57,7 +58,8 @@ async def start_in_turn(
 async def stop(runner: RunnerCore, progress: Progress) -> control_pb2.ChangeResult:
     """Stop the loop at the next cycle boundary.  Never queues.
 
-    A loop whose executor is dead counts as stopped.
+    A loop whose executor is dead counts as stopped.  Raises Unavailable if an executor does not
+    confirm the stop; the stop then takes effect when it answers again.
     """
     runner.loop.stop()
     runner.operations.withdraw(
@@ -71,11 +73,14 @@ async def stop(runner: RunnerCore, progress: Progress) -> control_pb2.ChangeResu
         # Concurrently: neither a slow disk nor a slow executor must delay the other.
         saving = asyncio.create_task(runner.save())
         try:
-            if not runner.up:
+            if not runner.up and runner.silent is None:
                 await runner.settle()  # its executor may be being adopted
                 runner.require_ours()
             if runner.up:
                 result = await _stop_at(runner, runner.alive(), progress)
+                runner.log.info("loop stopped")
+            elif (silent := runner.silent) is not None:
+                result = await _stop_silent(runner, silent, progress)
                 runner.log.info("loop stopped")
             else:
                 result = control_pb2.ChangeResult(notes=[f"no loop to stop: {runner.down_reason}"])
@@ -114,6 +119,32 @@ async def _stop_at(
         if not executor.ended.is_set() or not executor.safe:
             raise
         return control_pb2.ChangeResult(notes=[f"the loop has ended with its executor: {error}"])
+
+
+async def _stop_silent(
+    runner: RunnerCore, silent: Silent, progress: Progress
+) -> control_pb2.ChangeResult:
+    """Stop the loop of an executor that rtcfd could not adopt yet."""
+    if await runner.stop_silent(_SILENT_S):
+        runner.loop.note_report(False)
+        return control_pb2.ChangeResult(
+            notes=[f"the loop was stopped at its executor, because {silent}"]
+        )
+    if runner.up:  # adopted meanwhile
+        return await _stop_at(runner, runner.alive(), progress)
+    raise Unavailable(
+        f"runner {runner.name}: its loop stops when its executor answers again: {silent}",
+        errors_pb2.REASON_EXECUTOR_SILENT,
+    )
+
+
+async def stop_adopted(runner: RunnerCore) -> None:
+    """Stop the loop of an adopted executor that did not answer when the stop was requested."""
+    try:
+        await _ask_to_stop(runner, None)
+        runner.log.info("loop stopped, as requested while its executor did not answer")
+    except RequestError as error:
+        runner.log.error("the loop does not stop: %s", error)
 
 
 async def _ask_to_stop(

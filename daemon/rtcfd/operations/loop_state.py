@@ -17,6 +17,8 @@ class LoopState:
         self.fault = ""  # the fault that ended it
         self.held = ""  # why rtcfd did not start it
         self.stopped_at_ns = 0  # CLOCK_MONOTONIC of the last direct stop at the executor
+        # No executor has confirmed the last stop: one that is adopted may run the loop.
+        self.stop_owed = False
         self.stops = 0  # stop count; a request from before the last stop must not start the loop
 
     @property
@@ -27,6 +29,7 @@ class LoopState:
     def stop(self) -> None:
         """Note a request to stop.  It is valid from here on, even if the executor fails to stop."""
         self.stops += 1
+        self.stop_owed = True
         self.fault = ""
         self.want(False)
 
@@ -41,19 +44,22 @@ class LoopState:
         If it is a response, `asked` is the stop count at the time of the request.
         """
         self.running = running
-        if running and asked == self.stops:
+        if not running:
+            self.stop_owed = False
+        elif asked == self.stops:
+            self.stop_owed = False
             self.held = self.fault = ""
             self.want(True)
 
     def ended(self, why: str) -> None:
         """Note that a fault has ended the loop."""
-        self.running = False
+        self.running = self.stop_owed = False
         self.fault = why
         self.want(False)
 
     def gone(self) -> None:
         """Note that there is no executor any more; `wanted` stays."""
-        self.running = False
+        self.running = self.stop_owed = False
 
     def starts_at_boot(self, resume: bool, always: bool) -> bool:
         """Return whether the loop starts with rtcfd.

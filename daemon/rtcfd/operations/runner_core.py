@@ -19,11 +19,16 @@ from rtcf_shared.enums import word
 from rtcfd.access import caller
 from rtcfd.catalog.catalog import Catalog
 from rtcfd.common.background import WorkerThreads
-from rtcfd.common.errors import RequestError, Unavailable
+from rtcfd.common.errors import RequestError, Silent, Unavailable
 from rtcfd.common.event_log import EventLog
 from rtcfd.common.limits import Limits
 from rtcfd.executor.command import ExecutorCommand
-from rtcfd.executor.executor import CONNECT_TIMEOUT_S, QUERY_TIMEOUT_S, Executor
+from rtcfd.executor.executor import (
+    CONNECT_TIMEOUT_S,
+    QUERY_TIMEOUT_S,
+    Executor,
+    stop_left_over,
+)
 from rtcfd.executor.link import OnAnswer, OnPorts, Progress
 from rtcfd.executor.notifications import logger_of
 from rtcfd.executor.watched_process import End
@@ -113,6 +118,8 @@ class RunnerCore(ABC):
         self.incident = ""  # the name of the newest incident
         self._code_file = shared.command.folder / f"{self.name}.libraries"
         self._executor: Executor | None = None
+        # Why the executor of an earlier rtcfd could not be adopted yet; its loop may run.
+        self.silent: Silent | None = None
         self._changing_executor = asyncio.Lock()
         self._settled = asyncio.Event()  # not set while an executor is being started
         self._notified = (self.state, "")  # state and holder in the last events
@@ -215,6 +222,7 @@ class RunnerCore(ABC):
                 adopted = executor is not None
                 if not adopted and only_left_over:
                     self.down_reason = "it has no executor"
+                    self.silent = None
                     return None
                 if executor is None and (self.leaving or not self.closing):
                     executor = await self._launch()
@@ -223,14 +231,17 @@ class RunnerCore(ABC):
                         await (executor.leave() if self.leaving else executor.shut_down())
                     ending = f"runner {self.name} is being ended"
                     raise Unavailable(ending, errors_pb2.REASON_RUNNER_ENDING)
-                self._executor = executor
+                self._executor, self.silent = executor, None
                 self.counters = LoopCounters()
                 if adopted:
                     self.code.restore(self._code_file)
                 else:
                     self.code.clear()
+        except Silent as error:
+            self.down_reason, self.silent = str(error), error
+            raise
         except RequestError as error:
-            self.down_reason = str(error)
+            self.down_reason, self.silent = str(error), None
             raise
         except Exception as error:
             self.down_reason = f"its executor does not start: {type(error).__name__}: {error}"
@@ -248,6 +259,10 @@ class RunnerCore(ABC):
             async with self._changing_executor:
                 await executor.shut_down()
         self.loop.gone()
+
+    async def stop_silent(self, patience_s: float) -> bool:
+        """Stop the loop of an executor that was not adopted; see stop_left_over()."""
+        return await stop_left_over(self.name, self.shared.command, patience_s)
 
     async def leave_executor(self) -> None:
         """Disconnect from the executor: its loop goes on, and the next rtcfd adopts it."""

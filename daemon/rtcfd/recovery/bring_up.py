@@ -14,7 +14,7 @@ from rtcf_shared.naming import listing
 
 from rtcfd.catalog.catalog import loads
 from rtcfd.common.errors import FailedPrecondition, InvalidArgument, RequestError
-from rtcfd.operations.loop import start_in_turn
+from rtcfd.operations.loop import start_in_turn, stop_adopted
 from rtcfd.operations.runner_core import RunnerCore
 from rtcfd.recovery.follow import follow_components, follow_settings
 
@@ -34,12 +34,18 @@ async def bring_up(runner: RunnerCore, only_left_over: bool = False, boot: bool 
     """
     asked, stopped_at_ns = runner.loop.stops, runner.loop.stopped_at_ns
     agreed = set(runner.desired.left_out) if runner.loop.wanted else set()
+    # Noted before: a direct stop that the executor reports may be older than the one that it owes.
+    owed = runner.loop.stop_owed
     adopted = await runner.take_executor(only_left_over)
     if adopted is None:
         return False
+    if adopted and (owed or runner.loop.stop_owed):
+        runner.loop.stop_owed = True
+        await stop_adopted(runner)
     executor = runner.executor
     if executor is not None and executor.foreign:
-        runner.loop.note_report(runner.loop.wanted)  # its real state cannot be known
+        # Its real state cannot be known.
+        runner.loop.note_report(runner.loop.wanted or runner.loop.stop_owed)
         return True
     await runner.limit()
     if adopted:
@@ -95,7 +101,8 @@ async def _follow(runner: RunnerCore, asked: int) -> None:
 
 def _note_status(runner: RunnerCore, status: runner_pb2.RunnerStatus, asked: int) -> None:
     """Note the state of a loop that an earlier rtcfd started; after a stop, it is not wanted."""
-    runner.loop.note_report(status.state == runner_pb2.RUNNER_STATE_RUNNING, asked)
+    running = status.state == runner_pb2.RUNNER_STATE_RUNNING
+    runner.loop.note_report(running, None if runner.loop.stop_owed else asked)
 
 
 def _follow_leased(runner: RunnerCore, found: Iterable[graph_pb2.ComponentInfo]) -> bool:

@@ -1,16 +1,22 @@
 """Executors that do not answer a starting rtcfd, which keeps looking for them."""
 
 import asyncio
+import dataclasses
+import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
-from rtcf.v1 import errors_pb2, runner_pb2
+from peer_executor import Peer
+from rtcf.executor.v1 import executor_pb2 as wire
+from rtcf.v1 import control_pb2, errors_pb2, runner_pb2
 from rtcfd.common.errors import Silent
+from rtcfd.executor import executor, stop_socket
 from rtcfd.executor.executor import Executor
 from rtcfd.runners import runners
 from rtcfd.state.desired import Desired, RunnerLeaseTerms
-from rtcfd_in_process import Rtcfd, until
+from rtcfd_in_process import Refused, Rtcfd, until
 
 
 @pytest.fixture
@@ -58,5 +64,150 @@ def test_the_silent_executor_of_an_unknown_runner_is_retried_until_it_dies(
         await until(lambda: not daemon.runners.all(), "its end")
         assert looks == ["stranger"] * 3
         await daemon.runners.close(in_order=True)
+
+    asyncio.run(play())
+
+
+class Silence:
+    """Executors that do not answer `hello` until `over` is set."""
+
+    def __init__(
+        self, monkeypatch: pytest.MonkeyPatch, direct_stop: wire.DirectStop | None
+    ) -> None:
+        self.over = asyncio.Event()
+        hello = Peer.hello
+
+        async def silent(peer: Peer, request: wire.Hello, id_: int) -> wire.Response:
+            await self.over.wait()
+            response = await hello(peer, request, id_)
+            if direct_stop is not None:
+                response.hello.direct_stop.CopyFrom(direct_stop)
+            return response
+
+        monkeypatch.setattr(Peer, "hello", silent)
+        monkeypatch.setattr(executor, "QUERY_TIMEOUT_S", 0.3)
+        monkeypatch.setattr(runners, "_LOOK_AGAIN_S", 0.01)
+
+
+async def running_loop(daemon: Rtcfd) -> None:
+    """Start a loop, and leave it to the next rtcfd."""
+    await daemon.start()
+    await daemon.call("Start", control_pb2.StartRequest())
+    await daemon.runners.leave()
+
+
+def peer_of(daemon: Rtcfd) -> Peer:
+    """Return the running executor."""
+    peer = daemon.peer("rt_runner")
+    assert peer is not None
+    return peer
+
+
+@pytest.mark.parametrize("stopped_before", [False, True])
+def test_a_loop_stopped_while_its_executor_is_silent_is_stopped_at_its_adoption(
+    rtcfd: Callable[[], Rtcfd], monkeypatch: pytest.MonkeyPatch, stopped_before: bool
+) -> None:
+    # An earlier direct stop, before the loop was started again, is not the one that is owed.
+    before = wire.DirectStop(count=1, at_ns=time.monotonic_ns(), uid=0, pid=1)
+
+    async def play() -> None:
+        first, second = rtcfd(), rtcfd()
+        await running_loop(first)
+        silence = Silence(monkeypatch, before if stopped_before else None)
+        await second.start()
+        with pytest.raises(Refused, match="its loop stops when its executor answers again"):
+            await second.call("Stop", control_pb2.StopRequest())
+        peer, runner = peer_of(second), second.runners.get("rt_runner")
+        assert peer.running
+        silence.over.set()
+        await until(lambda: runner.up and not peer.running, "the stop")
+        assert not runner.loop.wanted
+        await until(lambda: not runner.operations.busy(), "the end of the adoption")
+        assert not peer.running and not runner.loop.running and not runner.loop.wanted
+        saved = second.saved("rt_runner")
+        assert saved is not None and saved["running"] is False
+        await second.call("Start", control_pb2.StartRequest())
+        assert peer.running and runner.loop.wanted
+        await second.runners.close(in_order=True)
+
+    asyncio.run(play())
+
+
+def test_a_silent_executor_can_confirm_a_stop_at_its_stop_socket(
+    rtcfd: Callable[[], Rtcfd], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    async def play() -> None:
+        first, second = rtcfd(), rtcfd()
+        await running_loop(first)
+        silence = Silence(monkeypatch, None)
+        peer, shared = peer_of(second), second.runners._shared
+
+        async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            assert await reader.readline() == b"stop\n"
+            peer.running = False
+            writer.write(b"stopped\n")
+            writer.close()
+
+        shared.command = dataclasses.replace(shared.command, stop_folder=tmp_path)
+        server = await asyncio.start_unix_server(serve, tmp_path / "rt_runner")
+        await second.start()
+        answer = await second.call("Stop", control_pb2.StopRequest())
+        (note,) = answer.result.notes
+        assert note.startswith("the loop was stopped at its executor, because ")
+        server.close()
+        runner = second.runners.get("rt_runner")
+        silence.over.set()
+        await until(lambda: runner.up, "its adoption")
+        assert not peer.running and not runner.loop.wanted
+        await second.runners.close(in_order=True)
+
+    asyncio.run(play())
+
+
+@pytest.mark.parametrize(
+    ("answer", "stopped"),
+    [
+        (b"stopped\n", True),
+        (b"stopped: not saved yet: the disk does not answer\n", True),
+        (b"late: a component does not return from update()\n", False),
+        (b"refused: stop requires the right `operate`\n", False),
+        (b"", False),
+    ],
+)
+def test_only_a_confirmed_direct_stop_counts(tmp_path: Path, answer: bytes, stopped: bool) -> None:
+    async def play() -> None:
+        requests: list[bytes] = []
+
+        async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            requests.append(await reader.readline())
+            writer.write(answer)
+            writer.close()
+
+        path = tmp_path / "stop"
+        assert not await stop_socket.stop(path, 30.0)  # nobody listens
+        server = await asyncio.start_unix_server(serve, path)
+        assert await stop_socket.stop(path, 30.0) == stopped
+        assert requests == [b"stop\n"]
+        server.close()
+
+    asyncio.run(play())
+
+
+def test_a_direct_stop_reaches_an_executor_that_answers_later(tmp_path: Path) -> None:
+    async def play() -> None:
+        requests: list[bytes] = []
+        continues = asyncio.Event()
+
+        async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+            await continues.wait()
+            requests.append(await reader.readline())
+            writer.close()
+
+        path = tmp_path / "stop"
+        server = await asyncio.start_unix_server(serve, path)
+        assert not await stop_socket.stop(path, 0.01)
+        continues.set()
+        await until(lambda: requests == [b"stop\n"], "the request")
+        server.close()
 
     asyncio.run(play())

@@ -1,0 +1,58 @@
+"""Executors that a signal has frozen: stops hold."""
+
+import contextlib
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+import rtcf
+from daemon_process import NO_ROS, Daemon, stopped, wait_for
+from rtcf.v1 import runner_pb2
+from values import state
+
+STOPPED = runner_pb2.RUNNER_STATE_STOPPED
+
+
+@pytest.fixture
+def settings() -> str:
+    """Return settings of an rtcfd whose executors outlive it for a minute."""
+    return "[runner]\norphan_timeout_s = 60\n" + NO_ROS
+
+
+def begin(daemon: Daemon, client: rtcf.Client) -> int:
+    """Run a loop; return the pid of its executor."""
+    hooks = f"file:={daemon.folder / 'hooks'}"
+    client.load(rtcf.component("rtcf_test", "Witness", name="steady", parameters=[hooks]))
+    client.start()
+    wait_for(lambda: state(client).iteration > 10, "cycles")
+    return int(state(client).pid)
+
+
+@contextmanager
+def frozen(daemon: Daemon) -> Iterator[int]:
+    """Freeze the executor of a running loop, and restart rtcfd; yield the executor's pid."""
+    with rtcf.Client(daemon.socket) as client:
+        pid = begin(daemon, client)
+    daemon.end(signal.SIGKILL)
+    with contextlib.suppress(ProcessLookupError), stopped(pid):
+        daemon.start()
+        with rtcf.Client(daemon.socket) as client:
+            wait_for(lambda: "its loop may be running" in state(client).status, "its silence")
+        yield pid
+
+
+@pytest.mark.parametrize("dies", [False, True])
+def test_a_stop_of_a_loop_that_is_not_adopted_yet_holds(daemon: Daemon, dies: bool) -> None:
+    with frozen(daemon) as pid:
+        done = daemon.ctl("stop")
+        assert (done.returncode, done.stdout) == (1, ""), done.stderr
+        assert f"(pid {pid}) is frozen" in done.stderr
+        if dies:  # the executor itself has the stop
+            daemon.end(signal.SIGKILL)
+            daemon.start()
+    with rtcf.Client(daemon.socket) as client:
+        wait_for(lambda: state(client).pid == pid, "the adoption")
+        wait_for(lambda: state(client).state == STOPPED, "the stop")
+        client.start()
+        assert state(client).state == runner_pb2.RUNNER_STATE_RUNNING
