@@ -36,7 +36,7 @@ from rtcfd.executor.link import (
     Progress,
     Unasked,
 )
-from rtcfd.executor.watched_process import Child, End, Process
+from rtcfd.executor.watched_process import Child, End, Process, is_frozen
 
 log = logging.getLogger(__name__)
 
@@ -155,11 +155,7 @@ class Executor:
             process.release()
             executor._close_memory()
             if isinstance(problem, Unavailable):
-                raise Silent(
-                    f"{problem}; its loop may be running: rtcfd keeps asking it, "
-                    f"`kill {executor.pid}` ends it",
-                    errors_pb2.REASON_EXECUTOR_SILENT,
-                ) from None
+                raise _silent(runner, str(problem), "rtcfd keeps asking it", executor.pid) from None
             raise
         executor._begin_to_watch()
         return executor
@@ -177,10 +173,7 @@ class Executor:
         """
         if not self._process.frozen:
             return ""
-        return (
-            f"{self._peer} is frozen, by a signal or a debugger: `rtcfctl runner restart "
-            f"{self._runner}` ends it, `kill -CONT {self.pid}` lets its loop go on"
-        )
+        return f"{self._peer} {_frozen(self._runner, self.pid)}"
 
     def note(self) -> Note | None:
         """Return the current content of the flight recorder; None if there is none."""
@@ -257,9 +250,7 @@ class Executor:
             await self.request(wire.Request(exit=wire.Exit()), EXIT_TIMEOUT_S)
         except RequestError as error:
             log.warning("%s: cannot end it in order: %s", self._peer, error)
-            self._process.signal(signal.SIGTERM)
-            # A frozen process receives the pending SIGTERM when it continues.
-            self._process.signal(signal.SIGCONT)
+            _terminate(self._process)
         await _end(self._process, self._peer)
         if self._watching is not None:
             await self._watching
@@ -398,6 +389,76 @@ async def stop_left_over(runner: str, command: ExecutorCommand, patience_s: floa
     return bool(stopped) and all(stopped)
 
 
+async def end_left_over(runner: str, command: ExecutorCommand) -> None:
+    """End an executor that was not adopted: in order, or by SIGKILL if it does not end.
+
+    Raises Unavailable if another process serves its socket.
+    """
+    socket = command.socket(runner)
+    sockets = []
+    while (process := await _left_over(socket)) is not None:
+        sockets = command.sockets(runner)
+        peer = f"left-over executor of {runner} (pid {process.pid})"
+        try:
+            log.warning("%s: ending it by a signal", peer)
+            _terminate(process)
+            await _end(process, peer)
+        finally:
+            process.release()
+    try:
+        link = await Link.connect(f"left-over executor of {runner}", socket, lambda _: None)
+    except OSError:
+        for each in sockets:  # one that was killed leaves them
+            each.unlink(missing_ok=True)
+        return
+    await link.close()
+    raise Unavailable(
+        f"{socket} is served by process {link.peer_pid}, which is not recognised as the executor "
+        f"of runner {runner}: end it with `kill -KILL {link.peer_pid}`, then repeat the request",
+        errors_pb2.REASON_EXECUTOR_SILENT,
+    )
+
+
+async def _left_over(socket: Path) -> Process | None:
+    """Return the process of the executor with a socket, watched; None if there is none."""
+    while (pid := await asyncio.to_thread(left_over.process, socket)) is not None:
+        try:
+            process = Process(pid)
+        except OSError:
+            continue  # it has just ended
+        # Again: the pid may have passed to another process before the descriptor was opened.
+        if await asyncio.to_thread(left_over.listens, pid, socket):
+            return process
+        process.release()
+    return None
+
+
+def _terminate(process: Process) -> None:
+    """Ask a process to end in order, also a frozen one."""
+    process.signal(signal.SIGTERM)
+    # A frozen process receives the pending SIGTERM when it continues.
+    process.signal(signal.SIGCONT)
+
+
+def _frozen(runner: str, pid: int) -> str:
+    return (
+        f"is frozen, by a signal or a debugger: `rtcfctl runner restart {runner}` ends it, "
+        f"`kill -CONT {pid}` lets its loop go on"
+    )
+
+
+def _silent(runner: str, problem: str, search: str, pid: int) -> Silent:
+    """Return the error for an executor that exists but cannot be adopted now."""
+    if is_frozen(pid):
+        remedy = f"it {_frozen(runner, pid)}"
+    else:
+        remedy = f"`rtcfctl runner restart {runner}` ends it"
+    return Silent(
+        f"{problem}; its loop may be running: {search}; {remedy}",
+        errors_pb2.REASON_EXECUTOR_SILENT,
+    )
+
+
 async def _end(process: Process, peer: str) -> None:
     """Wait for a process that was asked to end; send SIGTERM, then SIGKILL, if it does not."""
     for harder in (signal.SIGTERM, signal.SIGKILL):
@@ -428,11 +489,12 @@ async def _link_to(runner: str, socket: Path, on_unasked: Unasked) -> Link | Non
         if pid is None:
             return None
         if time.monotonic() > deadline:
-            raise Silent(
+            raise _silent(
+                runner,
                 f"the executor of runner {runner} (pid {pid}) exists, but its socket {socket} does "
-                "not; its loop may be running: rtcfd keeps looking for it, "
-                f"`kill {pid}` ends it in order",
-                errors_pb2.REASON_EXECUTOR_SILENT,
+                "not",
+                "rtcfd keeps looking for it",
+                pid,
             )
         await asyncio.sleep(_RENEW_LOOK_S)
 

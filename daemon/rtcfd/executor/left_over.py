@@ -23,21 +23,29 @@ def process(socket: Path) -> int | None:
     return next((pid for pid, its in _processes() if its == socket), None)
 
 
+def listens(pid: int, socket: Path) -> bool:
+    """Return whether this process is an executor of our user with this socket."""
+    return _socket_of(Path(f"/proc/{pid}")) == socket
+
+
 def _processes() -> Iterator[tuple[int, Path]]:
     """Yield the pids of our user's executors, and their sockets."""
     for entry in Path("/proc").iterdir():
-        if not entry.name.isdigit():
-            continue
-        try:
-            words = (entry / "cmdline").read_bytes().split(b"\0")
-            if b"--runner" not in words or b"--socket" not in words:
-                continue
-            if not _is_ours(entry):
-                continue  # another user could otherwise keep us from starting an executor
-        except OSError:
-            continue  # it has just ended, or we may not read it
-        socket = os.fsdecode(words[words.index(b"--socket") + 1])
-        yield int(entry.name), Path(socket)
+        if entry.name.isdigit() and (socket := _socket_of(entry)) is not None:
+            yield int(entry.name), socket
+
+
+def _socket_of(entry: Path) -> Path | None:
+    """Return the socket of an executor of our user; None for any other process."""
+    try:
+        words = (entry / "cmdline").read_bytes().split(b"\0")
+        if b"--runner" not in words or b"--socket" not in words[:-1]:
+            return None
+        if not _is_ours(entry):
+            return None  # another user could otherwise keep us from starting an executor
+    except OSError:
+        return None  # it has just ended, or we may not read it
+    return Path(os.fsdecode(words[words.index(b"--socket") + 1]))
 
 
 def _is_ours(entry: Path) -> bool:

@@ -6,6 +6,7 @@ executors outlive the rtcfd that started them.
 """
 
 import asyncio
+import contextlib
 import os
 import signal
 import subprocess
@@ -46,13 +47,7 @@ class Process:
     @property
     def frozen(self) -> bool:
         """Whether a signal or a debugger has stopped it."""
-        if self._end is not None:
-            return False
-        try:
-            text = Path(f"/proc/{self.pid}/stat").read_text(encoding="ascii", errors="replace")
-        except OSError:
-            return False
-        return text.rpartition(")")[2].split()[0] in ("T", "t")
+        return self._end is None and is_frozen(self.pid)
 
     async def wait(self) -> End:
         """Wait until it has ended."""
@@ -63,7 +58,8 @@ class Process:
         """Send a signal; does nothing if the process has ended."""
         if self._end is None:
             # By descriptor: another process may have the same pid by now.
-            signal.pidfd_send_signal(self._descriptor, number)
+            with contextlib.suppress(ProcessLookupError):  # ended, but not reported to us yet
+                signal.pidfd_send_signal(self._descriptor, number)
 
     def release(self) -> None:
         """Stop watching the process."""
@@ -86,6 +82,15 @@ class Child(Process):
 
     def _how_it_ended(self) -> End:
         return End(self._process.poll())
+
+
+def is_frozen(pid: int) -> bool:
+    """Return whether a signal or a debugger has stopped a process."""
+    try:
+        text = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
+    except OSError:
+        return False
+    return text.rpartition(")")[2].split()[0] in ("T", "t")
 
 
 def describe_exit(status: int) -> str:

@@ -27,6 +27,7 @@ from rtcfd.executor.executor import (
     CONNECT_TIMEOUT_S,
     QUERY_TIMEOUT_S,
     Executor,
+    end_left_over,
     stop_left_over,
 )
 from rtcfd.executor.link import OnAnswer, OnPorts, Progress
@@ -251,13 +252,22 @@ class RunnerCore(ABC):
         self.down_reason = ""
         return adopted
 
-    async def end_executor(self, reason: str) -> None:
-        """Stop the loop in order and end the executor, even a busy one."""
+    async def end_executor(self, reason: str, spare_silent: bool = False) -> None:
+        """Stop the loop in order and end the executor, even a busy or a frozen one.
+
+        Also an executor that was not adopted, unless `spare_silent`; raises Unavailable if that
+        cannot be ended.
+        """
         executor, self._executor = self._executor, None
         if executor is not None:
             self.down_reason = executor.verdict = reason
             async with self._changing_executor:
                 await executor.shut_down()
+        elif not self.leaving and not spare_silent:
+            async with self._changing_executor:  # after an attempt to adopt it
+                if self._executor is None:
+                    await end_left_over(self.name, self.shared.command)
+                    self.silent = None
         self.loop.gone()
 
     async def stop_silent(self, patience_s: float) -> bool:

@@ -65,11 +65,13 @@ class Runner(RunnerCore):
         why: "control_pb2.LeaseEnded.Why" = _Ended.WHY_UNLOADED,
         message: str = "it is removed",
         in_order: bool = False,
+        spare_silent: bool = False,
     ) -> None:
         """Stop the loop in order and end the executor.
 
         Holders receive the last log records, then the reason (`why`, `message`).  `in_order`:
-        permanently, so that the next rtcfd does not start the loop.
+        permanently, so that the next rtcfd does not start the loop.  `spare_silent`: leave an
+        executor alone that could not be adopted.
         """
         self.closing = True
         self.loop.stops += 1
@@ -78,7 +80,7 @@ class Runner(RunnerCore):
         if in_order and self.loop.wanted:
             self.loop.stop()
             saving.append(asyncio.create_task(self.save()))
-        await self.end_executor("it is being ended")
+        await self.end_executor("it is being ended", spare_silent)
         await asyncio.gather(*saving)
         self.end_leases(why, f"runner {self.name}: {message}")
         self.logs.end()

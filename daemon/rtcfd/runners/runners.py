@@ -90,8 +90,10 @@ class Runners:
         while True:
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self.closing.wait(), _LOOK_AGAIN_S)
-            if runner.up or runner.closing or self.closing.is_set():
+            if runner.up or self.closing.is_set() or self._runners.get(runner.name) is not runner:
                 return
+            if runner.closing:
+                continue  # it is being removed, which may fail
             try:
                 await take(runner)
                 return
@@ -201,9 +203,9 @@ class Runners:
         runner.happened(control_pb2.Event.KIND_RUNNER_ADDED, "runner added")
         try:
             await runner.bring_up()
-        except BaseException:
+        except BaseException as error:
             runner.hold_outbox = None  # its holder receives the error
-            await self._remove(runner)
+            await self._remove(runner, spare_silent=isinstance(error, Silent))
             raise
         await runner.save()
         runner.log.info("runner added")
@@ -256,13 +258,16 @@ class Runners:
 
         await self.operations.begin(f"the removal of runner {runner.name}", work)
 
-    async def _remove(self, runner: Runner) -> None:
+    async def _remove(self, runner: Runner, spare_silent: bool = False) -> None:
         if runner in self._leaving:
             return  # it is already being removed
         self._leaving.add(runner)
         try:
-            await runner.shut_down()
+            await runner.shut_down(spare_silent=spare_silent)
             await runner.saver.forget()
+        except RequestError:  # it runs on
+            runner.closing = False
+            raise
         finally:
             self._leaving.discard(runner)
         # Not earlier: its executor must have ended before another runner takes the name.
@@ -281,9 +286,14 @@ class Runners:
         self.operations.withdraw("rtcfd is ending", errors_pb2.REASON_DAEMON_ENDING)
         cause = control_pb2.LeaseEnded.WHY_DAEMON_ENDED
         runners = list(self._runners.values())
-        await asyncio.gather(
-            *(each.shut_down(cause, "rtcfd is being ended", in_order) for each in runners)
-        )
+
+        async def end(runner: Runner) -> None:
+            try:
+                await runner.shut_down(cause, "rtcfd is being ended", in_order)
+            except RequestError as error:
+                runner.log.error("%s", error)
+
+        await asyncio.gather(*(end(each) for each in runners))
         await self._drain()
 
     async def leave(self) -> None:

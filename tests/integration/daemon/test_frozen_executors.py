@@ -1,4 +1,4 @@
-"""Executors that a signal has frozen: stops hold."""
+"""Executors that a signal has frozen: stops hold, and rtcfctl ends them or names the way out."""
 
 import contextlib
 import signal
@@ -7,7 +7,7 @@ from contextlib import contextmanager
 
 import pytest
 import rtcf
-from daemon_process import NO_ROS, Daemon, stopped, wait_for
+from daemon_process import NO_ROS, Daemon, is_gone, stopped, wait_for
 from rtcf.v1 import runner_pb2
 from values import state
 
@@ -39,6 +39,7 @@ def frozen(daemon: Daemon) -> Iterator[int]:
         daemon.start()
         with rtcf.Client(daemon.socket) as client:
             wait_for(lambda: "its loop may be running" in state(client).status, "its silence")
+            assert f"`kill -CONT {pid}` lets its loop go on" in state(client).status
         yield pid
 
 
@@ -56,3 +57,27 @@ def test_a_stop_of_a_loop_that_is_not_adopted_yet_holds(daemon: Daemon, dies: bo
         wait_for(lambda: state(client).state == STOPPED, "the stop")
         client.start()
         assert state(client).state == runner_pb2.RUNNER_STATE_RUNNING
+
+
+def test_a_removed_runner_leaves_no_frozen_executor(daemon: Daemon) -> None:
+    with frozen(daemon) as pid:
+        removed = daemon.ctl("runner", "remove", "rt_runner")
+        assert removed.returncode == 0, removed.stderr
+        assert is_gone(pid)
+    with rtcf.Client(daemon.socket) as client:
+        added = client.add_runner("rt_runner", runner_pb2.RunnerSettings())
+        assert (added.pid != pid, added.state) == (True, STOPPED)
+
+
+def test_a_restart_replaces_a_frozen_executor(daemon: Daemon) -> None:
+    with frozen(daemon) as pid:
+        restarted = daemon.ctl("runner", "restart", "rt_runner")
+        assert restarted.returncode == 0, restarted.stderr
+        assert is_gone(pid)
+    # In order: after it was resumed, it ended by itself.
+    ends = ["safe", "stop", "cleanup"]
+    hooks = (daemon.folder / "hooks").read_text().split()
+    assert [each for each in hooks if each in ends] == ends
+    with rtcf.Client(daemon.socket) as client:
+        assert (state(client).pid != pid, state(client).state) == (True, STOPPED)
+        assert client.get_order() == ["/steady"]

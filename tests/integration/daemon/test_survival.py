@@ -142,7 +142,8 @@ def test_an_unreachable_executor_is_not_replaced(daemon: Daemon) -> None:
         shutil.rmtree(folders(daemon)[0])
         daemon.start()
         with rtcf.Client(daemon.socket) as client:
-            wait_for(lambda: f"`kill {before.pid}` ends it" in state(client).status, "its line")
+            remedy = f"`kill -CONT {before.pid}` lets its loop go on"
+            wait_for(lambda: remedy in state(client).status, "its line")
             with pytest.raises(
                 rtcf.RefusedError, match=f".pid {before.pid}. exists, but its socket"
             ):

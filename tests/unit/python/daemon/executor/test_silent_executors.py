@@ -2,18 +2,26 @@
 
 import asyncio
 import dataclasses
+import os
+import signal
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+import rtcf
+from daemon_process import is_gone, wait_for
+from daemon_under_test import DaemonUnderTest
 from peer_executor import Peer
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, errors_pb2, runner_pb2
 from rtcfd.common.errors import Silent
-from rtcfd.executor import executor, stop_socket
-from rtcfd.executor.executor import Executor
+from rtcfd.executor import executor, left_over, stop_socket
+from rtcfd.executor.command import ExecutorCommand
+from rtcfd.executor.executor import Executor, end_left_over
 from rtcfd.runners import runners
 from rtcfd.state.desired import Desired, RunnerLeaseTerms
 from rtcfd_in_process import Refused, Rtcfd, until
@@ -164,6 +172,44 @@ def test_a_silent_executor_can_confirm_a_stop_at_its_stop_socket(
     asyncio.run(play())
 
 
+def test_a_silent_executor_that_cannot_be_recognised_is_not_removed(
+    rtcfd: Callable[[], Rtcfd], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def play() -> None:
+        first, second = rtcfd(), rtcfd()
+        await running_loop(first)
+        silence = Silence(monkeypatch, None)
+        await second.start()
+        error = rf"is served by process {os.getpid()}, .* `kill -KILL {os.getpid()}`"
+        with pytest.raises(Refused, match=error):
+            await second.call("RemoveRunner", control_pb2.RemoveRunnerRequest(runner="rt_runner"))
+        with pytest.raises(Refused, match=error):
+            await second.call("RestartRunner", control_pb2.RestartRunnerRequest(runner="rt_runner"))
+        runner = second.runners.get("rt_runner")
+        silence.over.set()
+        await until(lambda: runner.up, "its adoption")
+        await second.runners.close(in_order=True)
+
+    asyncio.run(play())
+
+
+def test_the_failed_addition_of_a_runner_leaves_a_silent_executor_alone(
+    rtcfd: Callable[[], Rtcfd], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def play() -> None:
+        first, second = rtcfd(), rtcfd()
+        await running_loop(first)
+        silence = Silence(monkeypatch, None)
+        with pytest.raises(Refused, match="its loop may be running"):
+            await second.call("AddRunner", control_pb2.AddRunnerRequest(runner="rt_runner"))
+        assert second.runners.all() == []
+        assert peer_of(second).running
+        silence.over.set()
+        await second.machine.kill_all()
+
+    asyncio.run(play())
+
+
 @pytest.mark.parametrize(
     ("answer", "stopped"),
     [
@@ -211,3 +257,95 @@ def test_a_direct_stop_reaches_an_executor_that_answers_later(tmp_path: Path) ->
         server.close()
 
     asyncio.run(play())
+
+
+def left_behind(socket: Path, code: str) -> "subprocess.Popen[str]":
+    """Run a process that looks like an executor."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, "--runner", "arm", "--socket", str(socket)],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "ready\n"
+    return process
+
+
+WAITS = "print('ready', flush=True); import signal; signal.pause()"
+IGNORES = (
+    "import signal; signal.signal(signal.SIGTERM, signal.SIG_IGN)\n"
+    "print('ready', flush=True)\n"
+    "while True: signal.pause()"
+)
+
+
+@pytest.mark.parametrize(
+    ("code", "freeze", "end"),
+    [
+        (WAITS, False, signal.SIGTERM),
+        (WAITS, True, signal.SIGTERM),
+        (IGNORES, False, signal.SIGKILL),
+        (IGNORES, True, signal.SIGKILL),
+    ],
+)
+def test_an_executor_that_was_not_adopted_is_ended(
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    code: str,
+    freeze: bool,
+    end: signal.Signals,
+) -> None:
+    if end == signal.SIGKILL:
+        monkeypatch.setattr(executor, "EXIT_TIMEOUT_S", 0.05)
+    command = ExecutorCommand(Path("/nowhere"), tmp_path)
+    process = left_behind(command.socket("arm"), code)
+    if freeze:
+        process.send_signal(signal.SIGSTOP)
+    asyncio.run(end_left_over("arm", command))
+    assert process.wait() == -end
+
+
+def test_a_process_that_has_taken_the_pid_is_not_signalled(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    command = ExecutorCommand(Path("/nowhere"), tmp_path)
+    stranger = left_behind(tmp_path / "another.sock", WAITS)
+    found = [stranger.pid, None]
+    monkeypatch.setattr(left_over, "process", lambda _: found.pop(0))
+    asyncio.run(end_left_over("arm", command))
+    assert found == []
+    assert stranger.poll() is None
+    stranger.kill()
+    assert stranger.wait() == -signal.SIGKILL
+
+
+@pytest.mark.parametrize("request_", ["remove", "restart"])
+def test_remove_and_restart_end_a_frozen_executor_that_was_not_adopted(
+    stopped_daemon: DaemonUnderTest, request_: str
+) -> None:
+    daemon = stopped_daemon.start()
+    with daemon.client() as client:
+        client.set_runner(runner_pb2.RunnerSettings(orphan_timeout_s=60.0))
+        client.load(rtcf.component("demo", "Fine", name="a"))
+        client.start()
+    pid = daemon.executor_pid()
+    daemon.end(signal.SIGKILL)
+    os.kill(pid, signal.SIGSTOP)
+    daemon.start()
+    with daemon.client() as client:
+
+        def line() -> str:
+            return str(client.get_status("rt_runner").runners[0].status)
+
+        remedy = "it is frozen, by a signal or a debugger: `rtcfctl runner restart rt_runner` "
+        remedy += f"ends it, `kill -CONT {pid}` lets its loop go on"
+        wait_for(lambda: line().endswith(remedy), "its line")
+        if request_ == "remove":
+            client.remove_runner("rt_runner")
+            assert list(client.get_status().runners) == []
+        else:
+            client.restart_runner("rt_runner")
+            assert client.get_order() == ["/a"]
+            status = client.get_status().runners[0]
+            assert (status.pid != pid, status.state) == (True, runner_pb2.RUNNER_STATE_STOPPED)
+        assert is_gone(pid)
