@@ -44,6 +44,8 @@ CONNECT_TIMEOUT_S = 10.0
 QUERY_TIMEOUT_S = 5.0
 STOP_TIMEOUT_S = 10.0  # for the loop to end and the stop hooks to return
 EXIT_TIMEOUT_S = 5.0  # from the exit message, and then from SIGTERM, to the end
+FROZEN_S = 1.0  # for a frozen executor to continue
+_FROZEN_LOOK_S = 0.05
 _RETRY_S = 0.01
 _RENEW_S = 3.0  # longest time in which an executor recreates a removed socket, or ends
 _RENEW_LOOK_S = 0.1
@@ -174,6 +176,20 @@ class Executor:
         if not self._process.frozen:
             return ""
         return f"{self._peer} {_frozen(self._runner, self.pid)}"
+
+    async def require_not_frozen(self) -> None:
+        """Raise Unavailable if the process stays frozen for FROZEN_S.
+
+        For requests that it would not answer in time, before they are sent.
+        """
+        if not self._process.frozen:
+            return
+        loop = asyncio.get_running_loop()
+        deadline = loop.time() + FROZEN_S
+        while frozen := self.frozen:
+            if loop.time() > deadline:
+                raise Unavailable(frozen, errors_pb2.REASON_EXECUTOR_SILENT)
+            await asyncio.sleep(_FROZEN_LOOK_S)  # a debugger may freeze it briefly
 
     def note(self) -> Note | None:
         """Return the current content of the flight recorder; None if there is none."""

@@ -84,7 +84,10 @@ async def when_master(
 
 
 async def unload(
-    runner: RunnerCore, request: control_pb2.UnloadRequest, progress: Progress
+    runner: RunnerCore,
+    request: control_pb2.UnloadRequest,
+    progress: Progress,
+    patient: bool = False,
 ) -> control_pb2.ChangeResult:
     """Unload components.
 
@@ -112,6 +115,7 @@ async def unload(
             event=lambda _: f"{listed} unloaded",
             commit=lambda _: runner.desired.drop(names),
             component=_single(names),
+            patient=patient,
         ),
         progress,
     )

@@ -96,6 +96,7 @@ class Change:
     commit: Callable[[control_pb2.ChangeResult], None] | None = None
     kind: "control_pb2.Event.Kind | None" = control_pb2.Event.KIND_GRAPH  # None: only the log
     component: str | None = None  # of the event; None: that of the result
+    patient: bool = False  # see RunnerCore.change()
 
 
 class RunnerCore(ABC):
@@ -296,6 +297,7 @@ class RunnerCore(ABC):
     async def query(self, request: wire.Request) -> wire.Response:
         """Send a query, which does not change the graph, to the executor."""
         await self.settle()
+        await self.alive().require_not_frozen()
         return await self.ask(request, timeout_s=QUERY_TIMEOUT_S)
 
     async def ask(
@@ -403,7 +405,7 @@ class RunnerCore(ABC):
                 result.notes.extend(await self.save())
             return result, line
 
-        result, line = await self.change(change.name, work)
+        result, line = await self.change(change.name, work, patient=change.patient)
         self.log.info("%s", line)
         return result
 
@@ -413,8 +415,14 @@ class RunnerCore(ABC):
         work: Callable[[], Awaitable[Result]],
         timeout_s: float | None = CHANGE_TIMEOUT_S,
         runs_cycles: bool = False,
+        patient: bool = False,
     ) -> Result:
-        """Run one change in its turn; see Operations.take_turn()."""
+        """Run one change in its turn; see Operations.take_turn().
+
+        Raises Unavailable soon if the executor is frozen, unless the change is `patient`.
+        """
+        if not patient and self._executor is not None:
+            await self._executor.require_not_frozen()
 
         async def work_and_notify() -> Result:
             self.require_ours()

@@ -63,7 +63,7 @@ async def recover(runner: RunnerCore, verdict: Verdict, crashes: Crashes, cause:
         runner.log.warning("executor restarted in %.2f s: %s", took, runner.loop.held)
 
     try:
-        await runner.change("the recovery of its executor", work)
+        await runner.change("the recovery of its executor", work, patient=True)
     except RequestError as error:
         if not runner.up and not runner.closing:
             _give_up(runner, f"{cause}; not recovered: {error}")

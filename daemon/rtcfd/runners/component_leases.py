@@ -248,7 +248,7 @@ class ComponentLeases:
         try:
             if names:
                 request = control_pb2.UnloadRequest(components=names)
-                await graph.unload(runner, request, lambda _: None)
+                await graph.unload(runner, request, lambda _: None, patient=True)
         except RequestError as error:
             runner.log.error("%s", error)
         finally:
@@ -339,7 +339,7 @@ class ComponentLeases:
             names = [name for name in group if name in runner.desired.components]
             if names and not runner.closing:
                 request = control_pb2.UnloadRequest(components=names)
-                await graph.unload(runner, request, lambda _: None)
+                await graph.unload(runner, request, lambda _: None, patient=True)
         except RequestError as error:
             # It has no holder now; the list of components shows it.
             runner.log.error("%s stays loaded: %s", ", ".join(group), error)

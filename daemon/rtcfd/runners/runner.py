@@ -58,7 +58,7 @@ class Runner(RunnerCore):
         async def work() -> bool:
             return await bring_up(self, only_left_over, boot)
 
-        return await self.change("the start of its executor", work)
+        return await self.change("the start of its executor", work, patient=True)
 
     async def shut_down(
         self,
@@ -118,7 +118,7 @@ class Runner(RunnerCore):
             # Not in a turn: a hanging change only ends with its executor.
             await self.end_executor("its executor is being restarted")
             self.loop.held = self.loop.fault = ""
-            await self.change("the restart of its executor", fresh)
+            await self.change("the restart of its executor", fresh, patient=True)
             self.log.info("executor restarted")
 
         await self.operations.begin("the restart", work)
@@ -307,7 +307,7 @@ class Runner(RunnerCore):
             await self.save()
 
         try:
-            await self.change("a change of parameters by ROS", work)
+            await self.change("a change of parameters by ROS", work, patient=True)
         except RequestError as error:
             self._changed_by_ros = {}
             self.log.warning("parameters changed by ROS are not noted: %s", error)
@@ -355,7 +355,7 @@ class Runner(RunnerCore):
     async def follow_limits(self) -> None:
         """Apply changed limits and access rules."""
         try:
-            await self.change("a change of limits", self.limit)
+            await self.change("a change of limits", self.limit, patient=True)
         except RequestError as error:
             self.log.error("limits not changed: %s", error)
 
@@ -373,7 +373,7 @@ class Runner(RunnerCore):
                 await self.ask(wire.Request(configure=change))
 
         try:
-            await self.change("a change of defaults", work)
+            await self.change("a change of defaults", work, patient=True)
         except RequestError as error:
             return [f"{self.name}: not changed: {error}"]
         return [f"{self.name}: {line}" for line in lines]

@@ -126,7 +126,7 @@ class RunnerLease:
             await runner.save()
             runner.log.info("held by %s", terms.holder)
 
-        await runner.change("the begin of a launch", work)
+        await runner.change("the begin of a launch", work, patient=True)
         return runner
 
 
@@ -178,7 +178,7 @@ async def _release(runners: Runners, runner: Runner, hold: RunnerLeaseTerms) -> 
         await runner.save()
 
     try:
-        await runner.change("the end of its launch", work)
+        await runner.change("the end of its launch", work, patient=True)
     except RequestError as error:
         runner.log.error("%s", error)
     runner.log.info("given back by %s", hold.holder)

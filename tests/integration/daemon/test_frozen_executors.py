@@ -81,3 +81,17 @@ def test_a_restart_replaces_a_frozen_executor(daemon: Daemon) -> None:
     with rtcf.Client(daemon.socket) as client:
         assert (state(client).pid != pid, state(client).state) == (True, STOPPED)
         assert client.get_order() == ["/steady"]
+
+
+def test_a_request_to_a_frozen_executor_names_the_way_out(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    pid = begin(daemon, client)
+    with stopped(pid):
+        for command in (["load", "rtcf_test", "Knobs"], ["list"], ["stats"], ["info", "steady"]):
+            done = daemon.ctl(*command)
+            assert done.returncode == 1, done.stdout
+            assert f"(pid {pid}) is frozen, by a signal or a debugger" in done.stderr
+            assert f"`kill -CONT {pid}` lets its loop go on" in done.stderr
+    # The change has not even begun.
+    assert client.get_order() == ["/steady"]

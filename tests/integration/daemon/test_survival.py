@@ -10,6 +10,7 @@ import signal
 import subprocess
 import threading
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -153,11 +154,15 @@ def test_an_unreachable_executor_is_not_replaced(daemon: Daemon) -> None:
         assert state(client).state == runner_pb2.RUNNER_STATE_RUNNING
 
 
-def test_a_change_waiting_for_its_executor_reports_it(daemon: Daemon) -> None:
-    with rtcf.Client(daemon.socket) as client:
+def test_a_change_waiting_for_its_executor_reports_it(daemon: Daemon, tmp_path: Path) -> None:
+    file = tmp_path / "plugged in"
+    slow = rtcf.component(
+        "rtcf_test", "ConfiguresOnceThereIs", name="slow", parameters=[f"file:={file}"]
+    )
+    with rtcf.Client(daemon.socket) as client, ThreadPoolExecutor() as pool:
         client.load(rtcf.component("rtcf_test", "Knobs", name="knobs"))
-        executor = state(client).pid
-    with stopped(executor):
+        loading = pool.submit(client.load, slow)
+        wait_for(lambda: "busy with the load of" in state(client).status, "the load")
         setting = subprocess.Popen(
             ["rtcfctl", "-v", "set", "knobs", "count:=7"],
             env=daemon.environment(),
@@ -167,8 +172,10 @@ def test_a_change_waiting_for_its_executor_reports_it(daemon: Daemon) -> None:
         )
         assert setting.stderr is not None
         assert "still waiting after" in setting.stderr.readline()
-    _, rest = setting.communicate()
-    assert setting.returncode == 0, rest
+        file.touch()
+        _, rest = setting.communicate()
+        assert setting.returncode == 0, rest
+        loading.result()
 
 
 def test_the_crash_of_an_adopted_executor_is_explained_by_its_flight_recorder(

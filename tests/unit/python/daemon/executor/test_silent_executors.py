@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 import rtcf
-from daemon_process import is_gone, wait_for
+from daemon_process import is_gone, stopped, wait_for
 from daemon_under_test import DaemonUnderTest
 from peer_executor import Peer
 from rtcf.executor.v1 import executor_pb2 as wire
@@ -349,3 +349,19 @@ def test_remove_and_restart_end_a_frozen_executor_that_was_not_adopted(
             status = client.get_status().runners[0]
             assert (status.pid != pid, status.state) == (True, runner_pb2.RUNNER_STATE_STOPPED)
         assert is_gone(pid)
+
+
+def test_a_request_to_a_frozen_executor_fails_before_it_is_sent(
+    daemon: DaemonUnderTest, client: rtcf.Client
+) -> None:
+    pid = daemon.executor_pid()
+    error = rf"\(pid {pid}\) is frozen, by a signal or a debugger: .* `kill -CONT {pid}`"
+    with stopped(pid):
+        with pytest.raises(rtcf.RefusedError, match=error):
+            client.load(rtcf.component("demo", "Fine"))
+        with pytest.raises(rtcf.RefusedError, match=error):
+            client.start()
+        with pytest.raises(rtcf.RefusedError, match=error):
+            client.list_components()
+    assert client.get_order() == []
+    assert client.get_status().runners[0].state == runner_pb2.RUNNER_STATE_STOPPED
