@@ -16,8 +16,8 @@ namespace rtcf::executor {
 
 namespace {
 
-constexpr std::uint32_t kMagic = 0x42435452;  // "RTCB"
-constexpr std::uint32_t kVersion = 1;
+constexpr std::uint32_t kFramesMagic = 0x42435452;  // "RTCB"
+constexpr std::uint32_t kFramesVersion = 1;
 // Bytes; block sizes are powers of two, so that blocks can be reused.
 constexpr std::size_t kSmallest = 4096;
 
@@ -67,8 +67,8 @@ FrameMemory::FrameMemory() : fd_(::memfd_create("rtcf-frames", MFD_CLOEXEC)) {
         throw;
     }
     end_ = kSmallest;
-    directory_->magic = kMagic;
-    directory_->version = kVersion;
+    directory_->magic = kFramesMagic;
+    directory_->version = kFramesVersion;
 }
 
 FrameMemory::~FrameMemory() {
