@@ -162,7 +162,8 @@ class Lives:
     def _make(
         self, loop: asyncio.AbstractEventLoop, work: Any, context: Any = None
     ) -> "asyncio.Task[Any]":
-        task = asyncio.Task(work, loop=loop, context=context)
+        make: Any = asyncio.Task  # mypy of Debian 12 does not know its parameter `context`
+        task: asyncio.Task[Any] = make(work, loop=loop, context=context)
         life = (context or contextvars.copy_context()).get(self._life, 0)
         self._tasks.setdefault(life, weakref.WeakSet()).add(task)
         return task
