@@ -82,7 +82,7 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
             moment.condition.check(stream.schema)
         say_if_idle(client, args.runner, output)
         runner = args.runner or "rt_runner"
-        with Files(args.file, runner, force=args.force) as files, ended_by_signals(stream):
+        with ended_by_signals(stream), Files(args.file, runner, force=args.force) as files:
             _follow(stream, files, moment, args, output)
     _tell(files, moment, output)
 
