@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rtcf_shared.errors import RtcfError
+from rtcf_shared.processes import is_frozen
 
 from rtcf.errors import DaemonUnreachableError, RefusedError
 from rtcf.failures import refused
@@ -211,7 +212,7 @@ def _ask(path: Path, runner: str) -> Stopped:
         raise refused(
             f"runner {runner} is stopping, but {reason}", "UNAVAILABLE", "LOOP_STUCK", about
         )
-    if not hung_up and _state(pid) in ("T", "t"):
+    if not hung_up and is_frozen(pid):
         problem = (
             f"the executor of runner {runner} (pid {pid}) is frozen, by a signal or a debugger: "
             f"its loop does not run now, but continues with the process; end it with `rtcfctl "
@@ -240,12 +241,3 @@ def _wait_for_end(pid: int) -> bool:
         return bool(waiting.poll(TIMEOUT_S * 1000))
     finally:
         os.close(process)
-
-
-def _state(pid: int) -> str:
-    """Return the letter of a process's state, see proc(5); empty if it is not visible."""
-    try:
-        text = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
-    except OSError:
-        return ""
-    return text.rpartition(")")[2].split()[0]

@@ -74,14 +74,15 @@ class ExecutorCommand:
 
     def remove_folders(self) -> None:
         """Remove our folders if they are empty.  Only for the holder of the RuntimeLock."""
-        for folder in (self.stop_folder, self.claims_folder, self.folder):
+        for folder in (self.stop_folder, self.claims_folder):
             # Several daemons may share the folder of claims, which is elsewhere then.
             if folder is not None and folder.parent == self.folder.parent:
                 with contextlib.suppress(OSError):
-                    if folder == self.folder:
-                        # Last: from now on another rtcfd may make the folders again.
-                        self.lock_file.unlink(missing_ok=True)
                     folder.rmdir()
+        with contextlib.suppress(OSError):
+            # Last: from now on another rtcfd may make the folders again.
+            self.lock_file.unlink(missing_ok=True)
+            self.folder.rmdir()
 
     def socket(self, runner: str) -> Path:
         """Return the path of the socket that a runner's executor listens on."""

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import errors_pb2, ports_pb2
+from rtcf_shared.processes import is_frozen
 
 from rtcfd import VERSION
 from rtcfd.common.background import log_failure
@@ -36,7 +37,7 @@ from rtcfd.executor.link import (
     Progress,
     Unasked,
 )
-from rtcfd.executor.watched_process import Child, End, Process, is_frozen
+from rtcfd.executor.watched_process import Child, End, Process
 
 log = logging.getLogger(__name__)
 

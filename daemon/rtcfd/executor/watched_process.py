@@ -11,7 +11,8 @@ import os
 import signal
 import subprocess
 from dataclasses import dataclass
-from pathlib import Path
+
+from rtcf_shared.processes import is_frozen
 
 
 @dataclass(frozen=True)
@@ -82,15 +83,6 @@ class Child(Process):
 
     def _how_it_ended(self) -> End:
         return End(self._process.poll())
-
-
-def is_frozen(pid: int) -> bool:
-    """Return whether a signal or a debugger has stopped a process."""
-    try:
-        text = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace")
-    except OSError:
-        return False
-    return text.rpartition(")")[2].split()[0] in ("T", "t")
 
 
 def describe_exit(status: int) -> str:

@@ -80,8 +80,10 @@ class Runner(RunnerCore):
         if in_order and self.loop.wanted:
             self.loop.stop()
             saving.append(asyncio.create_task(self.save()))
-        await self.end_executor("it is being ended", spare_silent)
-        await asyncio.gather(*saving)
+        try:
+            await self.end_executor("it is being ended", spare_silent)
+        finally:
+            await asyncio.gather(*saving)
         self.end_leases(why, f"runner {self.name}: {message}")
         self.logs.end()
         await self.operations.drain()

@@ -97,11 +97,17 @@ class Silence:
         monkeypatch.setattr(runners, "_LOOK_AGAIN_S", 0.01)
 
 
-async def running_loop(daemon: Rtcfd) -> None:
-    """Start a loop, and leave it to the next rtcfd."""
-    await daemon.start()
-    await daemon.call("Start", control_pb2.StartRequest())
-    await daemon.runners.leave()
+async def successor(
+    rtcfd: Callable[[], Rtcfd],
+    monkeypatch: pytest.MonkeyPatch,
+    direct_stop: wire.DirectStop | None = None,
+) -> tuple[Rtcfd, Silence]:
+    """Leave a running loop to a second rtcfd, whose `hello` the executor does not answer."""
+    first, second = rtcfd(), rtcfd()
+    await first.start()
+    await first.call("Start", control_pb2.StartRequest())
+    await first.runners.leave()
+    return second, Silence(monkeypatch, direct_stop)
 
 
 def peer_of(daemon: Rtcfd) -> Peer:
@@ -119,9 +125,7 @@ def test_a_loop_stopped_while_its_executor_is_silent_is_stopped_at_its_adoption(
     before = wire.DirectStop(count=1, at_ns=time.monotonic_ns(), uid=0, pid=1)
 
     async def play() -> None:
-        first, second = rtcfd(), rtcfd()
-        await running_loop(first)
-        silence = Silence(monkeypatch, before if stopped_before else None)
+        second, silence = await successor(rtcfd, monkeypatch, before if stopped_before else None)
         await second.start()
         with pytest.raises(Refused, match="its loop stops when its executor answers again"):
             await second.call("Stop", control_pb2.StopRequest())
@@ -145,9 +149,7 @@ def test_a_silent_executor_can_confirm_a_stop_at_its_stop_socket(
     rtcfd: Callable[[], Rtcfd], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     async def play() -> None:
-        first, second = rtcfd(), rtcfd()
-        await running_loop(first)
-        silence = Silence(monkeypatch, None)
+        second, silence = await successor(rtcfd, monkeypatch)
         peer, shared = peer_of(second), second.runners._shared
 
         async def serve(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
@@ -176,9 +178,7 @@ def test_a_silent_executor_that_cannot_be_recognised_is_not_removed(
     rtcfd: Callable[[], Rtcfd], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def play() -> None:
-        first, second = rtcfd(), rtcfd()
-        await running_loop(first)
-        silence = Silence(monkeypatch, None)
+        second, silence = await successor(rtcfd, monkeypatch)
         await second.start()
         error = rf"is served by process {os.getpid()}, .* `kill -KILL {os.getpid()}`"
         with pytest.raises(Refused, match=error):
@@ -197,9 +197,7 @@ def test_the_failed_addition_of_a_runner_leaves_a_silent_executor_alone(
     rtcfd: Callable[[], Rtcfd], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     async def play() -> None:
-        first, second = rtcfd(), rtcfd()
-        await running_loop(first)
-        silence = Silence(monkeypatch, None)
+        second, silence = await successor(rtcfd, monkeypatch)
         with pytest.raises(Refused, match="its loop may be running"):
             await second.call("AddRunner", control_pb2.AddRunnerRequest(runner="rt_runner"))
         assert second.runners.all() == []
