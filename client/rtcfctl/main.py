@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 import rtcf
 from rtcf.connection import DEFAULT_SOCKET
 
+from rtcfctl.terminal.repeated_signals import kill_at_next
+
 if TYPE_CHECKING:
     from rtcfctl.terminal.output import Output
 
@@ -118,7 +120,8 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
     During an import, try again 20 ms later: the import system would lose the exception, or
     report a missing module.
     """
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    if number == signal.SIGINT:
+        kill_at_next(number)
     while frame is not None:
         if any(frame.f_globals is vars(each) for each in _IMPORTS):
             signal.signal(signal.SIGALRM, _interrupt)

@@ -16,6 +16,7 @@ BUILD_TREE = Path(str(rtcf.__file__)).parents[2]
 # ignore it. Not preexec_fn: a fork beside an open client hangs on Debian 13.
 MINDS_CTRL_C = ("env", "--default-signal=INT,HUP")
 DEADLINE_S = 60.0
+_BETWEEN_S = 0.005
 _POLL_S = 0.01
 
 # Without real-time rights the loops run degraded, since these tests measure no time.
@@ -42,6 +43,13 @@ def wait_until_it_is(wanted: Any, ask: Callable[[], Any], what: str) -> None:
     while (found := ask()) != wanted:
         assert time.monotonic() < deadline, f"{what}: {found!r} is not {wanted!r}"
         time.sleep(_POLL_S)
+
+
+def signal_twice(process: subprocess.Popen[Any], number: signal.Signals) -> None:
+    """Signal a process as timeout(1) does: the process, and then its group."""
+    process.send_signal(number)
+    time.sleep(_BETWEEN_S)
+    process.send_signal(number)
 
 
 @contextmanager

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 
 from rtcf.streams.ports import PortStream
 
+from rtcfctl.terminal.repeated_signals import kill_at_next
+
 
 @contextlib.contextmanager
 def ended_by_signals(stream: PortStream) -> Iterator[None]:
@@ -16,9 +18,9 @@ def ended_by_signals(stream: PortStream) -> Iterator[None]:
     """
 
     def end(number: int, _: object) -> None:
-        signal.signal(number, signal.SIG_DFL)
         # By a thread, because the interrupted code may hold locks of the stream.
         threading.Thread(target=stream.close, daemon=True).start()
+        kill_at_next(number)
 
     before = {}
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):

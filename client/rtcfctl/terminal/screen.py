@@ -13,6 +13,8 @@ import tty
 from types import FrameType
 from typing import Any, Self
 
+from rtcfctl.terminal.repeated_signals import kill_at_next
+
 _ENTER, _LEAVE = "\x1b[?1049h\x1b[?25l\x1b[?7l", "\x1b[?7h\x1b[?25h\x1b[?1049l"
 # Synchronized update: terminals that support it show the output between these at once.
 _BEGIN, _END = "\x1b[?2026h", "\x1b[?2026l"
@@ -128,4 +130,5 @@ class Screen:
 
 
 def _end(number: int, _: FrameType | None) -> None:
+    kill_at_next(number)
     raise SystemExit(128 + number)

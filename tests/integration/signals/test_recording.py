@@ -16,7 +16,14 @@ from typing import Any
 import numpy as np
 import pytest
 import rtcf
-from daemon_process import BUILD_TREE, MINDS_CTRL_C, Daemon, clean_environment, wait_for
+from daemon_process import (
+    BUILD_TREE,
+    MINDS_CTRL_C,
+    Daemon,
+    clean_environment,
+    signal_twice,
+    wait_for,
+)
 
 # MCAP's reference reader, which is not in Debian.
 _MCAP = ("mcap==1.6.0", "lz4==4.4.5", "zstandard==0.25.0")
@@ -179,7 +186,7 @@ def test_a_file_of_a_killed_writer_can_be_read(
 def test_ctrl_c_ends_the_file_in_order(running: Daemon, tmp_path: Path) -> None:
     file = tmp_path / "run.mcap"
     process = _begun(running, file)
-    process.send_signal(signal.SIGINT)
+    signal_twice(process, signal.SIGINT)
     said, _ = process.communicate()
     assert process.returncode == 0
     assert b"none lost" in said
@@ -400,7 +407,7 @@ def test_the_last_cycles_of_a_loop_are_written_immediately(
 def test_a_signal_interrupts_no_write(
     running: Daemon, tmp_path: Path, number: signal.Signals
 ) -> None:
-    # A disk that accepts one page, and then blocks for a while.
+    # A disk that accepts the head of the file and some cycles, and then blocks for a while.
     disk = tmp_path / "disk"
     os.mkfifo(disk)
     reader = os.open(disk, os.O_RDONLY | os.O_NONBLOCK)
@@ -410,6 +417,10 @@ def test_a_signal_interrupts_no_write(
          disk, "--force"],
         env=clean_environment(),
     )  # fmt: skip
+    written = b""
+    while len(written) < 100_000:
+        select.select([reader], [], [])
+        written += os.read(reader, 4096)
     writer = os.open(disk, os.O_WRONLY)
     wait_for(lambda: not select.select([], [writer], [], 0)[1], "a full disk")
     os.close(writer)
@@ -421,7 +432,7 @@ def test_a_signal_interrupts_no_write(
     os.set_blocking(reader, True)
     file = tmp_path / "run.mcap"
     with open(reader, "rb") as disk_file:
-        file.write_bytes(disk_file.read())
+        file.write_bytes(written + disk_file.read())
     assert process.wait() == 0
     with rtcf.read_recording(file) as recording:
         assert recording.whole

@@ -12,7 +12,14 @@ from typing import Any
 import numpy as np
 import pytest
 import rtcf
-from daemon_process import BUILD_TREE, MINDS_CTRL_C, Daemon, clean_environment, wait_for
+from daemon_process import (
+    BUILD_TREE,
+    MINDS_CTRL_C,
+    Daemon,
+    clean_environment,
+    signal_twice,
+    wait_for,
+)
 from rtcf.v1 import runner_pb2
 
 Event = dict[str, Any]
@@ -56,7 +63,7 @@ def tracing(daemon: Daemon, file: Path, expected: int = 0) -> Iterator[None]:
         wait_for(begun, "the first cycles")
         yield
         if not expected:
-            process.send_signal(signal.SIGINT)
+            signal_twice(process, signal.SIGINT)
         _, said = process.communicate(timeout=60)
         assert process.returncode == expected, said
     finally:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import graphs
 import pytest
 import rtcf
-from daemon_process import Daemon
+from daemon_process import Daemon, signal_twice
 from terminal import Terminal
 
 _LEFT = b"\x1b[?7h\x1b[?25h\x1b[?1049l"
@@ -140,7 +140,7 @@ def test_the_terminal_is_left_as_it_was_found(
 ) -> None:
     terminals.append(terminal := Terminal(running, *words))
     terminal.see("wave")
-    terminal.process.send_signal(number)
+    signal_twice(terminal.process, number)
     assert terminal.end() == code
     assert _LEFT in terminal.shown
     assert b"Traceback" not in terminal.shown

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 import rtcf
 import yaml
-from daemon_process import BUILD_TREE, MINDS_CTRL_C, wait_for
+from daemon_process import BUILD_TREE, MINDS_CTRL_C, signal_twice, wait_for
 from daemon_under_test import DaemonUnderTest
 from rtcf.v1 import graph_pb2, runner_pb2
 from rtcfctl.loop.runner import settings_of
@@ -115,7 +115,7 @@ def test_ctrl_c_is_exit_code_1_and_the_operation_continues(
     ) as process:  # fmt: skip
         assert process.stderr is not None
         assert any("configuring Slow" in line for line in process.stderr)
-        process.send_signal(signal.SIGINT)
+        signal_twice(process, signal.SIGINT)
         said = process.stderr.read()
         assert process.wait() == 1
     assert said == "rtcfctl: interrupted; a change that had started continues\n"
