@@ -9,10 +9,14 @@ from typing import Any
 
 from rtcf_shared import whole_files
 from rtcfd.common import regular_files
-from rtcfd.state import store
+from rtcfd.runners import runner
+from rtcfd.state import saver, store
 
 MODES = ("well", "hangs", "full", "read-only")
 _LONGEST_S = 60.0  # longest hang in a test
+# rtcfd's patience with a disk that hangs, which is detected quickly, and with one that works, also
+# on a loaded machine.
+_SHORT_S, _LONG_S = 0.02, 2.0
 
 
 class Killed(BaseException):
@@ -39,20 +43,19 @@ class FailingDisk:
     def become(self, mode: str) -> None:
         """Set one of MODES; "dead": no write succeeds in this life."""
         with self._changed:
-            self._mode = mode
+            self._enter(mode)
             self.ever_bad |= mode != "well"
-            self._changed.notify_all()
 
     def next_life(self) -> None:
         """End the present rtcfd; its successor starts with a disk that answers."""
         with self._changed:
             self._life += 1
-            if self._mode in ("hangs", "dead"):
-                self._mode = "well"
-            self._changed.notify_all()
+            self._enter("well" if self._mode in ("hangs", "dead") else self._mode)
 
     def install(self, monkeypatch: Any) -> None:
         """Install it between the store and its folder."""
+        monkeypatch.setattr(saver, "PATIENCE_S", _LONG_S)
+        monkeypatch.setattr(runner, "LEAVE_TIMEOUT_S", _LONG_S)
         monkeypatch.setattr(store, "whole_files", self)
         monkeypatch.setattr(store, "regular_files", self)
         unmark, remove = store._unmark, store.Store.remove
@@ -76,6 +79,11 @@ class FailingDisk:
 
     read_bytes = staticmethod(regular_files.read_bytes)
     read_text = staticmethod(regular_files.read_text)
+
+    def _enter(self, mode: str) -> None:
+        self._mode = mode
+        saver.PATIENCE_S = runner.LEAVE_TIMEOUT_S = _SHORT_S if mode == "hangs" else _LONG_S
+        self._changed.notify_all()
 
     def _do(self, file: Path, work: Callable[[], None], room: bool = False) -> None:
         if file.parent != self._folder:

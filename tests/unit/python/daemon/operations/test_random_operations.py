@@ -23,7 +23,6 @@ from hypothesis import HealthCheck, Phase, example, given, seed, settings
 from hypothesis import strategies as st
 from rtcf.v1 import control_pb2, runner_pb2
 from rtcfd.runners import component_leases, runner_leases
-from rtcfd.state import saver
 from rtcfd_in_process import Lives, Machine, Refused, Rtcfd, quiet, spec
 
 SEED = int(os.environ.get("RTCF_SEED", "1"))
@@ -236,9 +235,6 @@ def world() -> Any:
     world = World()
     with pytest.MonkeyPatch.context() as patch:
         world.install(patch)
-        # Hanging disks are detected quickly.
-        patch.setattr(saver, "PATIENCE_S", 0.02)
-        patch.setattr("rtcfd.runners.runner.LEAVE_TIMEOUT_S", 0.1)
         yield world
         world.disk.next_life()
 
