@@ -79,9 +79,8 @@ class Sequence:
             await watching
         self._check_end()
         await self.rtcfd.runners.close(in_order=True)
-        for name in RUNNERS:
-            saved = self.rtcfd.saved(name)
-            assert saved is None or saved["running"] is False
+        for state in self.rtcfd.store.load():
+            assert not state.running, f"the next rtcfd starts {state.runner}"
 
     async def _take(self, action: Any, caller: Any) -> None:
         if action[0] in ("SIGTERM", "SIGUSR1", "SIGKILL"):
@@ -294,6 +293,15 @@ def drawn(number: int) -> Any:
         (("disk", "hangs"), "waits", 0),
         (("Stop", "arm"), "waits", 0),
         (("SIGKILL",), "waits", 0),
+    ]
+)
+# A removal that a bad disk refuses.
+@example(
+    sequence=[
+        (("AddRunner", "arm"), "waits", 0),
+        (("Start", "arm"), "waits", 0),
+        (("disk", "read-only"), "waits", 0),
+        (("RemoveRunner", "arm"), "waits", 0),
     ]
 )
 @drawn(40)  # type: ignore[misc]
