@@ -13,6 +13,7 @@
 #include <system_error>
 
 #include "common/error.hpp"
+#include "realtime/cycle_counter.hpp"
 
 namespace rtcf::executor {
 
@@ -93,6 +94,30 @@ std::uint32_t FlightRecorder::addSlot(const std::string& name) {
 void FlightRecorder::removeSlot(std::uint32_t slot) noexcept {
     page_->names[slot][0] = '\0';
     free_.push_back(slot);
+}
+
+void FlightRecorder::enterHook(std::uint32_t slot, Hook hook) {
+    noteGraph(slot, hook,
+              fmt::format("{}.{}", static_cast<const char*>(page_->names[slot]), hookName(hook)));
+}
+
+void FlightRecorder::enterLibrary(const std::string& component) {
+    noteGraph(0, Hook::None, fmt::format("{}.{}", component, hookName(Hook::Constructor)));
+}
+
+void FlightRecorder::leaveHook() noexcept { noteGraph(0, Hook::None, {}); }
+
+void FlightRecorder::noteGraph(std::uint32_t slot, Hook hook, std::string activity) noexcept {
+    page_->graph_slot.store(slot, std::memory_order_relaxed);
+    page_->graph_hook.store(static_cast<std::uint32_t>(hook), std::memory_order_relaxed);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    graph_activity_ = std::move(activity);
+    graph_since_ns_ = monotonicNow();
+}
+
+std::pair<std::string, std::int64_t> FlightRecorder::graphActivity() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return {graph_activity_, graph_since_ns_};
 }
 
 std::string FlightRecorder::realtimeActivity() const {

@@ -1,12 +1,14 @@
 /// @file
 /// The flight recorder: shared memory that shows, after any end of the process, what its threads
-/// were doing. rtcfd holds it open. Each note is one store. executor.proto defines the layout.
+/// were doing. rtcfd holds it open. executor.proto defines the layout.
 #pragma once
 
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <mutex>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "rtcf/realtime.hpp"
@@ -57,7 +59,18 @@ class FlightRecorder {
     void removeSlot(std::uint32_t slot) noexcept;
     /// @}
 
-    /// @name Notes; real-time safe
+    /// @name Hooks of the graph thread, which notes them
+    /// @{
+    void enterHook(std::uint32_t slot, Hook hook);
+    /// Notes that the library of a component is opened, which runs its static initializers.
+    void enterLibrary(const std::string& component);
+    void leaveHook() noexcept;
+    /// Component and hook, e.g. "/H1.prepare", or an empty string; and since when
+    /// (CLOCK_MONOTONIC, ns). Any thread.
+    std::pair<std::string, std::int64_t> graphActivity() const;
+    /// @}
+
+    /// @name Notes; real-time safe, each is one store
     /// @{
     /// Notes of the real-time thread, see below.
     class RealtimeNotes;
@@ -65,11 +78,6 @@ class FlightRecorder {
     void setRunning(bool running) noexcept RTCF_NONBLOCKING {
         page_->running.store(running ? 1 : 0, std::memory_order_relaxed);
     }
-    void enterHook(std::uint32_t slot, Hook hook) noexcept {
-        page_->graph_slot.store(slot, std::memory_order_relaxed);
-        page_->graph_hook.store(static_cast<std::uint32_t>(hook), std::memory_order_relaxed);
-    }
-    void leaveHook() noexcept { enterHook(0, Hook::None); }
     /// Records a crash; only the first one counts. Async-signal-safe.
     /// @return true if this is the first one
     bool noteCrash(int signal, ThreadRole thread, CrashReason reason, const void* address) noexcept;
@@ -109,10 +117,15 @@ class FlightRecorder {
     static_assert(offsetof(Page, crash_address) == 40 && offsetof(Page, names) == 64,
                   "the layout is in executor.proto");
 
+    void noteGraph(std::uint32_t slot, Hook hook, std::string activity) noexcept;
+
     int fd_ = -1;
     Page* page_ = nullptr;
     std::vector<std::uint32_t> free_;
     std::uint32_t next_ = 1;
+    mutable std::mutex mutex_;  // of the members below
+    std::string graph_activity_;
+    std::int64_t graph_since_ns_ = 0;
 };
 
 /// Notes of the real-time thread. Copy the object into a local variable, so that a note is one

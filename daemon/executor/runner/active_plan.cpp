@@ -12,7 +12,6 @@ void ActivePlan::startComponents(const Progress& progress,
             Instance& instance = *plan_->graph.nodes()[index].instance;
             progress("starting " + instance.fullName());
             require_go();
-            activity_.begin(instance.fullName() + ".start");
             started.push_back(&instance);
             instance.setFault({});
             instance.start();
@@ -28,9 +27,7 @@ void ActivePlan::startComponents(const Progress& progress,
 void ActivePlan::stopComponents() noexcept {
     // In reverse order of execution, so that a component's writers run as long as it does.
     for (auto index = plan_->wiring.order.rbegin(); index != plan_->wiring.order.rend(); ++index) {
-        Instance& instance = *plan_->graph.nodes()[*index].instance;
-        activity_.begin(instance.fullName() + ".stop");
-        instance.stop();
+        plan_->graph.nodes()[*index].instance->stop();
     }
 }
 

@@ -9,14 +9,11 @@
 
 #include "ordering/plan.hpp"
 #include "runner/change_outcome.hpp"
-#include "runner/hook_activity.hpp"
 
 namespace rtcf::executor {
 
 class ActivePlan {
    public:
-    explicit ActivePlan(HookActivity& activity) : activity_(activity) {}
-
     Plan& operator*() noexcept { return *plan_; }
     const Plan& operator*() const noexcept { return *plan_; }
     Plan* operator->() noexcept { return plan_.get(); }
@@ -38,7 +35,6 @@ class ActivePlan {
     void stopComponents() noexcept;
 
    private:
-    HookActivity& activity_;
     std::unique_ptr<Plan> plan_ = std::make_unique<Plan>();
 };
 

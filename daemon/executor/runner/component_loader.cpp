@@ -9,13 +9,11 @@
 namespace rtcf::executor {
 
 ComponentLoader::ComponentLoader(std::string runner, const Loop& loop, LoopControl& control,
-                                 const BridgeLink& bridge, HookActivity& activity, Log& log,
-                                 FlightRecorder& recorder)
+                                 const BridgeLink& bridge, Log& log, FlightRecorder& recorder)
     : runner_(std::move(runner)),
       loop_(loop),
       control_(control),
       bridge_(bridge),
-      activity_(activity),
       log_(log),
       recorder_(recorder) {}
 
@@ -24,8 +22,9 @@ std::shared_ptr<Instance> ComponentLoader::make(ComponentDefinition definition,
                                                 const Progress& progress, bool configure) {
     const std::string full_name = definition.fullName();
     progress("loading " + full_name);
-    activity_.begin(full_name + ".constructor");
+    recorder_.enterLibrary(full_name);
     const std::shared_ptr<const Library> code = libraries_.open(library);
+    recorder_.leaveHook();
     requireThreadLocals(*code);
     auto instance = std::make_shared<Instance>(std::move(definition), code, runner_, loop_.clock(),
                                                log_, recorder_, bridge_.hooks());
@@ -34,7 +33,6 @@ std::shared_ptr<Instance> ComponentLoader::make(ComponentDefinition definition,
         return instance;
     }
     progress("configuring " + full_name);
-    activity_.begin(full_name + ".configure");
     instance->configure();
     return instance;
 }

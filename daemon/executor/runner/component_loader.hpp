@@ -16,7 +16,6 @@
 #include "plugins/library.hpp"
 #include "runner/bridge_link.hpp"
 #include "runner/change_outcome.hpp"
-#include "runner/hook_activity.hpp"
 #include "runner/loop_control.hpp"
 
 namespace rtcf::executor {
@@ -26,8 +25,7 @@ class ComponentLoader {
     /// @param runner name of the runner, for log records and messages
     /// All references outlive this object.
     ComponentLoader(std::string runner, const Loop& loop, LoopControl& control,
-                    const BridgeLink& bridge, HookActivity& activity, Log& log,
-                    FlightRecorder& recorder);
+                    const BridgeLink& bridge, Log& log, FlightRecorder& recorder);
 
     /// Trusts libraries of this user from here on.
     void trust(uid_t owner) { libraries_.trust(owner); }
@@ -46,7 +44,6 @@ class ComponentLoader {
     const Loop& loop_;
     LoopControl& control_;
     const BridgeLink& bridge_;
-    HookActivity& activity_;
     Log& log_;
     FlightRecorder& recorder_;
     LibraryStore libraries_;

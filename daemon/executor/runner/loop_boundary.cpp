@@ -19,15 +19,10 @@ constexpr std::int64_t kPeriodOfMostBytes = 500'000;  // ns
 }  // namespace
 
 LoopBoundary::LoopBoundary(std::string runner, const RunnerSettings& settings, Loop& loop,
-                           const FlightRecorder& recorder, HookActivity& activity)
-    : runner_(std::move(runner)),
-      settings_(settings),
-      loop_(loop),
-      recorder_(recorder),
-      activity_(activity) {}
+                           const FlightRecorder& recorder)
+    : runner_(std::move(runner)), settings_(settings), loop_(loop), recorder_(recorder) {}
 
 void LoopBoundary::adopt(Adoption& adoption) {
-    activity_.end();
     if (loop_.adopt(adoption, timeout())) return;
     throw Error(ErrorKind::Unavailable,
                 fmt::format("the loop of {} reaches no cycle boundary: {}; nothing has changed",

@@ -10,7 +10,6 @@
 
 #include "faults/flight_recorder.hpp"
 #include "loop/loop.hpp"
-#include "runner/hook_activity.hpp"
 #include "view/settings.hpp"
 
 namespace rtcf::executor {
@@ -20,7 +19,7 @@ class LoopBoundary {
     /// @param runner   name of the runner, for messages
     /// @param settings present settings of the runner
     LoopBoundary(std::string runner, const RunnerSettings& settings, Loop& loop,
-                 const FlightRecorder& recorder, HookActivity& activity);
+                 const FlightRecorder& recorder);
 
     /// Applies an adoption.
     /// @throws Error if the loop does not apply it in time; nothing has changed then
@@ -44,7 +43,6 @@ class LoopBoundary {
     const RunnerSettings& settings_;
     Loop& loop_;
     const FlightRecorder& recorder_;
-    HookActivity& activity_;
 };
 
 }  // namespace rtcf::executor

@@ -11,7 +11,7 @@ namespace rtcf::executor {
 
 OfflineRun::OfflineRun(std::string runner, Loop& loop, LoopControl& control, ActivePlan& plan,
                        FrameKeeper& frames, const Publication& publication, BridgeLink& bridge,
-                       Transactions& transactions, HookActivity& activity, Log& log)
+                       Transactions& transactions, Log& log)
     : runner_(std::move(runner)),
       loop_(loop),
       control_(control),
@@ -20,7 +20,6 @@ OfflineRun::OfflineRun(std::string runner, Loop& loop, LoopControl& control, Act
       publication_(publication),
       bridge_(bridge),
       transactions_(transactions),
-      activity_(activity),
       log_(log) {}
 
 ChangeOutcome OfflineRun::step(std::uint64_t cycles, const Progress& progress,
@@ -34,7 +33,6 @@ ChangeOutcome OfflineRun::step(std::uint64_t cycles, const Progress& progress,
         const std::uint64_t done = frames_.step(wanted, given_up);
         left -= done;
         log_.drain();
-        activity_.end();  // resets its time, as a long run is not a hook that hangs
         if (done < wanted) break;
         if (left > 0) progress(fmt::format("{} of {} cycles", cycles - left, cycles));
     }
@@ -64,7 +62,6 @@ ReplayOutcome OfflineRun::replay(const ReplayChunk& chunk, const Progress& progr
         }
     }
     log_.drain();
-    activity_.end();
     const bool failed = ended();
     if ((chunk.end && !outcome.more) || failed) end();
     if (failed) throw Error(ErrorKind::LoopFailed, publication_.status().loop_fault);

@@ -13,7 +13,6 @@
 #include "runner/bridge_link.hpp"
 #include "runner/change_outcome.hpp"
 #include "runner/frame_keeper.hpp"
-#include "runner/hook_activity.hpp"
 #include "runner/loop_control.hpp"
 #include "runner/publication.hpp"
 #include "runner/replay.hpp"
@@ -27,7 +26,7 @@ class OfflineRun {
     /// All references outlive this object.
     OfflineRun(std::string runner, Loop& loop, LoopControl& control, ActivePlan& plan,
                FrameKeeper& frames, const Publication& publication, BridgeLink& bridge,
-               Transactions& transactions, HookActivity& activity, Log& log);
+               Transactions& transactions, Log& log);
 
     /// Runs cycles on a simulated clock, as fast as possible; then pauses.
     /// @param given_up set by any thread to pause at the next boundary; null = never
@@ -55,7 +54,6 @@ class OfflineRun {
     const Publication& publication_;
     BridgeLink& bridge_;
     Transactions& transactions_;
-    HookActivity& activity_;
     Log& log_;
     std::unique_ptr<Replay> replay_;  // null = no replay
 };

@@ -20,18 +20,16 @@ Runner::Runner(std::string name, Log& log, EventConsumer events, std::unique_ptr
       recorder_(recorder),
       loop_(log, recorder, std::move(cpu_claims)),
       bridge_(std::move(bridge)),
-      plan_(activity_),
       frames_(loop_, log),
-      boundary_(name_, settings_, loop_, recorder, activity_),
+      boundary_(name_, settings_, loop_, recorder),
       control_(
           name_, settings_, loop_, boundary_, plan_, publication_, bridge_, log,
           [this](const RunnerEvent& event) { reportEvent(event); }, ending_),
-      loader_(name_, loop_, control_, bridge_, activity_, log, recorder),
+      loader_(name_, loop_, control_, bridge_, log, recorder),
       transactions_(name_, settings_, loop_, boundary_, control_, plan_, frames_, publication_,
-                    bridge_, loader_, activity_, log),
+                    bridge_, loader_, log),
       values_(name_, loop_, boundary_, control_, plan_, publication_, bridge_, transactions_, log),
-      offline_(name_, loop_, control_, plan_, frames_, publication_, bridge_, transactions_,
-               activity_, log),
+      offline_(name_, loop_, control_, plan_, frames_, publication_, bridge_, transactions_, log),
       snapshots_(name_, settings_, loop_, boundary_, control_, plan_, transactions_, offline_) {
     validate(settings_);
     control_.publishStatus();
@@ -77,7 +75,7 @@ void Runner::threadMain() {
         lock.unlock();
         control_.beginJob(job.stops);
         if (job.work) logErrors(log_, "a change", job.work);
-        activity_.end();
+        recorder_.leaveHook();
         logErrors(log_, "supervising the loop", [this] { tick(); });
         lock.lock();
     }

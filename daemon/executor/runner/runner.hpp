@@ -32,7 +32,6 @@
 #include "runner/change_outcome.hpp"
 #include "runner/component_loader.hpp"
 #include "runner/frame_keeper.hpp"
-#include "runner/hook_activity.hpp"
 #include "runner/loop_boundary.hpp"
 #include "runner/loop_control.hpp"
 #include "runner/offline_run.hpp"
@@ -165,8 +164,6 @@ class Runner final : private RunnerView {
     }
     /// See Loop. One thread only.
     void holdStatistics(bool held) noexcept { loop_.holdStatistics(held); }
-    /// Hook that the graph thread is running, and since when (CLOCK_MONOTONIC, ns); empty = none.
-    std::pair<std::string, std::int64_t> activity() const { return activity_.present(); }
     /// @}
 
    private:
@@ -195,7 +192,6 @@ class Runner final : private RunnerView {
     Loop loop_;
     BridgeLink bridge_;
     bool discards_cycles_ = true;  // no bridge consumes the cycle records
-    HookActivity activity_;
     ActivePlan plan_;
     Publication publication_;
     FrameKeeper frames_;

@@ -30,7 +30,7 @@ void stagePeriod(Instance& instance, std::int64_t loop_period_ns,
 Transactions::Transactions(std::string runner, const RunnerSettings& settings, const Loop& loop,
                            LoopBoundary& boundary, LoopControl& control, ActivePlan& plan,
                            FrameKeeper& frames, const Publication& publication, BridgeLink& bridge,
-                           ComponentLoader& loader, HookActivity& activity, Log& log)
+                           ComponentLoader& loader, Log& log)
     : runner_(std::move(runner)),
       settings_(settings),
       loop_(loop),
@@ -41,7 +41,6 @@ Transactions::Transactions(std::string runner, const RunnerSettings& settings, c
       publication_(publication),
       bridge_(bridge),
       loader_(loader),
-      activity_(activity),
       log_(log) {}
 
 MappingFilter Transactions::filter() const {
@@ -78,7 +77,6 @@ std::vector<std::string> Transactions::adopt(Change change, const Progress& prog
     if (loop_.running() || control_.state() == RunnerState::Stepping) {
         for (const auto& instance : change.arriving) {
             progress("starting " + instance->fullName());
-            activity_.begin(instance->fullName() + ".start");
             instance->start();
         }
     }
@@ -98,9 +96,7 @@ std::vector<std::string> Transactions::adopt(Change change, const Progress& prog
     // The leaving components are out of the loop, so their hooks may take long.
     for (const auto& instance : change.leaving) {
         control_.reportFaults(*instance);
-        activity_.begin(instance->fullName() + ".stop");
         instance->stop();
-        activity_.begin(instance->fullName() + ".cleanup");
         instance->cleanup();
     }
     logErrors(log_, "supervising the loop", [this] { control_.noticeEnd(); });

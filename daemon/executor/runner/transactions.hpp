@@ -25,7 +25,6 @@
 #include "runner/change_outcome.hpp"
 #include "runner/component_loader.hpp"
 #include "runner/frame_keeper.hpp"
-#include "runner/hook_activity.hpp"
 #include "runner/loop_boundary.hpp"
 #include "runner/loop_control.hpp"
 #include "runner/publication.hpp"
@@ -56,7 +55,7 @@ class Transactions {
     Transactions(std::string runner, const RunnerSettings& settings, const Loop& loop,
                  LoopBoundary& boundary, LoopControl& control, ActivePlan& plan,
                  FrameKeeper& frames, const Publication& publication, BridgeLink& bridge,
-                 ComponentLoader& loader, HookActivity& activity, Log& log);
+                 ComponentLoader& loader, Log& log);
 
     /// Limits the number of published outputs; later changes beyond the limit are rejected.
     void limitTaps(std::size_t most) noexcept { most_taps_ = most; }
@@ -131,7 +130,6 @@ class Transactions {
     const Publication& publication_;
     BridgeLink& bridge_;
     ComponentLoader& loader_;
-    HookActivity& activity_;
     Log& log_;
     std::set<std::string> written_;  // mapped names of inputs of makeWritable()
     std::size_t most_taps_ = SIZE_MAX;

@@ -359,7 +359,7 @@ void Server::servePorts() {
 }
 
 std::string Server::stuck() const {
-    const auto [activity, since_ns] = runner_->activity();
+    const auto [activity, since_ns] = runner_->recorder().graphActivity();
     return !activity.empty() && monotonicNow() - since_ns > kHookTimeout ? activity : std::string();
 }
 

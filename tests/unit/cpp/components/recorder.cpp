@@ -67,6 +67,9 @@ class Recorder : public rtcf::Component {
 class Blocker final : public Recorder {
     rtcf::Parameter<std::string> blocks{this, "blocks", "configure"};
 
+    bool prepare(const rtcf::Values& proposed) override {
+        return Recorder::prepare(proposed) && pass("prepare");
+    }
     bool configure() override { return Recorder::configure() && pass("configure"); }
     bool start() override { return Recorder::start() && pass("start"); }
     void stop() override {

@@ -133,7 +133,7 @@ class Soak : public RunnerFixture {
                     (void)component->statistics->duration.snapshot();
                 (void)runner().loop().statistics().duration.snapshot();
                 (void)runner().status();
-                (void)runner().activity();
+                (void)runner().recorder().graphActivity();
                 std::this_thread::yield();
             }
         });

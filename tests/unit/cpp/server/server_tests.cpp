@@ -334,6 +334,41 @@ TEST_F(ServerTest, StopEndsTheLoopWhileAHookBlocks) {
     EXPECT_TRUE(client.answerTo(stopping).has_change());
 }
 
+TEST_F(ServerTest, EachHookOfTheGraphThreadIsNamed) {
+    ExecutorClient client(socket_);
+    client.hello();
+    const auto activity = [this] { return runner_.recorder().graphActivity().first; };
+    Request set;
+    set.mutable_set_parameters()->set_component("B");
+    rtcf::v1::ParameterSetting& gain = *set.mutable_set_parameters()->add_parameters();
+    gain.set_name("gain");
+    gain.mutable_value()->set_double_value(2);
+    Request stop;
+    stop.mutable_stop();
+    for (const std::string hook : {"configure", "start", "prepare", "stop"}) {
+        Request loading = load("Blocker", "B");
+        rtcf::v1::ParameterSetting& blocks =
+            *loading.mutable_load()->mutable_component()->add_parameters();
+        blocks.set_name("blocks");
+        blocks.mutable_value()->set_string_value(hook);
+        const std::vector<std::pair<std::string, Request>> requests = {{"configure", loading},
+                                                                       {"start", start()},
+                                                                       {"prepare", set},
+                                                                       {"stop", stop},
+                                                                       {"cleanup", unload("B")}};
+        for (const auto& [name, request] : requests) {
+            journal().gate_open = name != hook;
+            const std::uint64_t sent = client.send(request);
+            if (name == hook) {
+                EXPECT_TRUE(eventually([&] { return activity() == "/B." + hook; })) << activity();
+            }
+            journal().gate_open = true;
+            EXPECT_TRUE(client.answerTo(sent).has_change()) << hook << ": " << name;
+            EXPECT_TRUE(eventually([&] { return activity().empty(); })) << activity();
+        }
+    }
+}
+
 // Takes ten seconds, the time limit of a hook.
 TEST_F(ServerTest, AbandonedChangeIsNotMadeLater) {
     ExecutorClient client(socket_);
