@@ -271,8 +271,10 @@ class Pid final : public rtcf::Component {
     // not jump. Without integral action nothing would remove this part again, so effort jumps.
     void adoptGains(double schedule) {
         const Gains now{kp, kd, setpoint_weight, derivative_weight, dead_band, schedule};
-        if (begun_ && ki != 0.0 && now != gains_.value()) integral_ += terms(gains_) - terms(now);
-        gains_ = now;
+        if (now != gains_.value()) {
+            if (begun_ && ki != 0.0) integral_ += terms(gains_) - terms(now);
+            gains_ = now;
+        }
         begun_ = true;
     }
 
