@@ -44,12 +44,20 @@ struct BridgeTable {
 /// A batch of parameter changes (name, value).
 using ParameterBatch = std::vector<std::pair<std::string, ParameterValue>>;
 
+/// Effect of one rejected value on the others of its batch.
+enum class BatchPolicy {
+    Whole,  ///< all values are rejected
+    Each,   ///< the others take effect
+};
+
 /// Function by which a bridge requests a change of a component's parameters. Any thread; returns at
 /// once.
+/// @param batch takes effect at one cycle if no value is rejected
 /// @param done called once by the graph thread, with the error text or an empty string; not called
 /// if the runner ends first
-using ParameterRequest = std::function<void(const std::string& component, ParameterBatch batch,
-                                            std::function<void(const std::string&)> done)>;
+using ParameterRequest =
+    std::function<void(const std::string& component, ParameterBatch batch, BatchPolicy policy,
+                       std::function<void(const std::string&)> done)>;
 
 /// Settings of a bridge.
 struct BridgeSettings {

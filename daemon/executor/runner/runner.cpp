@@ -1,5 +1,6 @@
 #include "runner/runner.hpp"
 
+#include "common/error.hpp"
 #include "faults/crash_handler.hpp"
 #include "logging/log_errors.hpp"
 
@@ -33,11 +34,11 @@ Runner::Runner(std::string name, Log& log, EventConsumer events, std::unique_ptr
       snapshots_(name_, settings_, loop_, boundary_, control_, plan_, transactions_, offline_) {
     validate(settings_);
     control_.publishStatus();
-    discards_cycles_ =
-        !bridge_.attach(*this, [this](const std::string& component, ParameterBatch batch,
-                                      std::function<void(const std::string&)> done) {
-            post([this, component, batch = std::move(batch), done = std::move(done)] {
-                changeByBridge(component, batch, done);
+    discards_cycles_ = !bridge_.attach(
+        *this, [this](const std::string& component, ParameterBatch batch, BatchPolicy policy,
+                      std::function<void(const std::string&)> done) {
+            post([this, component, batch = std::move(batch), policy, done = std::move(done)] {
+                changeByBridge(component, batch, policy, done);
             });
         });
     thread_ = std::thread([this] { threadMain(); });
@@ -139,6 +140,7 @@ ChangeOutcome Runner::stop(const Progress& progress) {
 }
 
 void Runner::changeByBridge(const std::string& component, const ParameterBatch& batch,
+                            BatchPolicy policy,
                             const std::function<void(const std::string&)>& done) {
     std::string message;
     try {
@@ -147,6 +149,18 @@ void Runner::changeByBridge(const std::string& component, const ParameterBatch& 
         for (const auto& [name, value] : batch) event.parameters.push_back(name);
         reportEvent(event);
     } catch (const std::exception& error) {
+        const auto* const known = dynamic_cast<const Error*>(&error);
+        if (policy == BatchPolicy::Each && batch.size() > 1 && known != nullptr &&
+            (known->kind() == ErrorKind::InvalidArgument ||
+             known->kind() == ErrorKind::HookFailed)) {
+            for (const auto& value : batch) {
+                changeByBridge(component, {value}, policy, [&message](const std::string& rejected) {
+                    if (!rejected.empty()) message = rejected;
+                });
+            }
+            done(message);
+            return;
+        }
         message = error.what();
         log_.write(LogLevel::Warn, component, "a change requested by ROS was rejected: " + message);
     }

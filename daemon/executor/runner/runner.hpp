@@ -180,7 +180,7 @@ class Runner final : private RunnerView {
     void reportEvent(const RunnerEvent& event) noexcept;
     /// Changes parameters at the request of the bridge.
     void changeByBridge(const std::string& component, const ParameterBatch& batch,
-                        const std::function<void(const std::string&)>& done);
+                        BatchPolicy policy, const std::function<void(const std::string&)>& done);
 
     const std::string name_;
     Log& log_;

@@ -217,7 +217,7 @@ void ParameterMirror::ask(const std::string& component, executor::ParameterBatch
         const std::lock_guard lock(pending_->mutex);
         pending_->asked.insert(component);
     }
-    request_(component, std::move(batch),
+    request_(component, std::move(batch), executor::BatchPolicy::Each,
              [pending = pending_, name = component](const std::string& error) {
                  const std::lock_guard lock(pending->mutex);
                  pending->asked.erase(name);

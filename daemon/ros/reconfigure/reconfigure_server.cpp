@@ -112,7 +112,7 @@ bool ReconfigureServer::change(const dynamic_reconfigure::ReconfigureRequest& as
     if (!batch.empty()) {
         const auto done = std::make_shared<std::promise<bool>>();
         std::future<bool> outcome = done->get_future();
-        request_(before->full_name, std::move(batch),
+        request_(before->full_name, std::move(batch), executor::BatchPolicy::Whole,
                  [done](const std::string& error) { done->set_value(!error.empty()); });
         const auto deadline = std::chrono::steady_clock::now() + kPatience;
         while (outcome.wait_for(kSlice) != std::future_status::ready) {

@@ -212,8 +212,7 @@ def test_the_loop_follows_the_parameter_server_within_its_bounds(
         wait_for(told, "the reason")
     assert values(client)["count"] == 5
     # A valid value next to an invalid one, which is rejected once.
-    master.run("rosparam", "set", f"{_NAME}/count", "12")
-    master.run("rosparam", "set", f"{_NAME}/mode", "run")
+    master.run("rosparam", "set", _NAME, "{count: 12, mode: run}")
     wait_for(lambda: values(client)["mode"] == "run", "the loop to follow the change")
     wait_for(lambda: master.parameter(f"{_NAME}/count") == 5, "the present value")
 

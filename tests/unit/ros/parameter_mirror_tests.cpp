@@ -8,6 +8,7 @@
 
 namespace {
 
+using rtcf::executor::BatchPolicy;
 using rtcf::executor::ParameterSet;
 using rtcf::ros1::MasterAddress;
 using rtcf::ros1::MasterCall;
@@ -61,7 +62,7 @@ class ParameterMirrorTest : public RosFixture {
 // Pending deletions for an unloaded component must not affect a component loaded later.
 TEST_F(ParameterMirrorTest, DeletesNothingOfAReloadedComponent) {
     ParameterMirror mirror;
-    mirror.serve([](const std::string&, const rtcf::executor::ParameterBatch&,
+    mirror.serve([](const std::string&, const rtcf::executor::ParameterBatch&, BatchPolicy,
                     const std::function<void(const std::string&)>& done) { done({}); });
     mirror.reconcile(calls(), caller_, {component(2.0)});
     ASSERT_TRUE(ask("getParam", texts({"/test", "/C/kp"}))[0]);
@@ -79,7 +80,7 @@ TEST_F(ParameterMirrorTest, DeletesNothingOfAReloadedComponent) {
 TEST_F(ParameterMirrorTest, OverwritesNoNewValueOfTheLoopWithAnOldOne) {
     std::vector<double> taken;
     ParameterMirror mirror;
-    mirror.serve([&](const std::string&, const rtcf::executor::ParameterBatch& batch,
+    mirror.serve([&](const std::string&, const rtcf::executor::ParameterBatch& batch, BatchPolicy,
                      const std::function<void(const std::string&)>& done) {
         taken.push_back(std::get<double>(batch.at(0).second));
         done({});
@@ -101,7 +102,7 @@ TEST_F(ParameterMirrorTest, OverwritesNoNewValueOfTheLoopWithAnOldOne) {
 TEST_F(ParameterMirrorTest, HandlesAKeyOfSlashesLikeAnyOther) {
     int asked = 0;
     ParameterMirror mirror;
-    mirror.serve([&](const std::string&, const rtcf::executor::ParameterBatch&,
+    mirror.serve([&](const std::string&, const rtcf::executor::ParameterBatch&, BatchPolicy,
                      const std::function<void(const std::string&)>& done) {
         ++asked;
         done({});
@@ -122,7 +123,7 @@ TEST_F(ParameterMirrorTest, HandlesAKeyOfSlashesLikeAnyOther) {
 TEST_F(ParameterMirrorTest, WritesNoTextThatXmlCannotCarry) {
     const auto problemOf = [this](const std::string& text) {
         ParameterMirror mirror;
-        mirror.serve([](const std::string&, const rtcf::executor::ParameterBatch&,
+        mirror.serve([](const std::string&, const rtcf::executor::ParameterBatch&, BatchPolicy,
                         const std::function<void(const std::string&)>& done) { done({}); });
         mirror.reconcile(calls(), caller_, {textComponent(text)});
         return mirror.problem();
@@ -149,7 +150,7 @@ TEST_F(ParameterMirrorTest, RequestsNoNanThatIsSetAlready) {
     constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
     int asked = 0;
     ParameterMirror mirror;
-    mirror.serve([&](const std::string&, const rtcf::executor::ParameterBatch&,
+    mirror.serve([&](const std::string&, const rtcf::executor::ParameterBatch&, BatchPolicy,
                      const std::function<void(const std::string&)>& done) {
         ++asked;
         done({});

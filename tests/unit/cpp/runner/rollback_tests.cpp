@@ -202,13 +202,33 @@ TEST_F(Rollback, NoExceptionInAChangeByRosEndsTheProcess) {
     start();
     loseEvents();
     std::promise<std::string> answer;
-    bridge().request("/A", {{"gain", 2.0}},
+    bridge().request("/A", {{"gain", 2.0}}, executor::BatchPolicy::Whole,
                      [&](const std::string& refused) { answer.set_value(refused); });
     EXPECT_EQ(answer.get_future().get(), "");
     EXPECT_EQ(parameter("/A", "gain"), ParameterValue(2.0));
-    bridge().request("/A", {{"gain", 3.0}}, [](const std::string&) { throw std::bad_alloc(); });
+    bridge().request("/A", {{"gain", 3.0}}, executor::BatchPolicy::Whole,
+                     [](const std::string&) { throw std::bad_alloc(); });
     EXPECT_TRUE(runs());
     EXPECT_EQ(stop().order, std::vector<std::string>{"/A"});
+}
+
+TEST_F(Rollback, ARejectedValueOfRosLeavesTheOthersIfRequested) {
+    load(definition("Recorder", "A"));
+    start();
+    const auto request = [this](executor::BatchPolicy policy) {
+        std::promise<std::string> answer;
+        bridge().request("/A", {{"text", std::string("new")}, {"gain", 11.0}, {"limit", 5.0}},
+                         policy, [&](const std::string& refused) { answer.set_value(refused); });
+        return answer.get_future().get();
+    };
+    const std::string rejected = request(executor::BatchPolicy::Whole);
+    EXPECT_NE(rejected.find("is above its maximum 10"), std::string::npos) << rejected;
+    EXPECT_EQ(parameter("/A", "text"), ParameterValue(std::string("as told")));
+    EXPECT_EQ(request(executor::BatchPolicy::Each), rejected);
+    EXPECT_EQ(parameter("/A", "text"), ParameterValue(std::string("new")));
+    EXPECT_EQ(parameter("/A", "limit"), ParameterValue(5.0));
+    EXPECT_EQ(parameter("/A", "gain"), ParameterValue(1.0));
+    EXPECT_TRUE(runs());
 }
 
 // With or without a report, the loop ends in order.
