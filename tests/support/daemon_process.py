@@ -46,7 +46,7 @@ def wait_until_it_is(wanted: Any, ask: Callable[[], Any], what: str) -> None:
 
 
 def signal_twice(process: subprocess.Popen[Any], number: signal.Signals) -> None:
-    """Signal a process as timeout(1) does: the process, and then its group."""
+    """Signal a process twice, as timeout(1) does, which signals the process and its group."""
     process.send_signal(number)
     time.sleep(_BETWEEN_S)
     process.send_signal(number)

@@ -11,6 +11,13 @@ namespace {
 constexpr auto kTick = std::chrono::milliseconds(20);
 constexpr std::int64_t kProbeTimeout = 100'000'000;
 
+// True if a change of parameters failed because of a value, not because of the state of the loop.
+bool isOfAValue(const std::exception& error) {
+    const auto* const known = dynamic_cast<const Error*>(&error);
+    return known != nullptr &&
+           (known->kind() == ErrorKind::InvalidArgument || known->kind() == ErrorKind::HookFailed);
+}
+
 }  // namespace
 
 Runner::Runner(std::string name, Log& log, EventConsumer events, std::unique_ptr<Bridge> bridge,
@@ -149,10 +156,7 @@ void Runner::changeByBridge(const std::string& component, const ParameterBatch& 
         for (const auto& [name, value] : batch) event.parameters.push_back(name);
         reportEvent(event);
     } catch (const std::exception& error) {
-        const auto* const known = dynamic_cast<const Error*>(&error);
-        if (policy == BatchPolicy::Each && batch.size() > 1 && known != nullptr &&
-            (known->kind() == ErrorKind::InvalidArgument ||
-             known->kind() == ErrorKind::HookFailed)) {
+        if (policy == BatchPolicy::Each && batch.size() > 1 && isOfAValue(error)) {
             for (const auto& value : batch) {
                 changeByBridge(component, {value}, policy, [&message](const std::string& rejected) {
                     if (!rejected.empty()) message = rejected;
