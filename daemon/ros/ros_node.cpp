@@ -18,10 +18,7 @@ RosNode::~RosNode() {
     thread_.join();
 }
 
-bool RosNode::attach(executor::RunnerView& runner) {
-    watch_->attach(runner, ask_);
-    return true;
-}
+void RosNode::attach(executor::RunnerView& runner) { watch_->attach(runner, ask_); }
 
 void RosNode::configure(const executor::BridgeSettings& settings) { watch_->configure(settings); }
 

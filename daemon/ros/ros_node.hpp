@@ -39,7 +39,7 @@ class RosNode final : public executor::Bridge {
     RosNode(const RosNode&) = delete;
     RosNode& operator=(const RosNode&) = delete;
 
-    bool attach(executor::RunnerView& runner) override;
+    void attach(executor::RunnerView& runner) override;
     void configure(const executor::BridgeSettings& settings) override;
     void setTable(std::shared_ptr<const executor::BridgeTable> table) override;
     void setClock(std::shared_ptr<executor::SimulatedClock> clock) override;

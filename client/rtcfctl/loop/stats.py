@@ -117,6 +117,12 @@ def _print(found: runner_pb2.RunnerStatistics, output: Output) -> None:
     for count, what in ((found.log_dropped, "log record"), (found.tap_dropped, "mapped value")):
         if count:
             output.line(f"{counted(count, what)} dropped (ring full)", "yellow")
+    if found.uncounted:
+        output.line(
+            f"{counted(found.uncounted, 'cycle')} missing in the durations: overwritten before "
+            "they were counted; lower frame_kb",
+            "yellow",
+        )
     output.line("")
     output.table(
         ("component (µs)", *_COLUMNS, "overruns"),

@@ -101,12 +101,7 @@ class Bridge {
     virtual ~Bridge() = default;
 
     /// Sets the runner, which outlives the bridge. Called once, before all other functions.
-    /// @return true if the bridge consumes the runner's cycle records; else the runner discards
-    /// them
-    virtual bool attach(RunnerView& runner) {
-        (void)runner;
-        return false;
-    }
+    virtual void attach(RunnerView& /*runner*/) {}
 
     /// Changes the settings. The first call starts the bridge.
     virtual void configure(const BridgeSettings& settings) = 0;

@@ -17,7 +17,7 @@ namespace rtcf::executor {
 namespace {
 
 constexpr std::uint32_t kFramesMagic = 0x42435452;  // "RTCB"
-constexpr std::uint32_t kFramesVersion = 1;
+constexpr std::uint32_t kFramesVersion = 2;
 // Bytes; block sizes are powers of two, so that blocks can be reused.
 constexpr std::size_t kSmallest = 4096;
 
@@ -55,7 +55,10 @@ FrameBlock::FrameBlock(int fd, std::uint64_t offset, std::size_t bytes)
 
 FrameBlock::~FrameBlock() { ::munmap(words_, bytes_); }
 
-void FrameBlock::clear() noexcept { std::memset(static_cast<void*>(words_), 0, bytes_); }
+void FrameBlock::clear() noexcept {
+    for (std::size_t i = 0; i < bytes_ / sizeof(Word); ++i)
+        words_[i].store(0, std::memory_order_relaxed);
+}
 
 FrameMemory::FrameMemory() : fd_(::memfd_create("rtcf-frames", MFD_CLOEXEC)) {
     if (fd_ < 0) throw std::system_error(errno, std::generic_category(), "no memory for frames");

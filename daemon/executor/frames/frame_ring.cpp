@@ -17,9 +17,12 @@ std::size_t capacityOf(std::size_t words_of_frame, std::size_t frames) {
 
 }  // namespace
 
-FrameRing::FrameRing(std::vector<Source> sources, std::size_t frames, FrameMemory* memory)
+FrameRing::FrameRing(std::vector<Source> sources, std::size_t steps, std::size_t frames,
+                     const CycleCounter& counter, FrameMemory* memory)
     : copy_(std::move(sources)),
-      stride_(kHeadWords + copy_.words()),
+      counter_(counter),
+      steps_(steps),
+      stride_(kHeadWords + steps + copy_.words()),
       mask_(capacityOf(stride_, frames) - 1) {
     const std::size_t words = capacity() * stride_;
     if (memory != nullptr) block_ = memory->take(words * FrameCopy::kWord);
@@ -33,30 +36,41 @@ FrameRing::FrameRing(std::vector<Source> sources, std::size_t frames, FrameMemor
     writing_ = words_;
 }
 
-std::size_t FrameRing::capacityFor(const std::vector<Source>& sources, std::size_t frames) {
-    return capacityOf(kHeadWords + FrameCopy(sources).words(), frames);
+std::size_t FrameRing::capacityFor(const std::vector<Source>& sources, std::size_t steps,
+                                   std::size_t frames) {
+    return capacityOf(kHeadWords + steps + FrameCopy(sources).words(), frames);
+}
+
+CycleTicks FrameRing::lastTicks() const noexcept RTCF_NONBLOCKING {
+    const Word* const frame = at(end_.load(std::memory_order_relaxed) - 1);
+    const auto get = [frame](Head place) {
+        return static_cast<std::int64_t>(frame[place].load(std::memory_order_relaxed));
+    };
+    return {get(kBegin), get(kReady), get(kEnd)};
 }
 
 void FrameRing::putBack(void* value) const noexcept RTCF_NONBLOCKING {
     const std::uint64_t end = end_.load(std::memory_order_relaxed);
-    const Word* const last = end == base_end_ ? base_.get() : at(end - 1) + kHeadWords;
+    const Word* const last = end == base_end_ ? base_.get() : at(end - 1) + kHeadWords + steps_;
     for (std::size_t i = 0; i < copy_.sources().size(); ++i) {
         if (copy_.sources()[i].from == value) copy_.copyBack(last, i, value);
     }
 }
 
-bool FrameRing::read(std::uint64_t number, Frame& frame) const {
+bool FrameRing::read(std::uint64_t number, Frame& frame, std::size_t words) const {
     const Word* const word = at(number);
     const auto get = [word](std::size_t place) {
         return word[place].load(std::memory_order_acquire);
     };
     const std::uint64_t whole = 2 * number + 2;
     if (get(kMark) != whole) return false;
+    frame.ticks_ = {signedOf(get(kBegin)), signedOf(get(kReady)), signedOf(get(kEnd))};
     frame.cycle_ = {get(kIteration), signedOf(get(kStamp)), signedOf(get(kLatency)),
-                    signedOf(get(kDuration))};
-    frame.last_of_loop_ = get(kLast) != 0;
-    frame.words_.resize(stride_ - kHeadWords);
-    for (std::size_t i = 0; i < frame.words_.size(); ++i) frame.words_[i] = get(kHeadWords + i);
+                    counter_.toNs(frame.ticks_.end - frame.ticks_.begin)};
+    frame.kind_ = static_cast<FrameKind>(get(kKind));
+    frame.steps_ = steps_;
+    frame.words_.resize(words);
+    for (std::size_t i = 0; i < words; ++i) frame.words_[i] = get(kHeadWords + i);
     return get(kMark) == whole;
 }
 

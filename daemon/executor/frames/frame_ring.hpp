@@ -1,7 +1,8 @@
 /// @file
-/// The ring of frames. At the end of each cycle, the real-time thread copies the cycle's record and
-/// values into the next frame. There is one writer and any number of readers; the writer does not
-/// know the readers and never waits for them. A late reader finds its frame overwritten, and
+/// The ring of frames: the record of each cycle. At the begin of a cycle, the real-time thread
+/// begins the next frame; it notes the end of each component's update() there, and adds the values
+/// and the cycle's times at the end. There is one writer and any number of readers; the writer does
+/// not know the readers and never waits for them. A late reader finds its frame overwritten, and
 /// detects a frame that is being written. Words are atomic, with release and acquire order, which
 /// costs nothing on x86-64.
 #pragma once
@@ -15,35 +16,57 @@
 #include "frames/cycle_record.hpp"
 #include "frames/frame_copy.hpp"
 #include "frames/frame_memory.hpp"
+#include "realtime/cycle_counter.hpp"
 #include "rtcf/realtime.hpp"
 
 namespace rtcf::executor {
+
+/// Times of a cycle, ticks of the cycle counter. All 0 in the last frame of a loop.
+struct CycleTicks {
+    std::int64_t begin;  ///< the end of the wait
+    std::int64_t ready;  ///< the begin of the first component, after the exchange of values
+    std::int64_t end;
+};
+
+/// Numbers as in executor.proto.
+enum class FrameKind : std::uint64_t { Counted = 0, LastOfLoop = 1, WarmUp = 2 };
 
 /// A reader's copy of one frame.
 class Frame {
    public:
     const CycleRecord& cycle() const noexcept { return cycle_; }
-    bool lastOfLoop() const noexcept { return last_of_loop_; }
-    /// The values, each at its FrameRing::offset().
+    bool lastOfLoop() const noexcept { return kind_ == FrameKind::LastOfLoop; }
+    /// True if statistics include the cycle: it is neither the last one nor of the warm-up.
+    bool counted() const noexcept { return kind_ == FrameKind::Counted; }
+    const CycleTicks& ticks() const noexcept { return ticks_; }
+    /// Ends of the components' update(), in the order of the schedule; 0 = did not run.
+    const std::uint64_t* ended() const noexcept { return words_.data(); }
+    /// The values, each at its FrameRing::offset(). Not after FrameRing::readTicks().
     const std::uint8_t* values() const noexcept {
-        return reinterpret_cast<const std::uint8_t*>(words_.data());
+        return reinterpret_cast<const std::uint8_t*>(words_.data() + steps_);
     }
 
    private:
     friend class FrameRing;
     CycleRecord cycle_{};
-    bool last_of_loop_ = false;
+    CycleTicks ticks_{};
+    FrameKind kind_ = FrameKind::Counted;
+    std::size_t steps_ = 0;
     std::vector<std::uint64_t> words_;
 };
 
 class FrameRing {
    public:
     using Source = FrameCopy::Source;
+    using Word = FrameBlock::Word;
 
-    /// @param frames wanted capacity; reduced if the ring would exceed kLargestRing
+    /// @param steps   number of components that note their end
+    /// @param frames  wanted capacity; reduced if the ring would exceed kLargestRing
+    /// @param counter of the ticks
     /// @param memory memory for a ring that outlives the process; null, or memory without room: the
     /// ring is in the process's own memory
-    FrameRing(std::vector<Source> sources, std::size_t frames, FrameMemory* memory = nullptr);
+    FrameRing(std::vector<Source> sources, std::size_t steps, std::size_t frames,
+              const CycleCounter& counter, FrameMemory* memory = nullptr);
     FrameRing(const FrameRing&) = delete;
     FrameRing& operator=(const FrameRing&) = delete;
 
@@ -53,12 +76,17 @@ class FrameRing {
 
     /// @name Cycle thread; real-time safe
     /// @{
-    /// Copies the values into the next frame. Readers cannot read it before commit().
-    void take() noexcept RTCF_NONBLOCKING {
+    /// Begins the next frame. Readers cannot read it before commit().
+    /// @return the words for the end of each component's update(), ticks; 0 = did not run
+    Word* begin() noexcept RTCF_NONBLOCKING {
         Word* const frame = writing_;
         frame[kMark].store(2 * end_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
-        copy_.copy(frame + kHeadWords);
+        return frame + kHeadWords;
     }
+    /// The words of begin() until commit().
+    const Word* ended() const noexcept RTCF_NONBLOCKING { return writing_ + kHeadWords; }
+    /// Copies the values into the frame.
+    void take() noexcept RTCF_NONBLOCKING { copy_.copy(writing_ + kHeadWords + steps_); }
     /// Records the present values after they were changed outside of a cycle, for putBack().
     void setBase() noexcept RTCF_NONBLOCKING {
         copy_.copy(base_.get());
@@ -68,20 +96,35 @@ class FrameRing {
     /// not a source.
     /// @param value address of the source's value
     void putBack(void* value) const noexcept RTCF_NONBLOCKING;
-    /// Adds the cycle's record and makes the frame readable.
-    void commit(const CycleRecord& cycle, bool last_of_loop) noexcept RTCF_NONBLOCKING {
-        const auto put = [frame = writing_](Head place, std::uint64_t value) {
-            frame[place].store(value, std::memory_order_release);
+    /// Adds the cycle's times and makes the frame readable.
+    void commit(std::uint64_t iteration, std::int64_t stamp_ns, std::int64_t latency_ns,
+                const CycleTicks& ticks, FrameKind kind = FrameKind::Counted) noexcept
+        RTCF_NONBLOCKING {
+        const auto put = [frame = writing_](Head place, auto value) {
+            frame[place].store(static_cast<std::uint64_t>(value), std::memory_order_release);
         };
-        put(kIteration, cycle.iteration);
-        put(kStamp, static_cast<std::uint64_t>(cycle.stamp_ns));
-        put(kLatency, static_cast<std::uint64_t>(cycle.latency_ns));
-        put(kDuration, static_cast<std::uint64_t>(cycle.duration_ns));
-        put(kLast, last_of_loop ? 1 : 0);
+        put(kIteration, iteration);
+        put(kStamp, stamp_ns);
+        put(kLatency, latency_ns);
+        put(kKind, kind);
+        put(kBegin, ticks.begin);
+        put(kReady, ticks.ready);
+        put(kEnd, ticks.end);
         const std::uint64_t next = end_.load(std::memory_order_relaxed) + 1;
         put(kMark, 2 * next);
         writing_ = (next & mask_) != 0 ? writing_ + stride_ : words_;
         end_.store(next, std::memory_order_release);
+        fence(std::memory_order_release);
+    }
+    /// Notes that the counters of the last cycle have their values, see ifSettled().
+    void settle() noexcept RTCF_NONBLOCKING {
+        settled_.store(end_.load(std::memory_order_relaxed), std::memory_order_release);
+    }
+    /// Times of the last frame, which must not be overwritten.
+    CycleTicks lastTicks() const noexcept RTCF_NONBLOCKING;
+    /// Ends of the components' update() in the last frame.
+    const Word* lastEnded() const noexcept RTCF_NONBLOCKING {
+        return at(end_.load(std::memory_order_relaxed) - 1) + kHeadWords;
     }
     /// @}
 
@@ -90,20 +133,40 @@ class FrameRing {
     const std::vector<Source>& sources() const noexcept { return copy_.sources(); }
     /// Offset of a source's value among a frame's values, bytes.
     std::size_t offset(std::size_t source) const noexcept { return copy_.offset(source); }
+    /// Number of components that note their end.
+    std::size_t steps() const noexcept { return steps_; }
+    const CycleCounter& counter() const noexcept { return counter_; }
     std::size_t capacity() const noexcept { return mask_ + 1; }
     /// Size of a frame, words.
     std::size_t wordsOfFrame() const noexcept { return stride_; }
-    /// Size of a frame's values, which follow its header, words.
+    /// Size of a frame's values, its last words.
     std::size_t wordsOfValues() const noexcept { return copy_.words(); }
     /// The memory of the ring; null = the process's own memory.
     const std::shared_ptr<FrameBlock>& block() const noexcept { return block_; }
     /// Capacity of a ring of these sources, frames.
-    static std::size_t capacityFor(const std::vector<Source>& sources, std::size_t frames);
+    static std::size_t capacityFor(const std::vector<Source>& sources, std::size_t steps,
+                                   std::size_t frames);
     /// Number of the next frame; all smaller numbers have been committed.
     std::uint64_t end() const noexcept { return end_.load(std::memory_order_acquire); }
     /// Copies a committed frame.
     /// @return false if it has been overwritten
-    bool read(std::uint64_t number, Frame& frame) const;
+    bool read(std::uint64_t number, Frame& frame) const {
+        return read(number, frame, steps_ + copy_.words());
+    }
+    /// Copies a committed frame without its values.
+    /// @return false if it has been overwritten
+    bool readTicks(std::uint64_t number, Frame& frame) const { return read(number, frame, steps_); }
+    /// Calls `copy`, which copies counters that the loop changes from commit() to settle(): a
+    /// sequence lock.
+    /// @return false if the loop changed them meanwhile
+    template <typename Copy>
+    bool ifSettled(Copy&& copy) const {
+        const std::uint64_t end = this->end();
+        if (settled_.load(std::memory_order_acquire) != end) return false;
+        copy();
+        fence(std::memory_order_acquire);
+        return end_.load(std::memory_order_relaxed) == end;
+    }
     /// Notes that the readers have taken all frames below `next`.
     /// @param next UINT64_MAX = there are no readers
     void setTaken(std::uint64_t next) noexcept { taken_.store(next, std::memory_order_release); }
@@ -115,14 +178,34 @@ class FrameRing {
     /// @}
 
    private:
-    using Word = FrameBlock::Word;
     // Header of a frame, in words. kMark is 2 * number + 1 while the frame is being written, and 2
     // * number + 2 when it is complete.
-    enum Head : std::size_t { kMark, kIteration, kStamp, kLatency, kDuration, kLast, kHeadWords };
+    enum Head : std::size_t {
+        kMark,
+        kIteration,
+        kStamp,
+        kLatency,
+        kKind,
+        kBegin,
+        kReady,
+        kEnd,
+        kHeadWords
+    };
 
+    static void fence(std::memory_order order) noexcept RTCF_NONBLOCKING {
+#if defined(__SANITIZE_THREAD__)
+        // ThreadSanitizer with gcc supports no other fence; x86 needs none
+        std::atomic_signal_fence(order);
+#else
+        std::atomic_thread_fence(order);
+#endif
+    }
+    bool read(std::uint64_t number, Frame& frame, std::size_t words) const;
     Word* at(std::uint64_t number) const noexcept { return words_ + (number & mask_) * stride_; }
 
     FrameCopy copy_;
+    CycleCounter counter_;
+    std::size_t steps_;
     std::size_t stride_;  // size of a frame, words
     std::size_t mask_;    // capacity minus 1
     std::shared_ptr<FrameBlock> block_;
@@ -133,6 +216,7 @@ class FrameRing {
     Word* words_ = nullptr;
     Word* writing_;  // the next frame; for the writer only
     std::atomic<std::uint64_t> end_{0};
+    std::atomic<std::uint64_t> settled_{0};  // end_ at the last settle()
     std::atomic<std::uint64_t> taken_{UINT64_MAX};
 };
 

@@ -86,8 +86,8 @@ struct Adoption {
     std::vector<Leaving> leaving;
     std::vector<StagedValue*> values;  ///< parameters and derived values
     std::int64_t period_ns = 0;        ///< the loop's new period, ns; 0 = no change
-    FrameRing* frames = nullptr;       ///< ring that cycles fill from now on; null = no change
-    bool timed = false;                ///< the ring's frames have the components' times
+    /// Ring that cycles fill from now on; null = no change, which a new schedule does not allow.
+    FrameRing* frames = nullptr;
     /// Restores an earlier state before all other changes; if that fails, nothing else changes.
     Restoration* restoration = nullptr;
 };

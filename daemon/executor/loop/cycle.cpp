@@ -9,8 +9,6 @@ namespace rtcf::executor {
 
 namespace {
 
-constexpr std::int64_t kAbandoned = -1;  // no time: the cycle was abandoned
-
 // Replaces a component's device statistics for one update, unless `statistics` is null.
 class DeviceLoan {
    public:
@@ -30,7 +28,14 @@ class DeviceLoan {
 }  // namespace
 
 Cycle::Cycle(FlightRecorder& recorder)
-    : schedule_(&empty_), notes_(recorder.realtimeNotes()), counter_(CycleCounter::calibrate()) {}
+    : schedule_(&empty_),
+      frames_(&no_frames_),
+      notes_(recorder.realtimeNotes()),
+      counter_(CycleCounter::calibrate()),
+      no_frames_({}, 0, FrameRing::kFewestFrames, counter_) {
+    statistics_.adoption.allocate();
+    statistics_.wake_up.allocate();
+}
 
 void Cycle::begin(std::int64_t period_ns, std::uint64_t warmup_cycles, std::int64_t time_ns,
                   bool monotonic) {
@@ -50,9 +55,9 @@ void Cycle::begin(std::int64_t period_ns, std::uint64_t warmup_cycles, std::int6
         step.context->disabled = false;
         step.statistics->faults.clear();
     }
-    noteSchedule();
+    noteSpecial();
     // Hooks may have written outputs since the last cycle.
-    if (frames_ != nullptr) frames_->setBase();
+    frames_->setBase();
     statistics_.iteration.store(0, std::memory_order_relaxed);
     fault_ = {};
     active_ = true;
@@ -85,89 +90,108 @@ void Cycle::moveTime(std::int64_t by_ns) {
 
 bool Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NONBLOCKING {
     const std::int64_t begin = readCycleCounter();
-    std::int64_t before = begin;
-    if (exchanges_ || boundary_.waiting()) {
-        before = exchange(begin, time_ns);
-        if (before == kAbandoned) return false;  // the inputs' values are undefined
-    }
-    const Schedule& schedule = *schedule_;
+    if (special_ != 0 || boundary_.waiting()) return runSpecial(begin, time_ns, latency_ns);
     setTimes(time_ns);
-    const std::uint64_t iteration = clock_.iteration;
-    notes_.setIteration(iteration);
-    if (schedule.selective) total_elapsed_ns_ += clock_.elapsed_ns;
-    counted_ = iteration >= warmup_cycles_ && statistics_.counting.counts();
-    next_waiting_ = 0;
-    if (counted_ && waiting_.empty()) {
-        for (const Stretch& stretch : schedule.stretches) {
-            before = stretch.plain ? update<true>(stretch.begin, stretch.end, before)
-                                   : updateSelected(stretch.begin, stretch.end, before);
-            if (before == kAbandoned) break;
-        }
-    } else {
-        before = updateSelected(schedule.steps.data(),
-                                schedule.steps.data() + schedule.steps.size(), before);
-        dropConnected();
-    }
+    notes_.setIteration(clock_.iteration);
+    const std::vector<Step>& steps = schedule_->steps;
+    update<true>(steps.data(), steps.data() + steps.size(), frames_->begin());
     notes_.leaveComponents();
-    if (exchanges_ && before != kAbandoned) {
-        for (QueueBase* queue : schedule.queues) queue->receive();
-        for (Tap* tap : schedule.taps) tap->push(clock_.stamp_ns);
+    finish(begin, begin, latency_ns, FrameKind::Counted);
+    return true;
+}
+
+[[gnu::noinline]] bool Cycle::runSpecial(std::int64_t begin_ticks, std::int64_t time_ns,
+                                         std::int64_t latency_ns) noexcept {
+    std::int64_t ready = begin_ticks;
+    if ((special_ & kExchange) != 0 || boundary_.waiting()) {
+        if (!exchange(time_ns)) return false;  // the inputs' values are undefined
+        ready = readCycleCounter();  // the exchange is not part of any component's duration
+    }
+    setTimes(time_ns);
+    notes_.setIteration(clock_.iteration);
+    if ((special_ & kSelective) != 0) total_elapsed_ns_ += clock_.elapsed_ns;
+    const bool completed = updateAll();
+    notes_.leaveComponents();
+    if ((special_ & kExchange) != 0 && completed) {
+        for (QueueBase* queue : schedule_->queues) queue->receive();
+        for (Tap* tap : schedule_->taps) tap->push(clock_.stamp_ns);
         given_ticks_ = readCycleCounter();
     }
-    FrameRing* const frames = frames_;
-    if (frames != nullptr) frames->take();
-    const std::int64_t duration = readCycleCounter() - begin;
-    if (counted_) {
-        statistics_.duration.add(duration);
-        statistics_.latency.add(latency_ns);
-    }
-    const CycleRecord cycle{iteration, clock_.stamp_ns, latency_ns, counter_.toNs(duration)};
-    if (CycleRecord* record = records_.claim()) {
-        *record = cycle;
-        records_.commit();
-    }
-    if (frames != nullptr) frames->commit(cycle, false);
-    clock_.iteration = iteration + 1;
-    statistics_.iteration.store(iteration + 1, std::memory_order_relaxed);
+    finish(begin_ticks, ready, latency_ns, counted_ ? FrameKind::Counted : FrameKind::WarmUp);
+    if ((special_ & (kWarmUp | kWaiting)) != 0) noteSpecial();
     return true;
 }
 
 // Runs the work before the components: a change at the boundary, values from outside, and values of
 // the previous cycle.
-// @return ticks at the end, or kAbandoned
-[[gnu::noinline]] std::int64_t Cycle::exchange(std::int64_t begin_ticks,
-                                               std::int64_t time_ns) noexcept {
+// @return false if a fault ended the loop
+bool Cycle::exchange(std::int64_t time_ns) noexcept {
     if (boundary_.waiting()) {
         // The elapsed time of this cycle is measured in the period before the change.
         const std::int64_t elapsed = clock_.elapsed_ns;
         atBoundary(time_ns);
         clock_.elapsed_ns = elapsed;
-        if (faulted()) return kAbandoned;
+        if (faulted()) return false;
     }
     setTimes(time_ns);
     feed();
-    if (!schedule_->latches.empty() && !copyLatches()) return kAbandoned;
-    const std::int64_t end = readCycleCounter();  // not part of any component's duration
-    marks_ = {begin_ticks, end};
-    return end;
+    return copyLatches();
+}
+
+// Runs all components. Those that use no special feature take the short way.
+// @return false if a fault ended the loop
+bool Cycle::updateAll() noexcept {
+    counted_ = clock_.iteration >= warmup_cycles_;
+    next_waiting_ = 0;
+    FrameRing::Word* const ended = frames_->begin();
+    const Step* const first = schedule_->steps.data();
+    if (!counted_ || !waiting_.empty()) {
+        const bool completed = updateSelected(first, first + schedule_->steps.size(), ended);
+        dropConnected();
+        return completed;
+    }
+    for (const auto& [begin, end, plain] : schedule_->stretches) {
+        FrameRing::Word* const at = ended + (begin - first);
+        if (!(plain ? update<true>(begin, end, at) : updateSelected(begin, end, at))) return false;
+    }
+    return true;
+}
+
+// Completes the frame, and with it the cycle.
+[[gnu::always_inline]] inline void Cycle::finish(std::int64_t begin_ticks, std::int64_t ready_ticks,
+                                                 std::int64_t latency_ns, FrameKind kind) noexcept
+    RTCF_NONBLOCKING {
+    FrameRing& frames = *frames_;
+    frames.take();
+    const std::uint64_t iteration = clock_.iteration;
+    frames.commit(iteration, clock_.stamp_ns, latency_ns,
+                  {begin_ticks, ready_ticks, readCycleCounter()}, kind);
+    clock_.iteration = iteration + 1;
+    statistics_.iteration.store(iteration + 1, std::memory_order_relaxed);
 }
 
 // The only place that catches exceptions of components. `Plain` leaves out features that most
 // components do not use, so that they cost those nothing.
-// @param before ticks at the begin
-// @return ticks at the end of the last component, or kAbandoned
+// @param ended frame's words for the ends of these steps
+// @return false if a fault ended the loop
 template <bool Plain>
-[[gnu::always_inline]] inline std::int64_t Cycle::update(const Step* next, const Step* end,
-                                                         std::int64_t before) noexcept {
+[[gnu::always_inline]] inline bool Cycle::update(const Step* next, const Step* end,
+                                                 FrameRing::Word* ended) noexcept {
     const FlightRecorder::RealtimeNotes notes = notes_;
     const std::int64_t time = clock_.time_ns;
+    const auto note = [](FrameRing::Word& word, std::int64_t ticks) {
+        word.store(static_cast<std::uint64_t>(ticks), std::memory_order_release);
+    };
     while (true) {
         bool goes_on = false;
         try {
-            for (; next != end; ++next) {
+            for (; next != end; ++next, ++ended) {
                 if (!Plain) {
                     connectWaiting(*next);
-                    if (!due(*next)) continue;
+                    if (!due(*next)) {
+                        note(*ended, 0);
+                        continue;
+                    }
                 }
                 notes.enterComponent(next->slot);
                 next->component->setTime(time);
@@ -178,29 +202,37 @@ template <bool Plain>
                     next->component->update();
                 }
                 if (!Plain) commit(*next->component, *next->statistics, OnBadOutput::End);
-                const std::int64_t after = readCycleCounter();
-                next->ended_ticks = after;
-                if (Plain || counted_) next->statistics->duration.add(after - before);
-                before = after;
+                note(*ended, readCycleCounter());
             }
-            return before;
+            return true;
         } catch (const std::exception& error) {
             goes_on = threw(*next, error.what());
         } catch (...) {
             goes_on = threw(*next, "an exception of unknown type");
         }
-        if (Plain || !goes_on) return kAbandoned;
-        before = readCycleCounter();
-        next->ended_ticks = before;
+        if (Plain || !goes_on) {
+            leaveOut(next, ended);
+            return false;
+        }
+        note(*ended, readCycleCounter());
         ++next;
+        ++ended;
     }
 }
 
 // Runs steps that are not plain. A separate function, as it needs registers that plain steps do
 // not.
-[[gnu::noinline]] std::int64_t Cycle::updateSelected(const Step* next, const Step* end,
-                                                     std::int64_t before) noexcept {
-    return update<false>(next, end, before);
+[[gnu::noinline]] bool Cycle::updateSelected(const Step* next, const Step* end,
+                                             FrameRing::Word* ended) noexcept {
+    return update<false>(next, end, ended);
+}
+
+// Notes in the frame that this step and those after it did not run.
+[[gnu::noinline]] void Cycle::leaveOut(const Step* next, FrameRing::Word* ended) noexcept
+    RTCF_NONBLOCKING {
+    const std::vector<Step>& steps = schedule_->steps;
+    for (const Step* const end = steps.data() + steps.size(); next != end; ++next, ++ended)
+        ended->store(0, std::memory_order_release);
 }
 
 // True if a component runs in this cycle; also sets its elapsed time.
@@ -297,7 +329,7 @@ void Cycle::makeSafe(Component& component, ComponentStatistics& statistics,
 void Cycle::putBack(const Step& step) noexcept {
     for (OutputBase* output : step.component->outputs()) {
         if (!output->staged()) {
-            putBack(*output, step.ended_ticks != 0);
+            putBack(step, *output);
             continue;
         }
         try {
@@ -309,10 +341,9 @@ void Cycle::putBack(const Step& step) noexcept {
 }
 
 // Restores the value from the last frame, and the stamp from the readers' read positions.
-// @param updated the component has completed an update in this schedule
-void Cycle::putBack(OutputBase& output, bool updated) noexcept {
+void Cycle::putBack(const Step& step, OutputBase& output) noexcept {
     SlotHeader& slot = *output.slot();
-    if (frames_ != nullptr) frames_->putBack(valueOf(output.type(), slot));
+    frames_->putBack(valueOf(output.type(), slot));
     if (slot.stamp != clock_.time_ns) return;  // not written in this cycle
     slot.stamp = 0;
     bool read = false;
@@ -320,10 +351,10 @@ void Cycle::putBack(OutputBase& output, bool updated) noexcept {
         read = true;
         if (stamp != 0 && (slot.stamp == 0 || stamp > slot.stamp)) slot.stamp = stamp;
     };
-    for (const Step& step : schedule_->steps) {
-        for (const InputPort* input : step.component->inputs()) {
+    for (const Step& reader : schedule_->steps) {
+        for (const InputPort* input : reader.component->inputs()) {
             // A component that has not run yet has not read either.
-            if (&input->slot() == &slot && (input->seen() != 0 || step.ended_ticks != 0))
+            if (&input->slot() == &slot && (input->seen() != 0 || hasRun(reader, step)))
                 known(input->seen());
             if (input->awaits(slot)) known(input->since());
         }
@@ -333,7 +364,14 @@ void Cycle::putBack(OutputBase& output, bool updated) noexcept {
     for (const Latch& latch : schedule_->latches)
         if (latch.from == &slot) known(latch.to->stamp);
     // Without readers, the earlier cycles of the component tell whether there is a value.
-    if (!read && updated) slot.stamp = clock_.time_ns - clock_.elapsed_ns;
+    if (!read && hasRun(step, step)) slot.stamp = clock_.time_ns - clock_.elapsed_ns;
+}
+
+// True if a component has completed an update() in this schedule.
+// @param running the step that is running
+bool Cycle::hasRun(const Step& step, const Step& running) const noexcept {
+    if (frames_->end() - scheduled_end_ >= step.every) return true;
+    return &step < &running && frames_->ended()[&step - schedule_->steps.data()] != 0;
 }
 
 bool Cycle::copy(const Latch& latch) noexcept {
@@ -372,15 +410,21 @@ void Cycle::makeSafe(std::int64_t time_ns) noexcept {
     }
     dropConnected();
     for (Tap* tap : schedule_->taps) tap->push(clock_.stamp_ns);
-    if (frames_ != nullptr) {
-        frames_->take();
-        frames_->commit({clock_.iteration, clock_.stamp_ns, 0, 0}, true);
-    }
+    leaveOut(schedule_->steps.data(), frames_->begin());
+    frames_->take();
+    frames_->commit(clock_.iteration, clock_.stamp_ns, 0, {}, FrameKind::LastOfLoop);
+    settle();
 }
 
-void Cycle::noteSchedule() noexcept RTCF_NONBLOCKING {
-    exchanges_ = timed_ || !schedule_->feeds.empty() || !schedule_->latches.empty() ||
-                 !schedule_->queues.empty() || !schedule_->taps.empty();
+void Cycle::noteSpecial() noexcept RTCF_NONBLOCKING {
+    const Schedule& schedule = *schedule_;
+    special_ = 0;
+    if (!schedule.feeds.empty() || !schedule.latches.empty() || !schedule.queues.empty() ||
+        !schedule.taps.empty())
+        special_ |= kExchange;
+    if (schedule.selective) special_ |= kSelective;
+    if (clock_.iteration < warmup_cycles_) special_ |= kWarmUp;
+    if (!waiting_.empty()) special_ |= kWaiting;
 }
 
 void Cycle::feed() noexcept RTCF_NONBLOCKING {
@@ -392,22 +436,24 @@ void Cycle::feed() noexcept RTCF_NONBLOCKING {
     }
 }
 
-void Cycle::blame(std::int64_t begin_ticks, std::int64_t limit_ticks) noexcept RTCF_NONBLOCKING {
-    const bool exchanged = marks_.begin >= begin_ticks;
-    if (!exchanged || marks_.ready <= limit_ticks) {
-        for (const Step& step : schedule_->steps) {
-            if (step.ended_ticks < begin_ticks || step.ended_ticks <= limit_ticks)
-                continue;  // did not run in this cycle, or ended in time
-            bump(step.statistics->overruns);
-            return;
-        }
-        // All components ended in time: frames or exchange caused the overrun.
-        if (frames_ != nullptr && (!exchanges_ || given_ticks_ <= limit_ticks)) {
-            statistics_.frame_overruns.add(1);
-            return;
-        }
+void Cycle::blame(std::int64_t limit_ticks) noexcept RTCF_NONBLOCKING {
+    const CycleTicks ticks = frames_->lastTicks();
+    if (ticks.ready > limit_ticks) {
+        statistics_.exchange_overruns.add(1);
+        return;
     }
-    statistics_.exchange_overruns.add(1);
+    const FrameRing::Word* ended = frames_->lastEnded();
+    for (const Step& step : schedule_->steps) {
+        if (static_cast<std::int64_t>((ended++)->load(std::memory_order_relaxed)) <= limit_ticks)
+            continue;  // did not run, or ended in time
+        step.statistics->overruns.add(1);
+        return;
+    }
+    // All components ended in time: frames or exchange caused the overrun.
+    const bool given = given_ticks_ >= ticks.begin;
+    (given && given_ticks_ > limit_ticks ? statistics_.exchange_overruns
+                                         : statistics_.frame_overruns)
+        .add(1);
 }
 
 }  // namespace rtcf::executor

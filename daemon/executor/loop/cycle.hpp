@@ -8,50 +8,33 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/spsc_ring.hpp"
 #include "faults/flight_recorder.hpp"
-#include "frames/cycle_record.hpp"
 #include "frames/frame_ring.hpp"
 #include "loop/adoption.hpp"
 #include "loop/boundary.hpp"
 #include "loop/faults.hpp"
 #include "loop/schedule.hpp"
 #include "realtime/cycle_counter.hpp"
-#include "statistics/counting.hpp"
+#include "statistics/counter.hpp"
 #include "statistics/histogram.hpp"
 
 namespace rtcf::executor {
 
-/// Statistics of the loop. Written by the cycle thread only.
+/// Statistics of the loop. Written by the cycle thread only. CycleStatistics has the durations.
 struct LoopStatistics {
-    Histogram duration;  ///< ticks
-    Histogram latency;   ///< ns
     Histogram adoption;  ///< ticks; time of adopting a change
     /// Ns from the requested end of the sleep (`spin` before the deadline) to the wake-up.
     Histogram wake_up;
-    Counting counting;  ///< keeps these and the components' statistics consistent
     std::atomic<std::uint64_t> iteration{0};  ///< cycles completed since the loop started
     Counter faults;                           ///< component faults that did not end the loop
-    std::atomic<std::uint64_t> overruns{0};
-    std::atomic<std::uint64_t> missed{0};
+    // These change between the end of a cycle and Cycle::settle().
+    EventCounter overruns;
+    EventCounter missed;
     // Causes of overruns other than components.
-    Counter late_wake_ups;      ///< the cycle began late, but took less than a period
-    Counter exchange_overruns;  ///< changes, or values from and to outside, took too long
-    Counter frame_overruns;     ///< copying values into a frame took too long
-    Counter catching_up;  ///< late because of the previous overrun, with OverrunPolicy::CatchUp
-};
-
-/// Increments a number that only the calling thread writes. Real-time safe.
-inline void bump(std::atomic<std::uint64_t>& number, std::uint64_t by = 1) noexcept
-    RTCF_NONBLOCKING {
-    number.store(number.load(std::memory_order_relaxed) + by, std::memory_order_relaxed);
-}
-
-/// Times in the last cycle that exchanged values or timed its components: its begin, and the end of
-/// the exchange. Ticks of the cycle counter. Owned by the cycle thread.
-struct CycleMarks {
-    std::int64_t begin = INT64_MIN;
-    std::int64_t ready = INT64_MIN;
+    EventCounter late_wake_ups;      ///< the cycle began late, but took less than a period
+    EventCounter exchange_overruns;  ///< changes, or values from and to outside, took too long
+    EventCounter frame_overruns;     ///< copying values into a frame took too long
+    EventCounter catching_up;        ///< late because of the previous overrun, with CatchUp
 };
 
 class Cycle {
@@ -91,7 +74,7 @@ class Cycle {
     void apply(Adoption& adoption) noexcept;
     /// Copies all values that the next cycle depends on.
     void capture(Capture& capture) noexcept;
-    /// Runs one cycle, within a Counting::Turn.
+    /// Runs one cycle.
     /// @param time_ns loop time
     /// @param latency_ns latency of the wake-up
     /// @return false if a fault ended the loop before any component ran
@@ -107,10 +90,12 @@ class Cycle {
     void setElapsed(std::int64_t elapsed_ns) noexcept RTCF_NONBLOCKING {
         clock_.elapsed_ns = elapsed_ns;
     }
-    /// Finds the component (or other work) that was running when the cycle that began at
-    /// `begin_ticks` should have ended, and counts the overrun there.
-    void blame(std::int64_t begin_ticks, std::int64_t limit_ticks) noexcept RTCF_NONBLOCKING;
+    /// Finds the component (or other work) that was running when the last cycle should have ended,
+    /// and counts the overrun there.
+    void blame(std::int64_t limit_ticks) noexcept RTCF_NONBLOCKING;
     void endLoop(LoopFault::Kind kind, const Component* component, const char* text) noexcept;
+    /// Ends the counting for the last cycle.
+    void settle() noexcept RTCF_NONBLOCKING { frames_->settle(); }
     LoopStatistics& statistics() noexcept { return statistics_; }
     /// @}
 
@@ -122,10 +107,6 @@ class Cycle {
         stamp_offset_ns_.store(offset_ns, std::memory_order_relaxed);
     }
     const CycleCounter& counter() const noexcept { return counter_; }
-    /// For the frames of timed components. Cycle thread.
-    const CycleMarks& marks() const noexcept { return marks_; }
-    SpscRing<CycleRecord, 16384>& records() noexcept { return records_; }
-    const SpscRing<CycleRecord, 16384>& records() const noexcept { return records_; }
     /// @}
 
    private:
@@ -135,10 +116,16 @@ class Cycle {
     }
     void moveTime(std::int64_t by_ns);
     void changeComponents(Adoption& adoption) noexcept;
-    std::int64_t exchange(std::int64_t begin_ticks, std::int64_t time_ns) noexcept;
+    bool runSpecial(std::int64_t begin_ticks, std::int64_t time_ns,
+                    std::int64_t latency_ns) noexcept;
+    bool exchange(std::int64_t time_ns) noexcept;
+    bool updateAll() noexcept;
+    void finish(std::int64_t begin_ticks, std::int64_t ready_ticks, std::int64_t latency_ns,
+                FrameKind kind) noexcept RTCF_NONBLOCKING;
     template <bool Plain>
-    std::int64_t update(const Step* next, const Step* end, std::int64_t before) noexcept;
-    std::int64_t updateSelected(const Step* next, const Step* end, std::int64_t before) noexcept;
+    bool update(const Step* next, const Step* end, FrameRing::Word* ended) noexcept;
+    bool updateSelected(const Step* next, const Step* end, FrameRing::Word* ended) noexcept;
+    void leaveOut(const Step* next, FrameRing::Word* ended) noexcept RTCF_NONBLOCKING;
     bool due(const Step& step) const noexcept RTCF_NONBLOCKING;
     void connectWaiting(const Step& step) noexcept RTCF_NONBLOCKING;
     void dropConnected() noexcept;
@@ -147,45 +134,53 @@ class Cycle {
     bool copy(const Latch& latch) noexcept;
     bool copyLatches() noexcept;
     void putBack(const Step& step) noexcept;
-    void putBack(OutputBase& output, bool updated) noexcept;
+    void putBack(const Step& step, OutputBase& output) noexcept;
+    bool hasRun(const Step& step, const Step& running) const noexcept;
     /// Effect of a non-finite value on an output declared Finite(OnNonFinite::Stop): end the loop,
     /// or go on.
     enum class OnBadOutput { End, GoOn };
     void commit(Component& component, ComponentStatistics& statistics, OnBadOutput may);
     bool threw(const Step& step, const char* text) noexcept;
     void makeSafe(Component& component, ComponentStatistics& statistics, OnBadOutput may) noexcept;
-    void noteSchedule() noexcept RTCF_NONBLOCKING;
+    void noteSpecial() noexcept RTCF_NONBLOCKING;
     bool restore(Restoration& restoration) noexcept;
+
+    // Features that a plain cycle does not have.
+    enum Special : unsigned {
+        kExchange = 1,   // feeds, latches, queues or taps
+        kSelective = 2,  // steps that are not plain
+        kWarmUp = 4,     // device statistics do not count yet
+        kWaiting = 8,    // inputs wait for their new writers
+    };
 
     // Members that every cycle touches, in two cache lines: after a sleep, cache misses cost more
     // than computation. Owned by the cycle thread.
     alignas(64) const Schedule* schedule_;
+    FrameRing* frames_;     // filled by the cycles; has a word per step of the schedule
+    unsigned special_ = 0;  // of the next cycle; 0 = it is plain
     const FlightRecorder::RealtimeNotes notes_;
     LoopClock clock_;
-    std::uint64_t warmup_cycles_ = 0;
-    bool exchanges_ = false;       // has feeds, latches, queues or taps, or components are timed
-    bool active_ = false;          // from begin() to the last cycle
-    FrameRing* frames_ = nullptr;  // filled by the cycles
-    bool counted_ = false;         // the present cycle's durations count
     // Shared.
     std::atomic<std::int64_t> stamp_offset_ns_{0};  // CLOCK_REALTIME minus CLOCK_MONOTONIC
     Boundary boundary_;
 
     CycleCounter counter_;
     // Owned by the cycle thread, too.
+    std::uint64_t warmup_cycles_ = 0;
+    bool active_ = false;                // from begin() to the last cycle
+    bool counted_ = false;               // the present cycle's device statistics count
+    bool monotonic_ = false;             // loop time is CLOCK_MONOTONIC of this boot
     std::int64_t boundary_time_ns_ = 0;  // loop time of the cycle after the present boundary
     std::int64_t total_elapsed_ns_ = 0;  // sum of elapsed_ns of all cycles
-    bool monotonic_ = false;             // loop time is CLOCK_MONOTONIC of this boot
-    CycleMarks marks_;
-    std::vector<Waiting> waiting_;  // inputs that wait for a new writer, in schedule order
-    std::size_t next_waiting_ = 0;  // the first one whose component has not run in this cycle
-    bool timed_ = false;            // a watch takes the components' times of each cycle
-    std::int64_t given_ticks_ = 0;  // when the taps were last filled
+    std::uint64_t scheduled_end_ = 0;    // frames_->end() minus the cycles of this schedule
+    std::vector<Waiting> waiting_;       // inputs that wait for a new writer, in schedule order
+    std::size_t next_waiting_ = 0;       // the first one whose component has not run in this cycle
+    std::int64_t given_ticks_ = 0;       // when values were last given to queues and taps
     LoopFault fault_;
     LoopStatistics statistics_;
     DeviceStatistics uncounted_;  // device statistics of cycles that are not counted
-    SpscRing<CycleRecord, 16384> records_;
     const Schedule empty_{};
+    FrameRing no_frames_;  // of the empty schedule
 };
 
 }  // namespace rtcf::executor

@@ -17,18 +17,17 @@ void Cycle::apply(Adoption& adoption) noexcept {
     for (const Audience& audience : adoption.audiences)
         audience.output->setConnected(audience.present);
     for (StagedValue* value : adoption.values) value->commit();
+    const std::uint64_t cycles = frames_->end() - scheduled_end_;
+    if (adoption.frames != nullptr) frames_ = adoption.frames;
+    scheduled_end_ = frames_->end() - cycles;
     if (adoption.schedule != nullptr) {
         schedule_ = adoption.schedule;
+        scheduled_end_ = frames_->end();
         waiting_.swap(adoption.waiting);
         dropConnected();
     }
-    if (adoption.frames != nullptr) {
-        frames_ = adoption.frames;
-        timed_ = adoption.timed;
-    }
-    noteSchedule();
-    if (frames_ != nullptr && (adoption.frames != nullptr || adoption.restoration != nullptr))
-        frames_->setBase();
+    noteSpecial();
+    if (adoption.frames != nullptr || adoption.restoration != nullptr) frames_->setBase();
     if (adoption.period_ns != 0) {
         clock_.period_ns = adoption.period_ns;
         clock_.elapsed_ns = adoption.period_ns;

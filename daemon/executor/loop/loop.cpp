@@ -233,14 +233,6 @@ void Loop::refreshWallClock() noexcept {
     cycle_.setStampOffset(realtimeOffset());
 }
 
-bool Loop::popRecord(CycleRecord& record) {
-    const CycleRecord* front = cycle_.records().front();
-    if (front == nullptr) return false;
-    record = *front;
-    cycle_.records().pop();
-    return true;
-}
-
 void* Loop::threadMain(void* self) {
     static_cast<Loop*>(self)->run();
     return nullptr;
@@ -286,8 +278,8 @@ std::uint64_t Loop::step(std::uint64_t cycles, const std::atomic<bool>* given_up
     const CrashRole crash_role(ThreadRole::Realtime);
     Log::setRealtimeThread(true);
     for (; done < cycles && goesOn() && wanted(); ++done) {
-        const Counting::Turn turn(cycle_.statistics().counting);
         if (!cycle_.run(nextStep(), 0)) break;
+        cycle_.settle();
         // A snapshot may have restored another elapsed time, and the period may have changed.
         cycle_.setElapsed(cycle_.clock().period_ns);
     }
@@ -331,17 +323,17 @@ void Loop::followRealTime() noexcept {
             deadline = wake_up.wake_ns + cycle_.clock().period_ns;
             continue;
         }
-        const Counting::Turn turn(cycle_.statistics().counting);
-        noteMissed(wake_up.missed);
         const std::int64_t begin = readCycleCounter();
         const std::int64_t time =
             device != nullptr ? afterLastCycle(wake_up.wake_ns) : wake_up.deadline_ns;
         if (!cycle_.run(time, wake_up.wake_ns - wake_up.deadline_ns)) break;
         // A device begins the next cycle itself; waitForSource() counts missed beats.
+        noteMissed(wake_up.missed);
         const std::int64_t limit = time + cycle_.clock().period_ns;
         end = endOfCycle(wake_up, begin, limit);
         if (end >= limit) noteOverrun(wake_up, begin, end, behind);
         deadline = device != nullptr ? limit : nextDeadline(wake_up.deadline_ns, end);
+        cycle_.settle();
     }
 }
 
@@ -371,8 +363,8 @@ void Loop::followClock() noexcept {
         }
         const std::int64_t now = nextStep();
         cycle_.setStampOffset(due->time_ns - now);
-        const Counting::Turn turn(cycle_.statistics().counting);
         cycle_.run(now, 0);
+        cycle_.settle();
         cycle_.setElapsed(cycle_.clock().period_ns);
     }
 }
@@ -415,13 +407,12 @@ Loop::WakeUp Loop::waitForClock(std::int64_t deadline_ns) noexcept {
 }
 
 void Loop::noteMissed(std::int64_t periods) noexcept RTCF_NONBLOCKING {
-    if (periods > 0 && cycle_.statistics().counting.counts())
-        bump(cycle_.statistics().missed, static_cast<std::uint64_t>(periods));
+    if (periods > 0) cycle_.statistics().missed.add(static_cast<std::uint64_t>(periods));
 }
 
 void Loop::noteOverrun(const WakeUp& wake_up, std::int64_t begin_ticks, std::int64_t end_ns,
                        bool behind) noexcept RTCF_NONBLOCKING {
-    if (cycle_.statistics().counting.counts()) countOverrun(wake_up, begin_ticks, end_ns, behind);
+    countOverrun(wake_up, begin_ticks, end_ns, behind);
     const std::uint32_t limit = max_overruns_.load(std::memory_order_relaxed);
     if (limit != 0 && ++bucket_ > limit && !cycle_.faulted())
         cycle_.endLoop(LoopFault::Kind::Overruns, nullptr, "too many overruns");
@@ -432,10 +423,10 @@ void Loop::noteOverrun(const WakeUp& wake_up, std::int64_t begin_ticks, std::int
 void Loop::countOverrun(const WakeUp& wake_up, std::int64_t begin_ticks, std::int64_t end_ns,
                         bool behind) noexcept RTCF_NONBLOCKING {
     LoopStatistics& statistics = cycle_.statistics();
-    bump(statistics.overruns);
+    statistics.overruns.add(1);
     const std::int64_t period = cycle_.clock().period_ns;
     if (end_ns - wake_up.wake_ns >= period) {
-        cycle_.blame(begin_ticks, begin_ticks + cycle_.counter().toTicks(period));
+        cycle_.blame(begin_ticks + cycle_.counter().toTicks(period));
     } else if (behind) {
         statistics.catching_up.add(1);
     } else {

@@ -115,10 +115,6 @@ class Loop {
     const LoopFault& fault() const noexcept { return cycle_.fault(); }
     /// @}
 
-    /// Takes the oldest cycle record. One thread only.
-    /// @return false if there is none
-    bool popRecord(CycleRecord& record);
-
     /// @name Any thread
     /// @{
     /// Stops the loop at the next boundary. The stop is final: a start() that was requested before
@@ -146,15 +142,9 @@ class Loop {
     int cpu() const noexcept { return cpu_.load(std::memory_order_relaxed); }
     int threadId() const noexcept { return thread_id_.load(std::memory_order_relaxed); }
     const LoopStatistics& statistics() const noexcept { return cycle_.statistics(); }
-    /// Excludes cycles that begin from here on from the statistics, so that these can be read as of
-    /// one instant; or includes them again. One thread only.
-    void holdStatistics(bool held) noexcept {
-        held ? cycle_.statistics().counting.hold() : cycle_.statistics().counting.release();
-    }
+    LoopStatistics& statistics() noexcept { return cycle_.statistics(); }
     const CycleCounter& counter() const noexcept { return cycle_.counter(); }
     const Cycle& cycle() const noexcept { return cycle_; }
-    /// Cycle records lost because the ring was full.
-    std::uint64_t recordsDropped() const noexcept { return cycle_.records().dropped(); }
     /// @}
 
     /// The clock that components of this loop see.

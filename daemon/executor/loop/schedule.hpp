@@ -3,6 +3,7 @@
 /// change once the loop has it.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -11,17 +12,26 @@
 #include "exchange/tap.hpp"
 #include "loop/faults.hpp"
 #include "rtcf/component.hpp"
+#include "statistics/counter.hpp"
 #include "statistics/histogram.hpp"
 
 namespace rtcf::executor {
 
 /// Statistics of one component. Outlives the schedules that contain the component.
 struct ComponentStatistics {
-    Histogram duration;  ///< of update(), in ticks of the cycle counter
+    Histogram duration;  ///< of update(), in ticks of the cycle counter; see CycleStatistics
     /// Cycles whose next deadline passed during this component's update().
-    std::atomic<std::uint64_t> overruns{0};
+    EventCounter overruns;
     DeviceStatistics device;
+    DeviceStatistics device_before;  ///< `device` at the last restart()
     ComponentFaults faults;
+
+    /// Resets the statistics but `overruns`. Only by CycleStatistics.
+    void restart() noexcept {
+        duration.clear();
+        device_before.calls.store(device.calls.load(std::memory_order_relaxed));
+        device_before.time_ns.store(device.time_ns.load(std::memory_order_relaxed));
+    }
 };
 
 /// One component's turn.
@@ -33,9 +43,6 @@ struct Step {
     std::uint32_t every = 1;  ///< runs in every n-th cycle,
     std::uint32_t phase = 0;  ///< when the iteration modulo n equals this
     bool optional = false;    ///< a fault takes the component out, and the loop goes on
-    /// End of the last update(), ticks. The cycle thread writes it here because this cache line is
-    /// already loaded.
-    mutable std::int64_t ended_ticks = 0;
 };
 
 /// Consecutive steps of one kind.

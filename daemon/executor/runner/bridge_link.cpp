@@ -4,10 +4,10 @@
 
 namespace rtcf::executor {
 
-bool BridgeLink::attach(RunnerView& runner, ParameterRequest change_parameters) {
-    if (!bridge_) return false;
+void BridgeLink::attach(RunnerView& runner, ParameterRequest change_parameters) {
+    if (!bridge_) return;
     bridge_->serveParameters(std::move(change_parameters));
-    return bridge_->attach(runner);
+    bridge_->attach(runner);
 }
 
 void BridgeLink::configure(const BridgeSettings& settings) {

@@ -17,8 +17,7 @@ class BridgeLink {
     explicit BridgeLink(std::unique_ptr<Bridge> bridge) : bridge_(std::move(bridge)) {}
 
     /// Sets the runner and the function that changes parameters. Called once, by any thread.
-    /// @return false if nothing consumes the runner's cycle records
-    bool attach(RunnerView& runner, ParameterRequest change_parameters);
+    void attach(RunnerView& runner, ParameterRequest change_parameters);
     void configure(const BridgeSettings& settings);
     /// Gives the bridge the connections of a plan and the parameters of its graph view.
     void setTable(const Plan& plan, const GraphView& graph);

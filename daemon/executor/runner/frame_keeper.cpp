@@ -24,18 +24,21 @@ void FrameKeeper::add(std::uint64_t number, Watch watch) {
 std::shared_ptr<const FrameTable> FrameKeeper::prepare(const Plan& plan, double frequency_hz,
                                                        std::size_t most_bytes, Adoption& adoption) {
     std::shared_ptr<const FrameTable> table = makeFrameTable(
-        plan, {watches_, frequency_hz, most_bytes, loop_.cycle(), &memory_, table_.get()});
+        plan, {watches_, frequency_hz, most_bytes, loop_.counter(), &memory_, table_.get()});
     adoption.frames = table->ring.get();
-    adoption.timed = table->turns.wanted();
     return table;
 }
 
 void FrameKeeper::publish(std::shared_ptr<const FrameTable> table) noexcept {
     const std::shared_ptr<const FrameTable> previous = std::exchange(table_, std::move(table));
     logErrors(log_, "publishing frames", [&] {
-        if (!watches_.empty()) {
+        const CycleFrames frames{table_->ring, table_->components};
+        statistics_.follow(frames);
+        {
             const std::lock_guard<std::mutex> lock(mutex_);
-            published_.push_back(table_);
+            cycles_.follow(frames);
+            if (!reads_cycles_) cycles_.skip();
+            if (!watches_.empty()) published_.push_back(table_);
         }
         if (table_->shortness.empty()) return;
         const bool reported = previous != nullptr && !previous->shortness.empty() &&
@@ -45,15 +48,15 @@ void FrameKeeper::publish(std::shared_ptr<const FrameTable> table) noexcept {
 }
 
 std::uint64_t FrameKeeper::step(std::uint64_t cycles, const std::atomic<bool>* given_up) {
-    if (watches_.empty()) return loop_.step(cycles, given_up);
     const std::uint64_t most = table_->ring->capacity() / 2;
     std::uint64_t done = 0;
     while (done < cycles) {
         const std::uint64_t wanted = std::min(cycles - done, most);
         const std::uint64_t ran = loop_.step(wanted, given_up);
         done += ran;
+        statistics_.count();
         if (ran < wanted) break;
-        awaitReaders();
+        if (!watches_.empty()) awaitReaders();
     }
     return done;
 }
@@ -84,6 +87,27 @@ std::vector<std::shared_ptr<const FrameTable>> FrameKeeper::takePublished() {
 void FrameKeeper::onReadersAwaited(std::function<void()> callback) {
     const std::lock_guard<std::mutex> lock(mutex_);
     readers_awaited_ = std::move(callback);
+}
+
+bool FrameKeeper::nextCycle(CycleRecord& cycle) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    reads_cycles_ = true;
+    do {
+        if (cycles_.next(cycle_) == nullptr) return false;
+    } while (cycle_.lastOfLoop());
+    cycle = cycle_.cycle();
+    return true;
+}
+
+void FrameKeeper::skipCycles() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    reads_cycles_ = false;
+    cycles_.skip();
+}
+
+std::uint64_t FrameKeeper::cyclesLost() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return cycles_.lost();
 }
 
 }  // namespace rtcf::executor

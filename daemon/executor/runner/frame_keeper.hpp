@@ -13,6 +13,8 @@
 
 #include "frames/frame_memory.hpp"
 #include "logging/log.hpp"
+#include "loop/cycle_reader.hpp"
+#include "loop/cycle_statistics.hpp"
 #include "loop/loop.hpp"
 #include "ordering/plan.hpp"
 #include "watch/frame_table.hpp"
@@ -22,7 +24,9 @@ namespace rtcf::executor {
 class FrameKeeper {
    public:
     /// @param loop fills the frames
-    FrameKeeper(Loop& loop, Log& log) : loop_(loop), log_(log) {}
+    /// @param statistics counted from the frames
+    FrameKeeper(Loop& loop, CycleStatistics& statistics, Log& log)
+        : loop_(loop), statistics_(statistics), log_(log) {}
 
     /// @name Graph thread
     /// @{
@@ -41,7 +45,8 @@ class FrameKeeper {
     /// Passes a table to readers. After the loop has begun to fill its ring.
     void publish(std::shared_ptr<const FrameTable> table) noexcept;
 
-    /// Runs steps, which wait for readers of frames; see Loop::step().
+    /// Runs steps, which wait for readers of frames and are counted in the statistics; see
+    /// Loop::step().
     std::uint64_t step(std::uint64_t cycles, const std::atomic<bool>* given_up);
     /// @}
 
@@ -53,12 +58,20 @@ class FrameKeeper {
     /// Sets a function that the graph thread calls when steps wait for readers.
     void onReadersAwaited(std::function<void()> callback);
     const FrameMemory& memory() const noexcept { return memory_; }
+    /// Takes the next cycle, for a reader of all cycles. One thread only.
+    /// @return false if there is none yet
+    bool nextCycle(CycleRecord& cycle);
+    /// Passes over the cycles so far.
+    void skipCycles();
+    /// Cycles that were overwritten before nextCycle() took them.
+    std::uint64_t cyclesLost() const;
     /// @}
 
    private:
     void awaitReaders();
 
     Loop& loop_;
+    CycleStatistics& statistics_;
     Log& log_;
 
     // Graph thread only.
@@ -66,9 +79,12 @@ class FrameKeeper {
     Watches watches_;
     std::shared_ptr<const FrameTable> table_;  // table of the loop's frames; null before the first
 
-    std::mutex mutex_;  // protects the following
+    mutable std::mutex mutex_;  // protects the following
     std::vector<std::shared_ptr<const FrameTable>> published_;
     std::function<void()> readers_awaited_;
+    CycleReader cycles_;  // of nextCycle()
+    bool reads_cycles_ = false;
+    Frame cycle_;
 };
 
 }  // namespace rtcf::executor

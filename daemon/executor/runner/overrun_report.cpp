@@ -18,8 +18,8 @@ std::string cycles(std::uint64_t count) {
 
 std::string OverrunReport::take(const Loop& loop, const Graph& graph, bool last) {
     const LoopStatistics& statistics = loop.statistics();
-    const std::uint64_t overruns = statistics.overruns.load(std::memory_order_relaxed);
-    const std::uint64_t missed = statistics.missed.load(std::memory_order_relaxed);
+    const std::uint64_t overruns = statistics.overruns.value();
+    const std::uint64_t missed = statistics.missed.value();
     const std::int64_t now = monotonicNow();
     if (overruns == reported_overruns_) return {};
     if (!last && reported_at_ns_ != 0 && now - reported_at_ns_ < kInterval) return {};
@@ -48,7 +48,7 @@ std::string OverrunReport::mostFrequentCause(const LoopStatistics& statistics, c
     };
     for (const GraphNode& node : graph.nodes()) {
         const std::shared_ptr<const ComponentStatistics> counted = node.instance->statistics();
-        const std::uint64_t count = counted->overruns.load(std::memory_order_relaxed);
+        const std::uint64_t count = counted->overruns.value();
         const auto reported = reported_of_component_.find(counted);
         present.emplace(counted, count);
         consider(count - (reported == reported_of_component_.end() ? 0 : reported->second),

@@ -1,5 +1,10 @@
 #include "runner/runner.hpp"
 
+#include <pthread.h>
+
+#include <algorithm>
+#include <chrono>
+
 #include "common/error.hpp"
 #include "faults/crash_handler.hpp"
 #include "logging/log_errors.hpp"
@@ -10,6 +15,11 @@ namespace {
 
 constexpr auto kTick = std::chrono::milliseconds(20);
 constexpr std::int64_t kProbeTimeout = 100'000'000;
+// Time between two counts of cycles: as long as they fill only a part of the ring.
+constexpr std::chrono::milliseconds kShortestCount{1};
+constexpr std::chrono::milliseconds kLongestCount{64};
+constexpr double kMuch = 0.3;
+constexpr double kLittle = 0.1;
 
 // True if a change of parameters failed because of a value, not because of the state of the loop.
 bool isOfAValue(const std::exception& error) {
@@ -28,7 +38,7 @@ Runner::Runner(std::string name, Log& log, EventConsumer events, std::unique_ptr
       recorder_(recorder),
       loop_(log, recorder, std::move(cpu_claims)),
       bridge_(std::move(bridge)),
-      frames_(loop_, log),
+      frames_(loop_, statistics_, log),
       boundary_(name_, settings_, loop_, recorder),
       control_(
           name_, settings_, loop_, boundary_, plan_, publication_, bridge_, log,
@@ -40,15 +50,16 @@ Runner::Runner(std::string name, Log& log, EventConsumer events, std::unique_ptr
       offline_(name_, loop_, control_, plan_, frames_, publication_, bridge_, transactions_, log),
       snapshots_(name_, settings_, loop_, boundary_, control_, plan_, transactions_, offline_) {
     validate(settings_);
+    transactions_.adoptFrames();
     control_.publishStatus();
-    discards_cycles_ = !bridge_.attach(
-        *this, [this](const std::string& component, ParameterBatch batch, BatchPolicy policy,
-                      std::function<void(const std::string&)> done) {
-            post([this, component, batch = std::move(batch), policy, done = std::move(done)] {
-                changeByBridge(component, batch, policy, done);
-            });
+    bridge_.attach(*this, [this](const std::string& component, ParameterBatch batch,
+                                 BatchPolicy policy, std::function<void(const std::string&)> done) {
+        post([this, component, batch = std::move(batch), policy, done = std::move(done)] {
+            changeByBridge(component, batch, policy, done);
         });
+    });
     thread_ = std::thread([this] { threadMain(); });
+    counting_thread_ = std::thread([this] { countCycles(); });
 }
 
 Runner::~Runner() {
@@ -59,6 +70,11 @@ Runner::~Runner() {
     loop_.requestStop();
     jobs_changed_.notify_all();
     thread_.join();
+    {
+        const std::lock_guard<std::mutex> lock(counting_mutex_);
+        counting_ends_.notify_all();
+    }
+    counting_thread_.join();
 }
 
 void Runner::post(std::function<void()> job) {
@@ -98,10 +114,20 @@ void Runner::threadMain() {
 
 void Runner::tick() {
     control_.tick();
-    CycleRecord record{};
-    while (discards_cycles_ && loop_.popRecord(record)) {
-    }
     control_.publishStatus();
+}
+
+void Runner::countCycles() {
+    const CrashContext crash_context(ThreadRole::Other);
+    pthread_setname_np(pthread_self(), "rtcf-counts");
+    std::chrono::milliseconds pause = kLongestCount;
+    std::unique_lock<std::mutex> lock(counting_mutex_);
+    while (!ending_) {
+        const double filled = statistics_.count();
+        if (filled > kMuch) pause = std::max(pause / 2, kShortestCount);
+        if (filled < kLittle) pause = std::min(pause * 2, kLongestCount);
+        counting_ends_.wait_for(lock, pause);
+    }
 }
 
 void Runner::reportEvent(const RunnerEvent& event) noexcept {

@@ -1,8 +1,9 @@
 /// @file
-/// A runner: the graph, its loop, and the graph thread, which alone changes them. The runner owns
-/// the thread, its jobs, and the following objects. An object uses only those above it:
+/// A runner: the graph, its loop, and the graph thread, which alone changes them; and a thread that
+/// counts the loop's cycles. The runner owns the threads, the jobs, and the following objects. An
+/// object uses only those above it:
 ///
-///     HookActivity, Publication              data for queries
+///     Publication, CycleStatistics           data for queries
 ///     ActivePlan, FrameKeeper, BridgeLink    plan and frames of the loop; link to the outside
 ///     LoopBoundary                           changes at a cycle boundary
 ///     LoopControl                            start, stop and supervision of the loop
@@ -26,6 +27,7 @@
 #include "graph/definition.hpp"
 #include "graph/difference.hpp"
 #include "logging/log.hpp"
+#include "loop/cycle_statistics.hpp"
 #include "loop/loop.hpp"
 #include "runner/active_plan.hpp"
 #include "runner/bridge_link.hpp"
@@ -162,8 +164,7 @@ class Runner final : private RunnerView {
     void onReadersAwaited(std::function<void()> callback) {
         frames_.onReadersAwaited(std::move(callback));
     }
-    /// See Loop. One thread only.
-    void holdStatistics(bool held) noexcept { loop_.holdStatistics(held); }
+    CycleStatistics& cycleStatistics() override { return statistics_; }
     /// @}
 
    private:
@@ -173,9 +174,12 @@ class Runner final : private RunnerView {
     };
 
     std::uint64_t logRecordsDropped() const override { return log_.dropped(); }
-    bool popCycle(CycleRecord& record) override { return loop_.popRecord(record); }
+    bool nextCycle(CycleRecord& cycle) override { return frames_.nextCycle(cycle); }
+    void skipCycles() override { frames_.skipCycles(); }
+    std::uint64_t cyclesLost() const override { return frames_.cyclesLost(); }
 
     void threadMain();
+    void countCycles();
     void tick();
     void reportEvent(const RunnerEvent& event) noexcept;
     /// Changes parameters at the request of the bridge.
@@ -191,9 +195,9 @@ class Runner final : private RunnerView {
 
     Loop loop_;
     BridgeLink bridge_;
-    bool discards_cycles_ = true;  // no bridge consumes the cycle records
     ActivePlan plan_;
     Publication publication_;
+    CycleStatistics statistics_{loop_.statistics()};
     FrameKeeper frames_;
     LoopBoundary boundary_;
     LoopControl control_;
@@ -208,6 +212,11 @@ class Runner final : private RunnerView {
     std::condition_variable jobs_changed_;
     std::deque<Job> jobs_;
     std::thread thread_;
+
+    // Counting of cycles.
+    std::mutex counting_mutex_;
+    std::condition_variable counting_ends_;
+    std::thread counting_thread_;
 };
 
 }  // namespace rtcf::executor

@@ -101,6 +101,8 @@ class Transactions {
     void watch(std::uint64_t watch, Watch wanted, bool allow_missing);
     /// Ends a watch; does nothing if the number is unknown.
     void endWatch(std::uint64_t watch);
+    /// Gives the loop frames for the present graph and watches.
+    void adoptFrames();
     /// @}
 
    private:
@@ -112,8 +114,6 @@ class Transactions {
     void handOver(Change& change, const Instance& previous, const Instance& successor) const;
     /// Publishes a change that the loop has adopted.
     void adopted(const Change& change);
-    /// Replaces the frames after a change of the watches.
-    void adoptFrames();
     std::shared_ptr<const FrameTable> framesOf(const Plan& plan, Adoption& adoption);
     void checkTaps(const Wiring& wiring) const;
     ChangeOutcome outcomeOf(const Instance& arrived) const;

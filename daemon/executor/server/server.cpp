@@ -176,7 +176,7 @@ void Server::serve(Runner& runner, Log& log, Access& access, const DirectStop& d
             ids.push_back(id);
         }
         const int patience_ms = waiting_.empty() ? 1000 : kPortsInterval;
-        ::poll(polled.data(), polled.size(), resets_.empty() ? patience_ms : 1);
+        ::poll(polled.data(), polled.size(), patience_ms);
         if ((polled[1].revents & POLLIN) != 0) exiting_ = true;
         if ((polled[2].revents & POLLIN) != 0) {
             std::uint64_t count = 0;
@@ -195,7 +195,6 @@ void Server::serve(Runner& runner, Log& log, Access& access, const DirectStop& d
         if ((polled[0].revents & POLLIN) != 0) accept();
         deliver();
         servePorts();
-        goOnWithResets();
         expire();
         listener_.renew(monotonicNow());
         if (orphaned()) exiting_ = true;
@@ -247,12 +246,6 @@ void Server::drop(std::uint64_t id) {
         if (of_it && it->second.endless()) it->second.given_up->store(true);
         it = of_it ? waiting_.erase(it) : std::next(it);
     }
-    // Resets of other connections continue; if there are none, counting resumes.
-    const auto gone = std::remove_if(resets_.begin(), resets_.end(),
-                                     [id](const Reset& each) { return each.connection == id; });
-    if (gone == resets_.end()) return;
-    resets_.erase(gone, resets_.end());
-    if (resets_.empty()) runner_->holdStatistics(false);
 }
 
 void Server::respond(std::uint64_t connection, const v1::Response& response) {
@@ -430,8 +423,9 @@ bool Server::answerQuery(std::uint64_t connection, const v1::Request& request) {
                 statistics_->statistics(request.get_statistics().buckets());
             break;
         case v1::Request::kResetStatistics:
-            resetStatistics(connection, request.id());
-            return true;
+            statistics_->restart();
+            response.mutable_done();
+            break;
         case v1::Request::kGetStatus:
             setState(response, runner_->numberedState());
             *response.mutable_status() = status();
@@ -482,9 +476,7 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
                         ((request.kind_case() == v1::Request::kStep ||
                           request.kind_case() == v1::Request::kRestoreSnapshot) &&
                          runner_->status().state != RunnerState::Stepping);
-    if (begins && !runner_->loop().running() && !statistics_->restart()) {
-        statistics_->restartInStep();  // during a step, which this request waits for
-    }
+    if (begins && !runner_->loop().running()) statistics_->restart();
     // Steps and replays have no time limit; they report progress.
     const bool endless =
         request.kind_case() == v1::Request::kStep || request.kind_case() == v1::Request::kReplay;
@@ -666,45 +658,6 @@ pb::RunnerStatus Server::status() const {
     for (const auto& injector : graph->injectors) passed_over += injector->passedOver();
     ros.set_passed_over(passed_over);
     return status;
-}
-
-// Resets the statistics at once, or at the end of the cycle that is being counted; later cycles are
-// not counted until then.
-void Server::resetStatistics(std::uint64_t connection, std::uint64_t request) {
-    constexpr std::int64_t kPeriods = 10;
-    const std::int64_t period_ns = runner_->status().settings.loop.period_ns;
-    resets_.push_back({connection, request, monotonicNow() + kSecond + kPeriods * period_ns});
-    goOnWithResets();
-}
-
-void Server::goOnWithResets() {
-    if (resets_.empty()) return;
-    v1::Response answer;
-    std::vector<Reset> answered;
-    if (statistics_->restart()) {
-        answer.mutable_done();
-        answered.swap(resets_);
-    } else {
-        const std::int64_t now = monotonicNow();
-        const auto late =
-            std::stable_partition(resets_.begin(), resets_.end(),
-                                  [now](const Reset& each) { return now < each.until_ns; });
-        if (late == resets_.end()) return;
-        answered.assign(late, resets_.end());
-        resets_.erase(late, resets_.end());
-        if (resets_.empty()) runner_->holdStatistics(false);
-        const std::string activity = runner_->recorder().realtimeActivity();
-        answer = errorResponse(
-            0, ErrorKind::Unavailable,
-            fmt::format(
-                "the loop of {} reaches no cycle boundary: {} does not return; the statistics "
-                "are not reset",
-                runner_->name(), activity.empty() ? "a component" : activity + "()"));
-    }
-    for (const Reset& each : answered) {
-        answer.set_id(each.request);
-        respond(each.connection, answer);
-    }
 }
 
 }  // namespace rtcf::executor

@@ -58,11 +58,6 @@ class Server {
         v1::Response response;
         bool last;  // the last response to its request
     };
-    struct Reset {  // a reset that waits for the end of a cycle
-        std::uint64_t connection;
-        std::uint64_t request;
-        std::int64_t until_ns;
-    };
 
     void post(std::uint64_t connection, v1::Response response, bool last);
     void wakeUp() const;
@@ -82,8 +77,6 @@ class Server {
     void expire();
     bool orphaned();
     ::rtcf::v1::RunnerStatus status() const;
-    void resetStatistics(std::uint64_t connection, std::uint64_t request);
-    void goOnWithResets();
     std::string stuck() const;
     void requireNotStuck() const;
 
@@ -100,7 +93,6 @@ class Server {
     std::uint64_t next_id_ = 1;
     std::map<std::uint64_t, std::unique_ptr<Connection>> connections_;
     std::unique_ptr<StatisticsReport> statistics_;
-    std::vector<Reset> resets_;
 
     // Requests queued for the graph thread, by connection and id, with their timeouts.
     struct Waiting {

@@ -28,31 +28,12 @@ class StatisticsReport {
     ::rtcf::v1::RunnerStatistics statistics(bool buckets) const;
 
     /// Resets the statistics.
-    /// @return false if a cycle is being counted; later cycles are then not counted until a call
-    /// succeeds
-    bool restart();
-    /// Resets the statistics, even while a cycle is being counted.
-    void restartInStep();
+    void restart();
 
    private:
-    struct Counted {  // all counters since the start
-        struct Component {
-            HistogramSnapshot duration;
-            std::uint64_t overruns = 0;
-            std::uint64_t device_calls = 0;
-            std::int64_t device_time_ns = 0;
-        };
-        // Shared ownership, as other statistics could get the same address.
-        std::map<std::shared_ptr<const ComponentStatistics>, Component> components;
-        HistogramSnapshot duration;
-        HistogramSnapshot latency;
+    /// Totals at the last reset of what is not counted from 0 then.
+    struct Baseline {
         HistogramSnapshot adoption;
-        std::uint64_t overruns = 0;
-        std::uint64_t missed = 0;
-        std::uint64_t late_wake_ups = 0;
-        std::uint64_t exchange_overruns = 0;
-        std::uint64_t frame_overruns = 0;
-        std::uint64_t catching_up = 0;
         std::uint64_t log_dropped = 0;
         // Weak, as the taps' rings are large.
         std::map<std::weak_ptr<const Tap>, std::uint64_t, std::owner_less<>> tap_dropped;
@@ -60,15 +41,13 @@ class StatisticsReport {
         ThreadUsage usage;
     };
 
-    Counted counted(const GraphView& graph) const;
-    static std::uint64_t tapDropped(const GraphView& graph, const Counted& baseline);
-    void setBaseline(Counted totals);
-    std::shared_ptr<const Counted> baseline() const;
+    static std::uint64_t tapDropped(const GraphView& graph, const Baseline& baseline);
+    std::shared_ptr<const Baseline> baseline() const;
 
     Runner& runner_;
     Log& log_;
     mutable std::mutex mutex_;  // the graph thread makes status messages, too
-    std::shared_ptr<const Counted> baseline_ = std::make_shared<Counted>();
+    std::shared_ptr<const Baseline> baseline_ = std::make_shared<Baseline>();
 };
 
 }  // namespace rtcf::executor

@@ -1,5 +1,5 @@
 /// @file
-/// A counter with one writer and any number of readers. Cheaper than fetch_add(), whose bus lock
+/// Counters with one writer and any number of readers. Cheaper than fetch_add(), whose bus lock
 /// only several writers need.
 #pragma once
 
@@ -32,6 +32,20 @@ class Counter {
 
    private:
     std::atomic<std::uint64_t> value_{0};
+};
+
+/// A counter of events, with their number since a reset of the statistics.
+class EventCounter : public Counter {
+   public:
+    /// Lets recent() count from a value. One thread only, at any time.
+    void restart(std::uint64_t from) noexcept { start_.store(from, std::memory_order_relaxed); }
+    /// Events since the last restart(). Any thread.
+    std::uint64_t recent() const noexcept {
+        return value() - start_.load(std::memory_order_relaxed);
+    }
+
+   private:
+    std::atomic<std::uint64_t> start_{0};  // of the last restart()
 };
 
 }  // namespace rtcf::executor

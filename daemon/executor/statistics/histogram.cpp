@@ -5,12 +5,31 @@
 
 namespace rtcf::executor {
 
-void Histogram::addLarge(std::int64_t value) noexcept RTCF_NONBLOCKING {
-    buckets_[bucketOf(value)].add(1);
-    if (value < 0) return;
-    large_sum_.add(static_cast<std::uint64_t>(value));
-    if (value > maximum_.load(std::memory_order_relaxed))
-        maximum_.store(value, std::memory_order_relaxed);
+Histogram::~Histogram() {
+    for (const std::atomic<Block*>& block : blocks_) delete block.load(std::memory_order_relaxed);
+}
+
+void Histogram::allocate() {
+    for (std::size_t number = 0; number < kBlocks; ++number) {
+        if (blocks_[number].load(std::memory_order_relaxed) == nullptr) allocateBlock(number);
+    }
+}
+
+Histogram::Block& Histogram::allocateBlock(std::size_t number) {
+    auto* const block = new Block{};
+    blocks_[number].store(block, std::memory_order_release);
+    return *block;
+}
+
+void Histogram::clear() noexcept {
+    for (const std::atomic<Block*>& place : blocks_) {
+        Block* const block = place.load(std::memory_order_relaxed);
+        if (block == nullptr) continue;
+        for (Counter& bucket : *block) bucket.reset();
+    }
+    sum_.reset();
+    maximum_.store(0, std::memory_order_relaxed);
+    generation_.fetch_add(1, std::memory_order_relaxed);
 }
 
 std::int64_t Histogram::lowerBound(std::size_t bucket) noexcept {
@@ -28,26 +47,27 @@ std::int64_t Histogram::width(std::size_t bucket) noexcept {
 
 HistogramSnapshot Histogram::snapshot() const {
     HistogramSnapshot result;
-    result.buckets.reserve(static_cast<std::size_t>(
-        std::count_if(buckets_.begin(), buckets_.end(),
-                      [](const Counter& bucket) { return bucket.value() != 0; })));
-    result.sum = static_cast<std::int64_t>(large_sum_.value());
+    result.generation = generation_.load(std::memory_order_relaxed);
+    result.sum = static_cast<std::int64_t>(sum_.value());
     result.maximum = maximum_.load(std::memory_order_relaxed);
-    for (std::size_t number = 0; number < kBuckets; ++number) {
-        const std::uint64_t count = buckets_[number].value();
-        if (count == 0) continue;
-        result.buckets.push_back({number, count});
-        result.count += count;
-        if (number >= kExact) continue;
-        const auto value = static_cast<std::int64_t>(number);
-        result.sum += value * static_cast<std::int64_t>(count);
-        result.maximum = std::max(result.maximum, value);
+    for (std::size_t number = 0; number < kBlocks; ++number) {
+        const Block* const block = blocks_[number].load(std::memory_order_acquire);
+        if (block == nullptr) continue;
+        for (std::size_t i = 0; i < kInBlock; ++i) {
+            const std::uint64_t count = (*block)[i].value();
+            if (count == 0) continue;
+            result.buckets.push_back({number * kInBlock + i, count});
+            result.count += count;
+        }
     }
+    result.buckets.shrink_to_fit();
     return result;
 }
 
 HistogramSnapshot difference(const HistogramSnapshot& now, const HistogramSnapshot& earlier) {
+    if (now.generation != earlier.generation) return now;
     HistogramSnapshot result;
+    result.generation = now.generation;
     result.count = now.count - earlier.count;
     result.sum = now.sum - earlier.sum;
     result.maximum = now.maximum;

@@ -1,12 +1,12 @@
 /// @file
 /// A histogram of durations: one bucket per small value, and logarithmic octaves of linear buckets
-/// for larger ones (as in HdrHistogram, G. Tene). Fixed memory, relative error below 1.6 %. One
-/// thread adds values in constant time. Any other thread takes snapshots, and resets by subtracting
-/// an earlier snapshot, without disturbing the writer.
+/// for larger ones (as in HdrHistogram, G. Tene), with a relative error below 1.6 %. Only the
+/// octaves that have values take memory. One thread adds values; any thread takes snapshots.
 #pragma once
 
 #include <array>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -26,7 +26,8 @@ struct HistogramSnapshot {
     std::vector<Bucket> buckets;
     std::uint64_t count = 0;
     std::int64_t sum = 0;
-    std::int64_t maximum = 0;  ///< exact; since the histogram was created
+    std::int64_t maximum = 0;      ///< exact; since the histogram was created or cleared
+    std::uint64_t generation = 0;  ///< how often the histogram was cleared
 };
 
 /// Statistics of a snapshot, in the unit of its values times a scale.
@@ -40,7 +41,8 @@ struct DistributionSummary {
     double max = 0.0;
 };
 
-/// The values added between two snapshots; `earlier` may be empty.
+/// The values added between two snapshots; `earlier` may be empty. If the histogram was cleared in
+/// between, all values of `now`.
 HistogramSnapshot difference(const HistogramSnapshot& now, const HistogramSnapshot& earlier);
 
 /// Computes minimum, mean, quantiles and maximum.
@@ -55,16 +57,27 @@ class Histogram {
     static constexpr unsigned kOctaves = 28;  // up to 2^36 units: 23 s of a 3 GHz counter
     static constexpr std::size_t kBuckets = kExact + (std::size_t{kOctaves} << kSubBits);
 
+    Histogram() = default;
+    ~Histogram();
+    Histogram(const Histogram&) = delete;
+    Histogram& operator=(const Histogram&) = delete;
+
+    /// Allocates the memory for all values, so that add() allocates nothing.
+    void allocate();
     /// Adds a value. Negative values count as 0; values above the range count in the last bucket.
-    /// Values with a bucket of their own cost one addition, because their sum and maximum follow
-    /// from the buckets; a short update() takes a few hundred ticks. Writer only; real-time safe.
-    void add(std::int64_t value) noexcept RTCF_NONBLOCKING {
-        if (static_cast<std::uint64_t>(value) < kExact) {
-            buckets_[static_cast<std::size_t>(value)].add(1);
-        } else {
-            addLarge(value);
-        }
+    /// Writer only. Real-time safe after allocate().
+    void add(std::int64_t value) {
+        const std::size_t number = bucketOf(value);
+        Block* block = blocks_[number / kInBlock].load(std::memory_order_relaxed);
+        if (block == nullptr) block = &allocateBlock(number / kInBlock);
+        (*block)[number % kInBlock].add(1);
+        if (value < 0) return;
+        sum_.add(static_cast<std::uint64_t>(value));
+        if (value > maximum_.load(std::memory_order_relaxed))
+            maximum_.store(value, std::memory_order_relaxed);
     }
+    /// Removes all values. Writer only.
+    void clear() noexcept;
 
     /// Copies the counts. While the writer runs, the last few values may be missing in some of
     /// them. Any thread; not real-time safe.
@@ -84,12 +97,16 @@ class Histogram {
     static std::int64_t width(std::size_t bucket) noexcept;
 
    private:
-    void addLarge(std::int64_t value) noexcept RTCF_NONBLOCKING;
+    static constexpr std::size_t kInBlock = std::size_t{1} << kSubBits;
+    static constexpr std::size_t kBlocks = kBuckets / kInBlock;
+    using Block = std::array<Counter, kInBlock>;
 
-    std::array<Counter, kBuckets> buckets_{};
-    // For the values from kExact on.
-    Counter large_sum_;
+    Block& allocateBlock(std::size_t number);
+
+    std::array<std::atomic<Block*>, kBlocks> blocks_{};  // owned; null = no values
+    Counter sum_;
     std::atomic<std::int64_t> maximum_{0};
+    std::atomic<std::uint64_t> generation_{0};
 };
 
 }  // namespace rtcf::executor

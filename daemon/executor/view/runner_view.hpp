@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include "loop/cycle_statistics.hpp"
 #include "loop/loop.hpp"
 #include "view/graph_view.hpp"
 #include "view/runner_status.hpp"
@@ -22,12 +23,19 @@ class RunnerView {
     virtual RunnerStatus status() const = 0;
     virtual const Loop& loop() const noexcept = 0;
     virtual std::uint64_t logRecordsDropped() const = 0;
+    virtual CycleStatistics& cycleStatistics() = 0;
+    /// Cycles that were overwritten before nextCycle() took them.
+    virtual std::uint64_t cyclesLost() const = 0;
     /// @}
 
-    /// Takes the oldest cycle record. One thread, which must call it often: the loop drops records
-    /// when the ring is full.
-    /// @return false if there is none
-    virtual bool popCycle(CycleRecord& record) = 0;
+    /// @name One thread
+    /// @{
+    /// Takes the next cycle. Cycles are lost unless it is called often.
+    /// @return false if there is none yet
+    virtual bool nextCycle(CycleRecord& cycle) = 0;
+    /// Passes over the cycles so far.
+    virtual void skipCycles() = 0;
+    /// @}
 
    protected:
     ~RunnerView() = default;

@@ -1,7 +1,6 @@
 /// @file
-/// The times at which each component's update() ended in a cycle: their place in frames, and their
-/// form in messages. The cycle always measures them, in the steps of the schedule; only watched
-/// frames copy them. Made by the graph thread; immutable.
+/// The times at which each component's update() ended in a cycle, as messages. Made by the graph
+/// thread for a watch; immutable.
 #pragma once
 
 #include <cstdint>
@@ -9,8 +8,8 @@
 #include <vector>
 
 #include "frames/frame_ring.hpp"
-#include "loop/cycle.hpp"
 #include "loop/schedule.hpp"
+#include "realtime/cycle_counter.hpp"
 
 namespace rtcf::executor {
 
@@ -18,15 +17,9 @@ class ComponentTurns {
    public:
     /// No times, because no watch requests them.
     ComponentTurns() = default;
-    /// @param first index of the first source of the ring that appendSources() has added
-    ComponentTurns(const Schedule& schedule, const CycleCounter& counter, const FrameRing& ring,
-                   std::size_t first);
+    /// @param counter of the frames' ticks
+    ComponentTurns(const Schedule& schedule, const CycleCounter& counter);
 
-    /// Appends the sources that frames copy.
-    static void appendSources(const Schedule& schedule, const Cycle& cycle,
-                              std::vector<FrameRing::Source>& sources);
-
-    bool wanted() const noexcept { return !offsets_.empty(); }
     /// Full names, in the order of the schedule.
     const std::vector<std::string>& components() const noexcept { return components_; }
     /// Number of bytes that pack() appends.
@@ -37,8 +30,6 @@ class ComponentTurns {
 
    private:
     std::vector<std::string> components_;
-    std::vector<std::size_t>
-        offsets_;  // offsets in a frame, bytes: the cycle's marks, then one per component
     CycleCounter counter_;
 };
 

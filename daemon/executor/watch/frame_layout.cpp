@@ -50,6 +50,8 @@ std::string frameLayout(const FrameRing& ring, const std::vector<FrameColumn>& c
         value.set_output(known->second);
     }
     for (const std::string& note : notes) layout.add_notes(note);
+    layout.set_steps(static_cast<std::uint32_t>(ring.steps()));
+    layout.set_ns_per_tick(ring.counter().nsPerTick());
     return serialized(layout);
 }
 

@@ -12,7 +12,8 @@ namespace rtcf::executor {
 
 namespace {
 
-constexpr double kSeconds = 1.0;
+constexpr double kSeconds = 1.0;             // that kept frames hold
+constexpr double kStatisticsSeconds = 0.25;  // of frames for statistics, which count them sooner
 constexpr std::size_t kNamesInMessage = 8;
 
 // A column and the address of its value.
@@ -120,25 +121,27 @@ std::shared_ptr<const FrameTable> makeFrameTable(const Plan& plan, const FrameDe
         sources.push_back({candidate.from, candidate.column.size});
         table->columns.push_back(std::move(candidate.column));
     }
-    const bool turns = std::any_of(demand.watches.begin(), demand.watches.end(),
-                                   [](const auto& watch) { return watch.second.turns; });
-    const std::size_t first_of_turns = sources.size();
-    if (turns) ComponentTurns::appendSources(plan.schedule, demand.cycle, sources);
-    const auto frames =
-        table->kept ? static_cast<std::size_t>(std::ceil(kSeconds * demand.frequency_hz)) : 1;
-    const std::size_t capacity = FrameRing::capacityFor(sources, frames);
+    for (const std::size_t index : plan.wiring.order)
+        table->components.push_back(plan.graph.nodes()[index].instance->statistics());
+    const CycleCounter& counter = demand.counter;
+    if (std::any_of(demand.watches.begin(), demand.watches.end(),
+                    [](const auto& watch) { return watch.second.turns; }))
+        table->turns = {plan.schedule, counter};
+    const double seconds = table->kept ? kSeconds : kStatisticsSeconds;
+    const auto frames = static_cast<std::size_t>(std::ceil(seconds * demand.frequency_hz));
+    const std::size_t steps = table->components.size();
+    const std::size_t capacity = FrameRing::capacityFor(sources, steps, frames);
     const FrameTable* const previous = demand.previous;
-    if (capacity < frames) table->shortness = shortnessOf(capacity, sources, demand.frequency_hz);
+    if (table->kept && capacity < frames)
+        table->shortness = shortnessOf(capacity, sources, demand.frequency_hz);
     if (previous != nullptr && previous->kept == table->kept &&
-        previous->ring->sources() == sources && previous->ring->capacity() == capacity &&
-        previous->shortness == table->shortness) {
+        previous->components == table->components && previous->ring->sources() == sources &&
+        previous->ring->capacity() == capacity && previous->shortness == table->shortness) {
         table->ring = previous->ring;
-        table->turns = previous->turns;
         return table;
     }
-    table->ring = std::make_shared<FrameRing>(std::move(sources), frames,
+    table->ring = std::make_shared<FrameRing>(std::move(sources), steps, frames, counter,
                                               table->kept ? demand.memory : nullptr);
-    if (turns) table->turns = {plan.schedule, demand.cycle.counter(), *table->ring, first_of_turns};
     if (const auto& block = table->ring->block(); block != nullptr) {
         std::vector<std::string> remarks = table->notes;
         if (!table->shortness.empty()) remarks.push_back(table->shortness);

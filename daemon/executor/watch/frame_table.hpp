@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "frames/frame_ring.hpp"
-#include "loop/cycle.hpp"
+#include "loop/cycle_reader.hpp"
 #include "ordering/plan.hpp"
 #include "watch/component_turns.hpp"
 #include "watch/frame_layout.hpp"
@@ -33,22 +33,24 @@ struct FrameTable {
     std::vector<std::string> notes;    ///< omitted values, one line each
     std::string shortness;             ///< message if less than one second is kept; else empty
     std::shared_ptr<FrameRing> ring;
+    /// The components whose times are in the frames, in schedule order.
+    std::vector<std::shared_ptr<ComponentStatistics>> components;
     ComponentTurns turns;  ///< empty unless a watch takes them
     Watches watches;       ///< watches that read the ring
-    /// Frames are kept for watches or an incident; else only the last one is used, by the loop.
+    /// Frames are kept for watches or an incident; else only for the loop and its statistics.
     bool kept = false;
 };
 
 /// Input of makeFrameTable().
 struct FrameDemand {
     const Watches& watches;
-    double frequency_hz;  ///< frequency of the loop; the ring holds about one second
+    double frequency_hz;  ///< frequency of the loop; a ring that is kept holds about one second
     /// Most bytes of states and staged outputs per frame, watched or not; 0 = only watched ones.
     /// Other outputs are always in the frame: the loop restores them after an update() that throws.
     std::size_t most_bytes;
-    const Cycle& cycle;   ///< the cycle that fills the frames
-    FrameMemory* memory;  ///< memory that outlives the process; may be null
-    /// Table whose ring is reused if the sources are the same; may be null.
+    const CycleCounter& counter;  ///< counter of the loop
+    FrameMemory* memory;          ///< memory that outlives the process; may be null
+    /// Table whose ring is reused if sources and components are the same; may be null.
     const FrameTable* previous;
 };
 

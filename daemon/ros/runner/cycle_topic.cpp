@@ -79,8 +79,12 @@ void CycleTopic::publishAll() {
     };
     const bool cycles = wanted(cycles_);
     const bool iteration_info = wanted(iteration_info_);
+    if (!cycles && !iteration_info) {
+        runner_.skipCycles();
+        return;
+    }
     executor::CycleRecord record{};
-    while (!stop_ && runner_.popCycle(record)) {
+    while (!stop_ && runner_.nextCycle(record)) {
         if (cycles) cycles_.publish(cycleOf(record));
         if (iteration_info) iteration_info_.publish(infoOf(record));
     }

@@ -18,8 +18,7 @@ class RunnerView;
 
 namespace rtcf::ros1 {
 
-/// Owned by Introspection. Its thread consumes all cycle records, with or without a master, so that
-/// the executor's ring does not overflow.
+/// Owned by Introspection. Its thread reads all cycles while a topic has a subscriber.
 class CycleTopic {
    public:
     explicit CycleTopic(executor::RunnerView& runner);

@@ -82,7 +82,7 @@ rtcf_msgs::GetLoop::Response describeRunner(const executor::RunnerView& runner) 
     response.status = present.loop_fault;
     response.frequency = present.settings.frequency_hz;
     response.iteration = statistics.iteration.load(std::memory_order_relaxed);
-    response.overruns = statistics.overruns.load(std::memory_order_relaxed);
+    response.overruns = statistics.overruns.value();
     response.generation = graph->generation;
     response.degraded = present.degraded;
     for (const auto& component : graph->components) {
@@ -163,7 +163,7 @@ rtcf_msgs::RunnerInfo runnerInfo(const rtcf_msgs::GetLoop::Response& loop) {
     return info;
 }
 
-DiagnosticReport::DiagnosticReport(const executor::RunnerView& runner, std::string hardware)
+DiagnosticReport::DiagnosticReport(executor::RunnerView& runner, std::string hardware)
     : runner_(runner), hardware_(std::move(hardware)), name_(runner.name()) {}
 
 diagnostic_msgs::DiagnosticArray DiagnosticReport::take() {
@@ -189,15 +189,17 @@ DiagnosticStatus DiagnosticReport::loopStatus() {
     const executor::RunnerStatus present = runner_.status();
     const executor::Loop& loop = runner_.loop();
     const executor::LoopStatistics& statistics = loop.statistics();
-    const executor::HistogramSnapshot duration = statistics.duration.snapshot();
-    const executor::HistogramSnapshot latency = statistics.latency.snapshot();
+    executor::CycleStatistics& durations = runner_.cycleStatistics();
+    durations.count();
+    const executor::HistogramSnapshot duration = durations.duration().snapshot();
+    const executor::HistogramSnapshot latency = durations.latency().snapshot();
     std::uint64_t taps = 0;
     const std::shared_ptr<const executor::GraphView> graph = runner_.graph();
     for (const auto& tap : graph->taps) taps += tap->dropped();
     std::uint64_t passed_over = 0;
     for (const auto& injector : graph->injectors) passed_over += injector->passedOver();
     const std::uint64_t logs = runner_.logRecordsDropped();
-    const std::uint64_t cycles = loop.recordsDropped();
+    const std::uint64_t cycles = runner_.cyclesLost();
     const std::uint64_t iteration = statistics.iteration.load(std::memory_order_relaxed);
     const std::int64_t now_ns = executor::monotonicNow();
     const std::uint64_t done = growth(iteration, iteration_);
@@ -208,9 +210,8 @@ DiagnosticStatus DiagnosticReport::loopStatus() {
     status.name = name_ + ": loop";
     status.level = DiagnosticStatus::OK;
     status.message = stateName(present.state);
-    const std::uint64_t overruns =
-        growth(statistics.overruns.load(std::memory_order_relaxed), overruns_);
-    const std::uint64_t missed = growth(statistics.missed.load(std::memory_order_relaxed), missed_);
+    const std::uint64_t overruns = growth(statistics.overruns.value(), overruns_);
+    const std::uint64_t missed = growth(statistics.missed.value(), missed_);
     const std::uint64_t dropped = growth(taps + logs + cycles, dropped_);
     if (dropped != 0) {
         raise(status, DiagnosticStatus::WARN,
@@ -281,8 +282,7 @@ DiagnosticStatus DiagnosticReport::componentStatus(const std::string& name,
     status.level = DiagnosticStatus::OK;
     status.message = "ok";
     const executor::HistogramSnapshot duration = now.duration.snapshot();
-    const std::uint64_t overruns =
-        growth(now.overruns.load(std::memory_order_relaxed), last.overruns);
+    const std::uint64_t overruns = growth(now.overruns.value(), last.overruns);
     if (overruns != 0)
         raise(status, DiagnosticStatus::WARN, counted(overruns, "overrun", "overruns"));
     if (!fault.empty()) raise(status, DiagnosticStatus::ERROR, fault);

@@ -32,7 +32,7 @@ rtcf_msgs::RunnerInfo runnerInfo(const rtcf_msgs::GetLoop::Response& loop);
 class DiagnosticReport {
    public:
     /// @param hardware name of the machine
-    DiagnosticReport(const executor::RunnerView& runner, std::string hardware);
+    DiagnosticReport(executor::RunnerView& runner, std::string hardware);
 
     /// Sets the prefix of status names, which must be unique on /diagnostics.
     void nameAfter(const std::string& node) { name_ = node.substr(node.find_first_not_of('/')); }
@@ -54,7 +54,7 @@ class DiagnosticReport {
     /// @return growth of a counter, which restarts from 0 with the loop
     static std::uint64_t growth(std::uint64_t now, std::uint64_t& last);
 
-    const executor::RunnerView& runner_;
+    executor::RunnerView& runner_;
     const std::string hardware_;
     std::string name_;
     executor::HistogramSnapshot duration_;

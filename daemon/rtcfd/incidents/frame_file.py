@@ -47,12 +47,13 @@ class Ring:
     @property
     def durations_ns(self) -> "NDArray[np.int64]":
         """The calculation duration of each cycle."""
-        return self._signed(4)
+        ticks = self._signed(7) - self._signed(5)
+        return np.rint(ticks * self.layout.ns_per_tick).astype("i8")
 
     @property
     def last_of_loop(self) -> "NDArray[np.bool_]":
         """Whether a cycle ends its loop: the components' safe() has run in it."""
-        flags: NDArray[np.bool_] = self.words[:, 5] != 0
+        flags: NDArray[np.bool_] = self.words[:, 4] == 1
         return flags
 
     def schema(self) -> ports_pb2.PortSchema:
@@ -114,7 +115,8 @@ class Ring:
         )
 
     def _values(self, value: wire.FrameValue, part: slice) -> bytes:
-        rows = np.ascontiguousarray(self.words[part, frame_memory.HEAD_WORDS :]).view("u1")
+        first = frame_memory.HEAD_WORDS + self.layout.steps
+        rows = np.ascontiguousarray(self.words[part, first:]).view("u1")
         raw = rows[:, value.offset : value.offset + value.size]
         if not value.output:
             return raw.tobytes()

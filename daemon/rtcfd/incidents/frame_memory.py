@@ -8,12 +8,12 @@ import os
 import struct
 
 MAGIC = 0x42435452
-VERSION = 1
+VERSION = 2
 HEAD = struct.Struct("<II")
 ENTRY = struct.Struct("<6Q")  # sequence, offset, frames, words of a frame, layout's offset, bytes
 ENTRIES = 8
 WORD = struct.Struct("<Q")
-HEAD_WORDS = 6  # of a frame: mark, iteration, stamp, latency, duration, last of its loop
+HEAD_WORDS = 8  # of a frame: mark, iteration, stamp, latency, kind, begin, ready, end
 
 _PIECE = 1024 * 1024
 

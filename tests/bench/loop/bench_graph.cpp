@@ -83,20 +83,33 @@ void BenchGraph::adopt(const executor::Graph& graph) {
         executor::wire(graph, {executor::NamePattern("bench", mapped_), {}}, {});
     executor::Adoption adoption;
     auto plan = executor::buildPlan(graph, std::move(wiring), *plan_, kFrequencyHz, adoption);
-    loop_.adopt(adoption, kAdoptionTimeoutNs);
+    adopt(adoption, *plan);
     plan->noteHeld(adoption, *plan_);
     std::swap(plan_, plan);
     order_.clear();
     for (const executor::Step& step : plan_->schedule.steps) order_.push_back(step.component);
 }
 
-void BenchGraph::keepFrames() {
-    frames_ = executor::makeFrameTable(
-        *plan_,
-        {{}, kFrequencyHz, executor::kLargestFrame, loop_.cycle(), &frame_memory_, nullptr});
-    executor::Adoption adoption;
-    adoption.frames = frames_->ring.get();
+void BenchGraph::adopt(executor::Adoption& adoption, const executor::Plan& plan) {
+    const auto frames = executor::makeFrameTable(
+        plan, {{}, kFrequencyHz, frame_bytes_, loop_.counter(), &frame_memory_, frames_.get()});
+    adoption.frames = frames->ring.get();
     loop_.adopt(adoption, kAdoptionTimeoutNs);
+    frames_ = frames;
+    statistics_.follow({frames->ring, frames->components});
+    cycles_.follow({frames->ring, frames->components});
+}
+
+void BenchGraph::keepFrames() {
+    frame_bytes_ = executor::kLargestFrame;
+    executor::Adoption adoption;
+    adopt(adoption, *plan_);
+}
+
+bool BenchGraph::nextCycle(executor::CycleRecord& cycle) {
+    if (cycles_.next(cycle_) == nullptr) return false;
+    cycle = cycle_.cycle();
+    return true;
 }
 
 void BenchGraph::deliver() {

@@ -12,6 +12,8 @@
 
 #include "faults/flight_recorder.hpp"
 #include "logging/log.hpp"
+#include "loop/cycle_reader.hpp"
+#include "loop/cycle_statistics.hpp"
 #include "loop/loop.hpp"
 #include "ordering/plan.hpp"
 #include "watch/frame_table.hpp"
@@ -41,6 +43,15 @@ class BenchGraph {
     ~BenchGraph();
 
     executor::Loop& loop() noexcept { return loop_; }
+    /// Takes the next cycle of the loop. @return false if there is none yet
+    bool nextCycle(executor::CycleRecord& cycle);
+    /// Cycles that were overwritten before nextCycle() took them.
+    std::uint64_t cyclesLost() const noexcept { return cycles_.lost(); }
+    /// Durations of the cycles and components so far.
+    const executor::CycleStatistics& statistics() {
+        statistics_.count();
+        return statistics_;
+    }
     executor::Plan& plan() noexcept { return *plan_; }
     /// Writes a new value to each mapped input, as a topic does.
     void deliver();
@@ -55,11 +66,17 @@ class BenchGraph {
     const std::vector<Component*>& order() const noexcept { return order_; }
 
    private:
+    void adopt(executor::Adoption& adoption, const executor::Plan& plan);
+
     executor::Log log_;
     executor::FlightRecorder recorder_;
     executor::FrameMemory frame_memory_;
+    std::size_t frame_bytes_ = 0;
     std::shared_ptr<const executor::FrameTable> frames_;
     executor::Loop loop_;
+    executor::CycleStatistics statistics_{loop_.statistics()};
+    executor::CycleReader cycles_;
+    executor::Frame cycle_;
     executor::LibraryStore libraries_;
     std::shared_ptr<const executor::Library> code_;
     const std::string mapped_;

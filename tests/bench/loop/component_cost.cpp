@@ -58,9 +58,6 @@ Turn turn(BenchGraph& graph, std::uint64_t cycles) {
         for (Component* component : graph.order()) component->update();
     }
     const std::int64_t end = readCycleCounter();
-    rtcf::executor::CycleRecord record{};
-    while (graph.loop().popRecord(record)) {
-    }
     const auto count = static_cast<double>(cycles);
     return {static_cast<double>(middle - begin) / count, static_cast<double>(end - middle) / count};
 }

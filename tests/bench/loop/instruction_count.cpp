@@ -2,7 +2,7 @@
 // single-stepped, and each read of the time stamp counter returns the number of
 // instructions so far. The loop's statistics, its calculation duration and that of each
 // component, are then instruction counts, exact and reproducible. `whole` is a full step,
-// including the cycle record and the pacing. Prints JSON. x86-64 only.
+// including the pacing. Prints JSON. x86-64 only.
 // Usage: instruction_count LIBRARY fig1|frames|mapped|CHAIN [CYCLES]
 #include <fmt/format.h>
 #include <sys/ptrace.h>
@@ -52,7 +52,7 @@ int runCounted(const std::string& library, const std::string& which, std::uint64
     raise(SIGSTOP);
     // Mean and maximum are exact, the histogram's quantiles are not.
     const executor::DistributionSummary cycle =
-        summarize(graph.loop().statistics().duration.snapshot(), 1.0);
+        summarize(graph.statistics().duration().snapshot(), 1.0);
     fmt::print(
         "{{\"graph\": \"{}\", \"cycles\": {}, \"instructions\": {:.1f}, \"max\": {}, "
         "\"whole\": {:.1f}, \"components\": {{",

@@ -50,7 +50,7 @@ int run(char** argv) {
         nanosleep(&pause, nullptr);
         if (!graph.loop().running()) break;
         executor::CycleRecord record{};
-        while (taken < cycles && graph.loop().popRecord(record)) {
+        while (taken < cycles && graph.nextCycle(record)) {
             if (record.iteration < kWarmUp) continue;
             ++taken;
             fmt::print(file.get(), "{} {}\n", record.duration_ns, record.latency_ns);
@@ -58,8 +58,8 @@ int run(char** argv) {
     }
     const executor::LoopStatistics& statistics = graph.loop().statistics();
     fmt::print("{{\"cycles\": {}, \"overruns\": {}, \"missed\": {}, \"records_dropped\": {}}}\n",
-               statistics.iteration.load(), statistics.overruns.load(), statistics.missed.load(),
-               graph.loop().recordsDropped());
+               statistics.iteration.load(), statistics.overruns.value(), statistics.missed.value(),
+               graph.cyclesLost());
     return 0;
 }
 

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "frames/frame_ring.hpp"
+#include "realtime/cycle_counter.hpp"
 
 namespace rtcf::executor {
 namespace {
@@ -33,7 +34,7 @@ std::vector<Entry> entriesOf(const FrameMemory& memory) {
 std::shared_ptr<FrameRing> ringIn(FrameMemory& memory, const double& value,
                                   const std::string& layout) {
     auto ring = std::make_shared<FrameRing>(std::vector<FrameRing::Source>{{&value, sizeof value}},
-                                            16, &memory);
+                                            1, 16, CycleCounter(), &memory);
     if (ring->block() != nullptr)
         memory.announce(ring->block(), ring->capacity(), ring->wordsOfFrame(), layout);
     return ring;
@@ -43,8 +44,9 @@ TEST(FrameMemory, HasFramesAtTheOffsetsInItsFile) {
     FrameMemory memory;
     double value = 2.5;
     const auto ring = ringIn(memory, value, "layout");
+    ring->begin();
     ring->take();
-    ring->commit({7, 0, 0, 0}, false);
+    ring->commit(7, 0, 0, {});
     const std::vector<Entry> entries = entriesOf(memory);
     ASSERT_EQ(entries.size(), 1);
     const auto [sequence, offset, frames, words, layout_offset, layout_bytes] = entries[0];
@@ -122,8 +124,9 @@ TEST(FrameMemory, UsesProcessMemoryForARingWithoutRoom) {
     const double value = 1.0;
     const auto ring = ringIn(memory, value, "x");
     EXPECT_EQ(ring->block(), nullptr);
+    ring->begin();
     ring->take();
-    ring->commit({3, 0, 0, 0}, false);
+    ring->commit(3, 0, 0, {});
     Frame frame;
     ASSERT_TRUE(ring->read(0, frame));
     EXPECT_EQ(frame.cycle().iteration, 3);
@@ -137,8 +140,9 @@ TEST(FrameMemory, ReturnsAClearedBlock) {
         Frame frame;
         ASSERT_FALSE(ring->read(0, frame)) << "the block has frames of an earlier ring";
         for (std::uint64_t cycle = 0; cycle < 40; ++cycle) {
+            ring->begin();
             ring->take();
-            ring->commit({cycle, 0, 0, 0}, false);
+            ring->commit(cycle, 0, 0, {});
         }
     }
 }

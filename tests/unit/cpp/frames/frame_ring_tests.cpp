@@ -12,8 +12,9 @@
 namespace rtcf::test {
 namespace {
 
-using executor::CycleRecord;
+using executor::CycleCounter;
 using executor::Frame;
+using executor::FrameKind;
 using executor::FrameRing;
 
 #ifdef RTCF_SANITIZED
@@ -22,10 +23,17 @@ constexpr std::uint64_t kFrames = 20'000;
 constexpr std::uint64_t kFrames = 200'000;
 #endif
 
+const CycleCounter kCounter;  // one tick takes 1 ns
+
+FrameRing ringOf(std::vector<FrameRing::Source> sources, std::size_t frames = 16) {
+    return {std::move(sources), 0, frames, kCounter};
+}
+
 void fill(FrameRing& ring, std::uint64_t iteration) {
+    ring.begin();
     ring.take();
     const auto number = static_cast<std::int64_t>(iteration);
-    ring.commit({iteration, 10 * number, -number, 3 * number}, false);
+    ring.commit(iteration, 10 * number, -number, {number, number, 4 * number});
 }
 
 template <typename T>
@@ -39,8 +47,8 @@ TEST(FrameRing, HasEachValueOfEachCycle) {
     double number = 0.0;
     bool flag = false;
     std::array<std::uint8_t, 11> bytes{};
-    FrameRing ring({{&number, sizeof number}, {&flag, sizeof flag}, {bytes.data(), bytes.size()}},
-                   16);
+    FrameRing ring =
+        ringOf({{&number, sizeof number}, {&flag, sizeof flag}, {bytes.data(), bytes.size()}});
     for (std::uint64_t i = 0; i < 10; ++i) {
         number = 0.5 * static_cast<double>(i);
         flag = i % 2 == 1;
@@ -70,7 +78,7 @@ TEST(FrameRing, HasValuesOfAllSizes) {
     std::vector<FrameRing::Source> sources;
     for (std::size_t size = 1; size <= kMost; ++size) values.emplace_back(size);
     for (const auto& value : values) sources.push_back({value.data(), value.size()});
-    FrameRing ring(sources, 16);
+    FrameRing ring = ringOf(sources);
     std::uint8_t next = 0;
     for (auto& value : values) {
         for (std::uint8_t& byte : value) byte = ++next;
@@ -93,7 +101,7 @@ TEST(FrameRing, HasValuesOfAllSizes) {
 
 TEST(FrameRing, KnowsWhichFramesAreOverwritten) {
     double number = 0.0;
-    FrameRing ring({{&number, sizeof number}}, 16);
+    FrameRing ring = ringOf({{&number, sizeof number}});
     ASSERT_EQ(ring.capacity(), 16);
     for (std::uint64_t i = 0; i < 40; ++i) fill(ring, i);
     Frame frame;
@@ -102,21 +110,57 @@ TEST(FrameRing, KnowsWhichFramesAreOverwritten) {
     EXPECT_EQ(frame.cycle().iteration, 24);
 }
 
-TEST(FrameRing, MarksTheLastCycleOfItsLoop) {
-    FrameRing ring({}, 16);
-    fill(ring, 0);
-    ring.take();
-    ring.commit({1, 0, 0, 0}, true);
+TEST(FrameRing, KnowsWhichCyclesCount) {
+    FrameRing ring = ringOf({});
+    for (const FrameKind kind : {FrameKind::WarmUp, FrameKind::Counted, FrameKind::LastOfLoop}) {
+        ring.begin();
+        ring.commit(0, 0, 0, {}, kind);
+    }
     Frame frame;
     ASSERT_TRUE(ring.read(0, frame));
+    EXPECT_FALSE(frame.counted());
     EXPECT_FALSE(frame.lastOfLoop());
     ASSERT_TRUE(ring.read(1, frame));
+    EXPECT_TRUE(frame.counted());
+    ASSERT_TRUE(ring.read(2, frame));
+    EXPECT_FALSE(frame.counted());
     EXPECT_TRUE(frame.lastOfLoop());
+}
+
+TEST(FrameRing, HasTheEndOfEachComponent) {
+    const double number = 2.5;
+    FrameRing ring({{&number, sizeof number}}, 3, 16, kCounter);
+    FrameRing::Word* const ended = ring.begin();
+    for (std::size_t i = 0; i < 3; ++i) ended[i] = 10 * (i + 1);
+    ring.take();
+    ring.commit(0, 0, 0, {1, 2, 40});
+    EXPECT_EQ(ring.lastTicks().ready, 2);
+    EXPECT_EQ(ring.lastEnded()[1], 20);
+    Frame frame;
+    for (const bool values : {true, false}) {
+        ASSERT_TRUE(values ? ring.read(0, frame) : ring.readTicks(0, frame));
+        EXPECT_EQ(frame.ticks().begin, 1);
+        EXPECT_EQ(frame.ticks().ready, 2);
+        EXPECT_EQ(frame.ticks().end, 40);
+        for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(frame.ended()[i], 10 * (i + 1));
+    }
+    ASSERT_TRUE(ring.read(0, frame));
+    EXPECT_EQ(valueAt<double>(frame, ring.offset(0)), 2.5);
+}
+
+TEST(FrameRing, AFrameThatHasBegunCannotBeRead) {
+    FrameRing ring = ringOf({});
+    for (std::uint64_t i = 0; i < ring.capacity(); ++i) fill(ring, i);
+    Frame frame;
+    ASSERT_TRUE(ring.read(0, frame));
+    ring.begin();
+    EXPECT_FALSE(ring.read(0, frame)) << "it is being overwritten";
+    EXPECT_TRUE(ring.read(1, frame));
 }
 
 TEST(FrameRing, IsBoundedInBytes) {
     const std::vector<std::uint8_t> large(std::size_t{64} * 1024);
-    const FrameRing ring({{large.data(), large.size()}}, 50'000);
+    const FrameRing ring = ringOf({{large.data(), large.size()}}, 50'000);
     EXPECT_LE(ring.capacity() * large.size(), FrameRing::kLargestRing);
     EXPECT_GE(ring.capacity(), FrameRing::kFewestFrames);
 }
@@ -124,7 +168,7 @@ TEST(FrameRing, IsBoundedInBytes) {
 // All words of a frame are equal; a torn frame would have two different ones.
 TEST(FrameRing, NoReaderSeesATornFrame) {
     std::array<std::uint64_t, 32> values{};
-    FrameRing ring({{values.data(), sizeof values}}, 16);
+    FrameRing ring = ringOf({{values.data(), sizeof values}});
     std::atomic<bool> done{false};
     std::thread writer([&] {
         for (std::uint64_t i = 0; i < kFrames; ++i) {

@@ -46,9 +46,13 @@ class LoopAlone : public ::testing::Test {
         worker_->attach(context_);
         schedule_.steps.push_back({worker_.get(), &context_, &component_, context_.recorder_slot});
         schedule_.findStretches();
+        if (frames_ == nullptr) {
+            frames_ = std::make_unique<FrameRing>(std::vector<FrameRing::Source>{}, 1, 16,
+                                                  loop_.counter());
+        }
         Adoption adoption;
         adoption.schedule = &schedule_;
-        adoption.frames = frames_;
+        adoption.frames = frames_.get();
         ASSERT_TRUE(loop_.adopt(adoption, kSecond));
         loop_.start(settings_, loop_.stops());
     }
@@ -77,7 +81,7 @@ class LoopAlone : public ::testing::Test {
     ComponentContext context_;
     ComponentStatistics component_;
     Schedule schedule_;
-    FrameRing* frames_ = nullptr;
+    std::unique_ptr<FrameRing> frames_;
     std::unique_ptr<Worker> worker_;
 };
 
@@ -94,7 +98,7 @@ TEST_P(LoopSuspended, ASuspendNeitherStopsNorStallsTheLoop) {
         if (iteration == kAt) counter.shift(ticks);
     });
     ASSERT_TRUE(reaches(kAt + 100));
-    EXPECT_LT(loop_.statistics().missed.load(), static_cast<std::uint64_t>(kSlept) * 1000)
+    EXPECT_LT(loop_.statistics().missed.value(), static_cast<std::uint64_t>(kSlept) * 1000)
         << "cycles missed during the suspend";
     stop();
 }
@@ -109,7 +113,7 @@ TEST_F(LoopAlone, FullBucketEndsTheLoop) {
     });
     ASSERT_TRUE(eventually([this] { return loop_.join(0); }));
     EXPECT_EQ(loop_.fault().kind, LoopFault::Kind::Overruns);
-    EXPECT_EQ(loop_.statistics().overruns.load(), 4U);
+    EXPECT_EQ(loop_.statistics().overruns.value(), 4U);
 }
 
 TEST_F(LoopAlone, BucketOfNoSizeIsNeverFull) {
@@ -124,8 +128,8 @@ TEST_F(LoopAlone, BucketOfNoSizeIsNeverFull) {
 // Copies of frames that exceed the cycle.
 TEST_F(LoopAlone, FramesAreASeparateCauseOfOverruns) {
     std::vector<std::uint8_t> large(4 * 1024 * 1024);
-    FrameRing ring({{large.data(), large.size()}}, 16);
-    frames_ = &ring;
+    frames_ = std::make_unique<FrameRing>(
+        std::vector<FrameRing::Source>{{large.data(), large.size()}}, 1, 16, loop_.counter());
     settings_.period_ns = 50'000;
     start([](std::uint64_t) {});
     ASSERT_TRUE(reaches(60));
@@ -134,8 +138,8 @@ TEST_F(LoopAlone, FramesAreASeparateCauseOfOverruns) {
     EXPECT_GE(statistics.frame_overruns.value(), 20U);
     // A cycle delayed elsewhere has another cause.
     EXPECT_EQ(statistics.frame_overruns.value() + statistics.exchange_overruns.value() +
-                  statistics.late_wake_ups.value() + component_.overruns.load(),
-              statistics.overruns.load());
+                  statistics.late_wake_ups.value() + component_.overruns.value(),
+              statistics.overruns.value());
 }
 
 }  // namespace

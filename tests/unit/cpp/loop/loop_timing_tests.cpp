@@ -28,8 +28,8 @@ class LoopTiming : public RunnerFixture {
         stop();
     }
 
-    std::uint64_t overruns() { return runner().loop().statistics().overruns.load(); }
-    std::uint64_t missed() { return runner().loop().statistics().missed.load(); }
+    std::uint64_t overruns() { return runner().loop().statistics().overruns.value(); }
+    std::uint64_t missed() { return runner().loop().statistics().missed.value(); }
     std::vector<std::string> linesOnOverruns() const {
         std::vector<std::string> lines;
         for (const RunnerEvent& event : events()) {
@@ -79,7 +79,7 @@ TEST_F(LoopTiming, RelativeRestartsThePeriod) {
 TEST_F(LoopTiming, OverrunIsCountedForTheComponentThatWasRunning) {
     load(definition("Ticker", "A"));
     overrun(OverrunPolicy::Skip);
-    EXPECT_GE(runner().graph()->get("/S").statistics->overruns.load(), 1U);
+    EXPECT_GE(runner().graph()->get("/S").statistics->overruns.value(), 1U);
 }
 
 TEST_F(LoopTiming, AChangesDurationIsNoComponentsOverrun) {
@@ -113,7 +113,7 @@ TEST_F(LoopTiming, LateWakeUpIsASeparateCause) {
         return runs(2) && late() > 0;
     }));
     stop();  // statistics that no longer change
-    EXPECT_LE(late() + runner().graph()->get("/A").statistics->overruns.load(), overruns());
+    EXPECT_LE(late() + runner().graph()->get("/A").statistics->overruns.value(), overruns());
 }
 
 // Without full real-time rights a loop is not blamed for being late.
@@ -173,9 +173,8 @@ TEST_F(LoopTiming, EveryCycleIsInTheStatistics) {
     start();
     ASSERT_TRUE(runs(100));
     stop();
-    const executor::LoopStatistics& statistics = runner().loop().statistics();
-    EXPECT_EQ(statistics.duration.snapshot().count, iteration());
-    EXPECT_EQ(statistics.latency.snapshot().count, iteration());
+    EXPECT_EQ(durations().duration().snapshot().count, iteration());
+    EXPECT_EQ(durations().latency().snapshot().count, iteration());
     EXPECT_EQ(runner().graph()->get("/A").statistics->duration.snapshot().count, iteration());
 }
 
@@ -185,7 +184,7 @@ TEST_F(LoopTiming, WarmUpIsNotInTheStatistics) {
     start();
     ASSERT_TRUE(runs(100));
     stop();
-    EXPECT_EQ(runner().loop().statistics().duration.snapshot().count, iteration() - 10);
+    EXPECT_EQ(durations().duration().snapshot().count, iteration() - 10);
     EXPECT_EQ(runner().graph()->get("/A").statistics->duration.snapshot().count, iteration() - 10);
 }
 

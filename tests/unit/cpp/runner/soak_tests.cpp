@@ -131,7 +131,7 @@ class Soak : public RunnerFixture {
                 const auto graph = runner().graph();
                 for (const auto& component : graph->components)
                     (void)component->statistics->duration.snapshot();
-                (void)runner().loop().statistics().duration.snapshot();
+                (void)durations().duration().snapshot();
                 (void)runner().status();
                 (void)runner().recorder().graphActivity();
                 std::this_thread::yield();

@@ -107,6 +107,42 @@ TEST(Histogram, ASnapshotStoresNoEmptyBuckets) {
     EXPECT_EQ(summarize(since, 1.0).max, 100.0);
 }
 
+TEST(Histogram, ClearedHasLaterValuesOnly) {
+    Histogram histogram;
+    histogram.add(1'000'000);
+    const HistogramSnapshot before = histogram.snapshot();
+    histogram.clear();
+    EXPECT_EQ(histogram.snapshot().count, 0U);
+    histogram.add(40);
+    const HistogramSnapshot after = histogram.snapshot();
+    EXPECT_EQ(after.count, 1U);
+    EXPECT_EQ(after.maximum, 40);
+    EXPECT_EQ(difference(after, before).count, 1U) << "of the values since it was cleared";
+    EXPECT_EQ(difference(after, before).sum, 40);
+}
+
+TEST(Histogram, CountsTheSameWithMemoryForAllValues) {
+    std::mt19937_64 random(2);
+    std::lognormal_distribution<double> durations(9.0, 3.0);
+    Histogram sparse;
+    Histogram full;
+    full.allocate();
+    for (int i = 0; i < 1000; ++i) {
+        const std::int64_t value = std::llround(durations(random));
+        sparse.add(value);
+        full.add(value);
+    }
+    const HistogramSnapshot some = sparse.snapshot();
+    const HistogramSnapshot all = full.snapshot();
+    ASSERT_EQ(some.buckets.size(), all.buckets.size());
+    for (std::size_t i = 0; i < some.buckets.size(); ++i) {
+        EXPECT_EQ(some.buckets[i].number, all.buckets[i].number);
+        EXPECT_EQ(some.buckets[i].count, all.buckets[i].count);
+    }
+    EXPECT_EQ(some.sum, all.sum);
+    EXPECT_EQ(some.maximum, all.maximum);
+}
+
 TEST(Histogram, ScalesItsResults) {
     Histogram histogram;
     histogram.add(40);

@@ -100,6 +100,11 @@ class RunnerFixture : public ::testing::Test {
 
     /// Newest value of a port with a std_msgs number. @return NaN without a value
     double value(const std::string& component, const std::string& port);
+    /// Durations of the loop's cycles so far.
+    const executor::CycleStatistics& durations() {
+        runner_->cycleStatistics().count();
+        return runner_->cycleStatistics();
+    }
     std::uint64_t iteration() const { return runner_->loop().statistics().iteration.load(); }
     /// Waits until the loop has run `cycles` more. @return false at the deadline
     bool runs(std::uint64_t cycles = 20);
