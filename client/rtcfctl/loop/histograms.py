@@ -37,13 +37,13 @@ class Bin:
     count: int
 
 
-def bins(buckets: Sequence[runner_pb2.Bucket], most: int, most_filled: int) -> list[Bin]:
-    """Return adjacent bins of equal width on a logarithmic axis: at most `most`, of which at most
-    `most_filled` are not empty."""
+def bins(buckets: Sequence[runner_pb2.Bucket], most: int, most_lines: int) -> list[Bin]:
+    """Return adjacent bins of equal width on a logarithmic axis: at most `most`, which take at most
+    `most_lines` in a terminal, where long gaps are folded."""
     uppers = [max(each.upper_ns, _LEAST_NS) for each in buckets]
     for of_decade in _BINS_OF_DECADE:
         numbers = [math.ceil(of_decade * math.log10(each) - 1e-6) for each in uppers]
-        if numbers[-1] - numbers[0] < most and len(set(numbers)) <= most_filled:
+        if numbers[-1] - numbers[0] < most and _number_of_lines(numbers) <= most_lines:
             break
     counts = dict.fromkeys(range(numbers[0], numbers[-1] + 1), 0)
     for number, bucket in zip(numbers, buckets, strict=True):
@@ -52,6 +52,13 @@ def bins(buckets: Sequence[runner_pb2.Bucket], most: int, most_filled: int) -> l
         Bin(10 ** ((number - 1) / of_decade), 10 ** (number / of_decade), count)
         for number, count in counts.items()
     ]
+
+
+def _number_of_lines(numbers: Sequence[int]) -> int:
+    """Return how many lines the bins of these numbers take, with the gaps between them."""
+    filled = sorted(set(numbers))
+    gaps = (after - before - 1 for before, after in itertools.pairwise(filled))
+    return len(filled) + sum(1 if gap >= _FEWEST_FOLDED else gap for gap in gaps)
 
 
 def require_cycles(found: runner_pb2.RunnerStatistics) -> None:

@@ -21,15 +21,25 @@
 
 namespace rtcf::executor {
 
+/// Kinds of cycles. Numbers as in executor.proto.
+enum class FrameKind : std::uint64_t { Counted = 0, LastOfLoop = 1, WarmUp = 2 };
+
+/// What is known at the begin of a cycle.
+struct FrameHead {
+    std::uint64_t iteration;
+    std::int64_t stamp_ns;
+    std::int64_t latency_ns;
+    std::int64_t begin_ticks;  ///< the end of the wait
+    std::int64_t ready_ticks;  ///< the begin of the first component
+    FrameKind kind = FrameKind::Counted;
+};
+
 /// Times of a cycle, ticks of the cycle counter. All 0 in the last frame of a loop.
 struct CycleTicks {
     std::int64_t begin;  ///< the end of the wait
     std::int64_t ready;  ///< the begin of the first component, after the exchange of values
     std::int64_t end;
 };
-
-/// Numbers as in executor.proto.
-enum class FrameKind : std::uint64_t { Counted = 0, LastOfLoop = 1, WarmUp = 2 };
 
 /// A reader's copy of one frame.
 class Frame {
@@ -78,9 +88,15 @@ class FrameRing {
     /// @{
     /// Begins the next frame. Readers cannot read it before commit().
     /// @return the words for the end of each component's update(), ticks; 0 = did not run
-    Word* begin() noexcept RTCF_NONBLOCKING {
+    [[gnu::always_inline]] Word* begin(const FrameHead& head) noexcept RTCF_NONBLOCKING {
         Word* const frame = writing_;
         frame[kMark].store(2 * end_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
+        put(frame[kIteration], head.iteration);
+        put(frame[kStamp], head.stamp_ns);
+        put(frame[kLatency], head.latency_ns);
+        put(frame[kKind], head.kind);
+        put(frame[kBegin], head.begin_ticks);
+        put(frame[kReady], head.ready_ticks);
         return frame + kHeadWords;
     }
     /// The words of begin() until commit().
@@ -96,23 +112,13 @@ class FrameRing {
     /// not a source.
     /// @param value address of the source's value
     void putBack(void* value) const noexcept RTCF_NONBLOCKING;
-    /// Adds the cycle's times and makes the frame readable.
-    void commit(std::uint64_t iteration, std::int64_t stamp_ns, std::int64_t latency_ns,
-                const CycleTicks& ticks, FrameKind kind = FrameKind::Counted) noexcept
-        RTCF_NONBLOCKING {
-        const auto put = [frame = writing_](Head place, auto value) {
-            frame[place].store(static_cast<std::uint64_t>(value), std::memory_order_release);
-        };
-        put(kIteration, iteration);
-        put(kStamp, stamp_ns);
-        put(kLatency, latency_ns);
-        put(kKind, kind);
-        put(kBegin, ticks.begin);
-        put(kReady, ticks.ready);
-        put(kEnd, ticks.end);
+    /// Adds the end of the cycle and makes the frame readable.
+    [[gnu::always_inline]] void commit(std::int64_t end_ticks) noexcept RTCF_NONBLOCKING {
+        Word* const frame = writing_;
         const std::uint64_t next = end_.load(std::memory_order_relaxed) + 1;
-        put(kMark, 2 * next);
-        writing_ = (next & mask_) != 0 ? writing_ + stride_ : words_;
+        put(frame[kEnd], end_ticks);
+        put(frame[kMark], 2 * next);
+        writing_ = (next & mask_) != 0 ? frame + stride_ : words_;
         end_.store(next, std::memory_order_release);
         fence(std::memory_order_release);
     }
@@ -192,6 +198,10 @@ class FrameRing {
         kHeadWords
     };
 
+    template <typename T>
+    static void put(Word& word, T value) noexcept RTCF_NONBLOCKING {
+        word.store(static_cast<std::uint64_t>(value), std::memory_order_release);
+    }
     static void fence(std::memory_order order) noexcept RTCF_NONBLOCKING {
 #if defined(__SANITIZE_THREAD__)
         // ThreadSanitizer with gcc supports no other fence; x86 needs none

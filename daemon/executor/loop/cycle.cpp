@@ -88,88 +88,6 @@ void Cycle::moveTime(std::int64_t by_ns) {
     for (Tap* tap : schedule_->taps) tap->moveTime(by_ns);
 }
 
-bool Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NONBLOCKING {
-    const std::int64_t begin = readCycleCounter();
-    if (special_ != 0 || boundary_.waiting()) return runSpecial(begin, time_ns, latency_ns);
-    setTimes(time_ns);
-    notes_.setIteration(clock_.iteration);
-    const std::vector<Step>& steps = schedule_->steps;
-    update<true>(steps.data(), steps.data() + steps.size(), frames_->begin());
-    notes_.leaveComponents();
-    finish(begin, begin, latency_ns, FrameKind::Counted);
-    return true;
-}
-
-[[gnu::noinline]] bool Cycle::runSpecial(std::int64_t begin_ticks, std::int64_t time_ns,
-                                         std::int64_t latency_ns) noexcept {
-    std::int64_t ready = begin_ticks;
-    if ((special_ & kExchange) != 0 || boundary_.waiting()) {
-        if (!exchange(time_ns)) return false;  // the inputs' values are undefined
-        ready = readCycleCounter();  // the exchange is not part of any component's duration
-    }
-    setTimes(time_ns);
-    notes_.setIteration(clock_.iteration);
-    if ((special_ & kSelective) != 0) total_elapsed_ns_ += clock_.elapsed_ns;
-    const bool completed = updateAll();
-    notes_.leaveComponents();
-    if ((special_ & kExchange) != 0 && completed) {
-        for (QueueBase* queue : schedule_->queues) queue->receive();
-        for (Tap* tap : schedule_->taps) tap->push(clock_.stamp_ns);
-        given_ticks_ = readCycleCounter();
-    }
-    finish(begin_ticks, ready, latency_ns, counted_ ? FrameKind::Counted : FrameKind::WarmUp);
-    if ((special_ & (kWarmUp | kWaiting)) != 0) noteSpecial();
-    return true;
-}
-
-// Runs the work before the components: a change at the boundary, values from outside, and values of
-// the previous cycle.
-// @return false if a fault ended the loop
-bool Cycle::exchange(std::int64_t time_ns) noexcept {
-    if (boundary_.waiting()) {
-        // The elapsed time of this cycle is measured in the period before the change.
-        const std::int64_t elapsed = clock_.elapsed_ns;
-        atBoundary(time_ns);
-        clock_.elapsed_ns = elapsed;
-        if (faulted()) return false;
-    }
-    setTimes(time_ns);
-    feed();
-    return copyLatches();
-}
-
-// Runs all components. Those that use no special feature take the short way.
-// @return false if a fault ended the loop
-bool Cycle::updateAll() noexcept {
-    counted_ = clock_.iteration >= warmup_cycles_;
-    next_waiting_ = 0;
-    FrameRing::Word* const ended = frames_->begin();
-    const Step* const first = schedule_->steps.data();
-    if (!counted_ || !waiting_.empty()) {
-        const bool completed = updateSelected(first, first + schedule_->steps.size(), ended);
-        dropConnected();
-        return completed;
-    }
-    for (const auto& [begin, end, plain] : schedule_->stretches) {
-        FrameRing::Word* const at = ended + (begin - first);
-        if (!(plain ? update<true>(begin, end, at) : updateSelected(begin, end, at))) return false;
-    }
-    return true;
-}
-
-// Completes the frame, and with it the cycle.
-[[gnu::always_inline]] inline void Cycle::finish(std::int64_t begin_ticks, std::int64_t ready_ticks,
-                                                 std::int64_t latency_ns, FrameKind kind) noexcept
-    RTCF_NONBLOCKING {
-    FrameRing& frames = *frames_;
-    frames.take();
-    const std::uint64_t iteration = clock_.iteration;
-    frames.commit(iteration, clock_.stamp_ns, latency_ns,
-                  {begin_ticks, ready_ticks, readCycleCounter()}, kind);
-    clock_.iteration = iteration + 1;
-    statistics_.iteration.store(iteration + 1, std::memory_order_relaxed);
-}
-
 // The only place that catches exceptions of components. `Plain` leaves out features that most
 // components do not use, so that they cost those nothing.
 // @param ended frame's words for the ends of these steps
@@ -194,14 +112,15 @@ template <bool Plain>
                     }
                 }
                 notes.enterComponent(next->slot);
-                next->component->setTime(time);
+                Component& component = *next->component;
+                component.setTime(time);
                 if (Plain) {
-                    next->component->update();
+                    component.update();
                 } else {
                     const DeviceLoan loan(*next->context, counted_ ? nullptr : &uncounted_);
-                    next->component->update();
+                    component.update();
+                    commit(component, *next->statistics, OnBadOutput::End);
                 }
-                if (!Plain) commit(*next->component, *next->statistics, OnBadOutput::End);
                 note(*ended, readCycleCounter());
             }
             return true;
@@ -218,6 +137,95 @@ template <bool Plain>
         ++next;
         ++ended;
     }
+}
+
+// Completes the frame, and with it the cycle.
+[[gnu::always_inline]] inline void Cycle::finish() noexcept RTCF_NONBLOCKING {
+    FrameRing& frames = *frames_;
+    frames.take();
+    frames.commit(readCycleCounter());
+    const std::uint64_t next = clock_.iteration + 1;
+    clock_.iteration = next;
+    statistics_.iteration.store(next, std::memory_order_relaxed);
+}
+
+bool Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NONBLOCKING {
+    const std::int64_t begin = readCycleCounter();
+    if (special_ != 0 || boundary_.waiting()) return runSpecial(begin, time_ns, latency_ns);
+    setTimes(time_ns);
+    notes_.setIteration(clock_.iteration);
+    FrameRing::Word* const ended =
+        frames_->begin({clock_.iteration, clock_.stamp_ns, latency_ns, begin, begin});
+    const std::vector<Step>& steps = schedule_->steps;
+    update<true>(steps.data(), steps.data() + steps.size(), ended);
+    notes_.leaveComponents();
+    finish();
+    return true;
+}
+
+// A cycle with any special feature.
+[[gnu::noinline]] bool Cycle::runSpecial(std::int64_t begin_ticks, std::int64_t time_ns,
+                                         std::int64_t latency_ns) noexcept {
+    std::int64_t ready = begin_ticks;
+    if ((special_ & kExchange) != 0 || boundary_.waiting()) {
+        if (!exchange(time_ns)) return false;  // the inputs' values are undefined
+        ready = readCycleCounter();  // the exchange is not part of any component's duration
+    }
+    setTimes(time_ns);
+    notes_.setIteration(clock_.iteration);
+    counted_ = (special_ & kWarmUp) == 0;
+    FrameRing::Word* const ended =
+        frames_->begin({clock_.iteration, clock_.stamp_ns, latency_ns, begin_ticks, ready,
+                        counted_ ? FrameKind::Counted : FrameKind::WarmUp});
+    const std::vector<Step>& steps = schedule_->steps;
+    const bool completed = (special_ & ~kExchange) != 0
+                               ? updateSelective(ended)
+                               : update<true>(steps.data(), steps.data() + steps.size(), ended);
+    notes_.leaveComponents();
+    if ((special_ & kExchange) != 0 && completed) {
+        for (QueueBase* queue : schedule_->queues) queue->receive();
+        for (Tap* tap : schedule_->taps) tap->push(clock_.stamp_ns);
+        given_ticks_ = readCycleCounter();
+    }
+    finish();
+    if ((special_ & (kWarmUp | kWaiting)) != 0) noteSpecial();
+    return true;
+}
+
+// Runs the work before the components: a change at the boundary, values from outside, and values of
+// the previous cycle.
+// @return false if a fault ended the loop
+bool Cycle::exchange(std::int64_t time_ns) noexcept {
+    if (boundary_.waiting()) {
+        // The elapsed time of this cycle is measured in the period before the change.
+        const std::int64_t elapsed = clock_.elapsed_ns;
+        atBoundary(time_ns);
+        clock_.elapsed_ns = elapsed;
+        if (faulted()) return false;
+    }
+    setTimes(time_ns);
+    feed();
+    return copyLatches();
+}
+
+// Runs steps of which some are not plain, or none is, because statistics of devices do not count
+// yet, or inputs wait for their writers.
+// @param ended frame's words for the ends of the steps
+// @return false if a fault ended the loop
+[[gnu::noinline]] bool Cycle::updateSelective(FrameRing::Word* ended) noexcept {
+    next_waiting_ = 0;
+    if ((special_ & kSelective) != 0) total_elapsed_ns_ += clock_.elapsed_ns;
+    const Step* const first = schedule_->steps.data();
+    if ((special_ & (kWarmUp | kWaiting)) != 0) {
+        const bool completed = updateSelected(first, first + schedule_->steps.size(), ended);
+        dropConnected();
+        return completed;
+    }
+    for (const auto& [begin, end, plain] : schedule_->stretches) {
+        FrameRing::Word* const at = ended + (begin - first);
+        if (!(plain ? update<true>(begin, end, at) : updateSelected(begin, end, at))) return false;
+    }
+    return true;
 }
 
 // Runs steps that are not plain. A separate function, as it needs registers that plain steps do
@@ -410,9 +418,10 @@ void Cycle::makeSafe(std::int64_t time_ns) noexcept {
     }
     dropConnected();
     for (Tap* tap : schedule_->taps) tap->push(clock_.stamp_ns);
-    leaveOut(schedule_->steps.data(), frames_->begin());
+    leaveOut(schedule_->steps.data(),
+             frames_->begin({clock_.iteration, clock_.stamp_ns, 0, 0, 0, FrameKind::LastOfLoop}));
     frames_->take();
-    frames_->commit(clock_.iteration, clock_.stamp_ns, 0, {}, FrameKind::LastOfLoop);
+    frames_->commit(0);
     settle();
 }
 

@@ -119,9 +119,8 @@ class Cycle {
     bool runSpecial(std::int64_t begin_ticks, std::int64_t time_ns,
                     std::int64_t latency_ns) noexcept;
     bool exchange(std::int64_t time_ns) noexcept;
-    bool updateAll() noexcept;
-    void finish(std::int64_t begin_ticks, std::int64_t ready_ticks, std::int64_t latency_ns,
-                FrameKind kind) noexcept RTCF_NONBLOCKING;
+    bool updateSelective(FrameRing::Word* ended) noexcept;
+    void finish() noexcept RTCF_NONBLOCKING;
     template <bool Plain>
     bool update(const Step* next, const Step* end, FrameRing::Word* ended) noexcept;
     bool updateSelected(const Step* next, const Step* end, FrameRing::Word* ended) noexcept;

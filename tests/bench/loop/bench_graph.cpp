@@ -83,27 +83,17 @@ void BenchGraph::adopt(const executor::Graph& graph) {
         executor::wire(graph, {executor::NamePattern("bench", mapped_), {}}, {});
     executor::Adoption adoption;
     auto plan = executor::buildPlan(graph, std::move(wiring), *plan_, kFrequencyHz, adoption);
-    adopt(adoption, *plan);
+    auto frames = executor::makeFrameTable(
+        *plan, {{}, kFrequencyHz, 0, loop_.counter(), &frame_memory_, frames_.get()});
+    adoption.frames = frames->ring.get();
+    loop_.adopt(adoption, kAdoptionTimeoutNs);
+    statistics_.follow({frames->ring, frames->components});
+    cycles_.follow({frames->ring, frames->components});
+    frames_ = std::move(frames);
     plan->noteHeld(adoption, *plan_);
     std::swap(plan_, plan);
     order_.clear();
     for (const executor::Step& step : plan_->schedule.steps) order_.push_back(step.component);
-}
-
-void BenchGraph::adopt(executor::Adoption& adoption, const executor::Plan& plan) {
-    const auto frames = executor::makeFrameTable(
-        plan, {{}, kFrequencyHz, frame_bytes_, loop_.counter(), &frame_memory_, frames_.get()});
-    adoption.frames = frames->ring.get();
-    loop_.adopt(adoption, kAdoptionTimeoutNs);
-    frames_ = frames;
-    statistics_.follow({frames->ring, frames->components});
-    cycles_.follow({frames->ring, frames->components});
-}
-
-void BenchGraph::keepFrames() {
-    frame_bytes_ = executor::kLargestFrame;
-    executor::Adoption adoption;
-    adopt(adoption, *plan_);
 }
 
 bool BenchGraph::nextCycle(executor::CycleRecord& cycle) {

@@ -58,20 +58,15 @@ class BenchGraph {
     /// Creates a component outside the graph. @param remaps of its ports
     std::shared_ptr<executor::Instance> make(const std::string& type, const std::string& name,
                                              executor::Remaps remaps = {}, bool first = false);
-    /// Records the values of all outputs and states in each cycle.
-    void keepFrames();
     /// Replaces the graph that the loop runs.
     void adopt(const executor::Graph& graph);
     /// The components in order of execution.
     const std::vector<Component*>& order() const noexcept { return order_; }
 
    private:
-    void adopt(executor::Adoption& adoption, const executor::Plan& plan);
-
     executor::Log log_;
     executor::FlightRecorder recorder_;
     executor::FrameMemory frame_memory_;
-    std::size_t frame_bytes_ = 0;
     std::shared_ptr<const executor::FrameTable> frames_;
     executor::Loop loop_;
     executor::CycleStatistics statistics_{loop_.statistics()};

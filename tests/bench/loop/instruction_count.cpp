@@ -3,7 +3,7 @@
 // instructions so far. The loop's statistics, its calculation duration and that of each
 // component, are then instruction counts, exact and reproducible. `whole` is a full step,
 // including the pacing. Prints JSON. x86-64 only.
-// Usage: instruction_count LIBRARY fig1|frames|mapped|CHAIN [CYCLES]
+// Usage: instruction_count LIBRARY fig1|mapped|CHAIN [CYCLES]
 #include <fmt/format.h>
 #include <sys/ptrace.h>
 #include <sys/user.h>
@@ -28,10 +28,9 @@ constexpr std::uint64_t kWarmUp = 10;  // cycles
 // The child: stops itself before and after the counted part.
 int runCounted(const std::string& library, const std::string& which, std::uint64_t cycles) {
     using namespace rtcf;
-    const bool paper = which == "fig1" || which == "frames" || which == "mapped";
+    const bool paper = which == "fig1" || which == "mapped";
     bench::BenchGraph graph(paper ? bench::paperGraph() : bench::chain(std::stoul(which)), library,
                             which == "mapped" ? kTopics : "");
-    if (which == "frames") graph.keepFrames();
     executor::LoopSettings settings;
     settings.warmup_cycles = kWarmUp;
     graph.loop().beginStepping(settings, graph.loop().stops());
@@ -107,7 +106,7 @@ bool count(pid_t child) {
 
 int main(int argc, char** argv) try {
     if (argc < 3 || argc > 4) {
-        std::fputs("usage: instruction_count LIBRARY fig1|frames|mapped|LENGTH [CYCLES]\n", stderr);
+        std::fputs("usage: instruction_count LIBRARY fig1|mapped|LENGTH [CYCLES]\n", stderr);
         return 2;
     }
     const std::uint64_t cycles = argc == 4 ? std::stoull(argv[3]) : 50;

@@ -44,9 +44,9 @@ TEST(FrameMemory, HasFramesAtTheOffsetsInItsFile) {
     FrameMemory memory;
     double value = 2.5;
     const auto ring = ringIn(memory, value, "layout");
-    ring->begin();
+    ring->begin({7, 0, 0, 0, 0});
     ring->take();
-    ring->commit(7, 0, 0, {});
+    ring->commit(0);
     const std::vector<Entry> entries = entriesOf(memory);
     ASSERT_EQ(entries.size(), 1);
     const auto [sequence, offset, frames, words, layout_offset, layout_bytes] = entries[0];
@@ -124,9 +124,9 @@ TEST(FrameMemory, UsesProcessMemoryForARingWithoutRoom) {
     const double value = 1.0;
     const auto ring = ringIn(memory, value, "x");
     EXPECT_EQ(ring->block(), nullptr);
-    ring->begin();
+    ring->begin({3, 0, 0, 0, 0});
     ring->take();
-    ring->commit(3, 0, 0, {});
+    ring->commit(0);
     Frame frame;
     ASSERT_TRUE(ring->read(0, frame));
     EXPECT_EQ(frame.cycle().iteration, 3);
@@ -140,9 +140,9 @@ TEST(FrameMemory, ReturnsAClearedBlock) {
         Frame frame;
         ASSERT_FALSE(ring->read(0, frame)) << "the block has frames of an earlier ring";
         for (std::uint64_t cycle = 0; cycle < 40; ++cycle) {
-            ring->begin();
+            ring->begin({cycle, 0, 0, 0, 0});
             ring->take();
-            ring->commit(cycle, 0, 0, {});
+            ring->commit(0);
         }
     }
 }

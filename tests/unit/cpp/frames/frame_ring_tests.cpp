@@ -30,10 +30,10 @@ FrameRing ringOf(std::vector<FrameRing::Source> sources, std::size_t frames = 16
 }
 
 void fill(FrameRing& ring, std::uint64_t iteration) {
-    ring.begin();
-    ring.take();
     const auto number = static_cast<std::int64_t>(iteration);
-    ring.commit(iteration, 10 * number, -number, {number, number, 4 * number});
+    ring.begin({iteration, 10 * number, -number, number, number});
+    ring.take();
+    ring.commit(4 * number);
 }
 
 template <typename T>
@@ -113,8 +113,8 @@ TEST(FrameRing, KnowsWhichFramesAreOverwritten) {
 TEST(FrameRing, KnowsWhichCyclesCount) {
     FrameRing ring = ringOf({});
     for (const FrameKind kind : {FrameKind::WarmUp, FrameKind::Counted, FrameKind::LastOfLoop}) {
-        ring.begin();
-        ring.commit(0, 0, 0, {}, kind);
+        ring.begin({0, 0, 0, 0, 0, kind});
+        ring.commit(0);
     }
     Frame frame;
     ASSERT_TRUE(ring.read(0, frame));
@@ -130,10 +130,10 @@ TEST(FrameRing, KnowsWhichCyclesCount) {
 TEST(FrameRing, HasTheEndOfEachComponent) {
     const double number = 2.5;
     FrameRing ring({{&number, sizeof number}}, 3, 16, kCounter);
-    FrameRing::Word* const ended = ring.begin();
+    FrameRing::Word* const ended = ring.begin({0, 0, 0, 1, 2});
     for (std::size_t i = 0; i < 3; ++i) ended[i] = 10 * (i + 1);
     ring.take();
-    ring.commit(0, 0, 0, {1, 2, 40});
+    ring.commit(40);
     EXPECT_EQ(ring.lastTicks().ready, 2);
     EXPECT_EQ(ring.lastEnded()[1], 20);
     Frame frame;
@@ -153,7 +153,7 @@ TEST(FrameRing, AFrameThatHasBegunCannotBeRead) {
     for (std::uint64_t i = 0; i < ring.capacity(); ++i) fill(ring, i);
     Frame frame;
     ASSERT_TRUE(ring.read(0, frame));
-    ring.begin();
+    ring.begin({ring.capacity(), 0, 0, 0, 0});
     EXPECT_FALSE(ring.read(0, frame)) << "it is being overwritten";
     EXPECT_TRUE(ring.read(1, frame));
 }

@@ -30,13 +30,13 @@ CycleFrames framesOf(std::size_t components, std::size_t capacity = 16) {
 
 // A cycle whose components take 10, 20, 30 … ticks.
 void fill(const CycleFrames& frames, std::uint64_t iteration, FrameKind kind = FrameKind::Counted) {
-    FrameRing::Word* const ended = frames.ring->begin();
+    FrameRing::Word* const ended = frames.ring->begin({iteration, 0, 7, 1000, 1005, kind});
     std::int64_t now = 1005;
     for (std::size_t i = 0; i < frames.components.size(); ++i) {
         now += static_cast<std::int64_t>(10 * (i + 1));
         ended[i] = static_cast<std::uint64_t>(now);
     }
-    frames.ring->commit(iteration, 0, 7, {1000, 1005, now + 2}, kind);
+    frames.ring->commit(now + 2);
 }
 
 std::vector<std::uint64_t> allOf(CycleReader& reader) {
@@ -133,11 +133,11 @@ TEST(CycleStatistics, LeaveOutAComponentThatDidNotRun) {
     CycleStatistics statistics(loop);
     const CycleFrames frames = framesOf(3);
     statistics.follow(frames);
-    FrameRing::Word* const ended = frames.ring->begin();
+    FrameRing::Word* const ended = frames.ring->begin({0, 0, 0, 0, 5});
     ended[0] = 15;
     ended[1] = 0;
     ended[2] = 22;
-    frames.ring->commit(0, 0, 0, {0, 5, 30});
+    frames.ring->commit(30);
     statistics.count();
     EXPECT_EQ(frames.components[0]->duration.snapshot().sum, 10);
     EXPECT_EQ(frames.components[1]->duration.snapshot().count, 0U);

@@ -217,7 +217,7 @@ def _memory(rings: int, frames: int) -> int:
         frame_memory.ENTRY.pack_into(memory, frame_memory.entry_at(ring), *entry)
         for number in range(frames):
             at = offset + number * words * frame_memory.WORD.size
-            struct.pack_into("<6Q", memory, at, 2 * number + 2, number, 0, 0, 0, 0)
+            struct.pack_into("<2Q", memory, at, 2 * number + 2, number)
     return _frames(bytes(memory))
 
 
@@ -235,7 +235,8 @@ def test_frames_overwritten_during_the_copy_are_left_out(monkeypatch: pytest.Mon
         os.pwrite(live, struct.pack("<Q", 3), frame_memory.entry_at(0))
         assert first[0] == 1
         for place, mark in ((0, 2 * 8 + 2), (1, 2 * 9 + 1)):
-            os.pwrite(live, struct.pack("<Q", mark), second[1] + place * 48)
+            at = second[1] + place * frame_memory.HEAD_WORDS * frame_memory.WORD.size
+            os.pwrite(live, struct.pack("<Q", mark), at)
 
     monkeypatch.setattr(frame_memory, "_copy", copy_and_write_on)
     copy = frame_memory.copied(live)
