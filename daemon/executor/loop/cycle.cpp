@@ -422,6 +422,7 @@ void Cycle::makeSafe(std::int64_t time_ns) noexcept {
              frames_->begin({clock_.iteration, clock_.stamp_ns, 0, 0, 0, FrameKind::LastOfLoop}));
     frames_->take();
     frames_->commit(0);
+    ++scheduled_end_;  // no component has run update()
     settle();
 }
 

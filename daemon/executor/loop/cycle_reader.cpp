@@ -5,7 +5,8 @@ namespace rtcf::executor {
 void CycleReader::follow(const CycleFrames& frames) {
     if (!rings_.empty() && rings_.back().ring == frames.ring) return;
     rings_.push_back(frames);
-    if (rings_.size() > kMostRings) leaveRing();
+    // Rings that have been read must not take memory from later ones.
+    while (rings_.size() > 1 && (rings_.size() > kMostRings || waiting() == 0)) leaveRing();
 }
 
 // Goes on to the next ring; the cycles left in this one are lost.

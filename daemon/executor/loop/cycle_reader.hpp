@@ -29,6 +29,10 @@ class CycleReader {
     /// Reads the next cycle, without its values.
     /// @return the frames it belongs to; null = there is none yet
     const CycleFrames* next(Frame& frame);
+    /// Number of cycles of the present ring, or of an earlier one, that are not read yet.
+    std::uint64_t waiting() const noexcept {
+        return rings_.empty() ? 0 : rings_.front().ring->end() - next_;
+    }
     /// Passes over all cycles so far.
     void skip();
     /// Cycles that were overwritten before they were read.

@@ -18,6 +18,12 @@ double CycleStatistics::count() {
     return frames == nullptr ? 0.0 : counted / static_cast<double>(frames->ring->capacity());
 }
 
+std::size_t CycleStatistics::capacity() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const CycleFrames* const frames = reader_.present();
+    return frames == nullptr ? 0 : frames->ring->capacity();
+}
+
 // @return number of frames that were read or lost
 std::uint64_t CycleStatistics::countFrames() {
     const std::uint64_t lost = reader_.lost();

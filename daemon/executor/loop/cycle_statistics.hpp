@@ -24,6 +24,8 @@ class CycleStatistics {
     /// Counts the cycles since the last call, except for those of the warm-up.
     /// @return share of the ring that they filled; above 1, cycles were lost
     double count();
+    /// Number of cycles that the present frames hold.
+    std::size_t capacity();
     /// Resets the statistics of the loop and of the present components.
     void restart();
     /// Counts, and lets both functions copy statistics of the same cycles, unless the loop leaves

@@ -56,27 +56,42 @@ std::uint64_t FrameKeeper::step(std::uint64_t cycles, const std::atomic<bool>* g
         done += ran;
         statistics_.count();
         if (ran < wanted) break;
-        if (!watches_.empty()) awaitReaders();
+        awaitReaders();
     }
     return done;
 }
 
+bool FrameKeeper::stepOnce() {
+    if (loop_.step(1) != 1) return false;
+    if (++uncounted_ >= table_->ring->capacity() / 2) {
+        statistics_.count();
+        uncounted_ = 0;
+    }
+    return true;
+}
+
 void FrameKeeper::awaitReaders() {
-    const FrameRing& ring = *table_->ring;
     std::function<void()> callback;
     {
         const std::lock_guard<std::mutex> lock(mutex_);
         callback = readers_awaited_;
     }
+    const std::uint64_t most = table_->ring->capacity() / 4;
     auto since = std::chrono::steady_clock::now();
-    std::uint64_t before = ring.waiting();
-    while (before > ring.capacity() / 4 && std::chrono::steady_clock::now() - since < kPatience) {
+    std::uint64_t before = waiting();
+    while (before > most && std::chrono::steady_clock::now() - since < kPatience) {
         if (callback) callback();
         std::this_thread::sleep_for(kLook);
-        const std::uint64_t now = ring.waiting();
+        const std::uint64_t now = waiting();
         if (now < before) since = std::chrono::steady_clock::now();
         before = now;
     }
+}
+
+// Number of frames that the slowest reader has yet to take.
+std::uint64_t FrameKeeper::waiting() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return std::max(table_->ring->waiting(), reads_cycles_ ? cycles_.waiting() : 0);
 }
 
 std::vector<std::shared_ptr<const FrameTable>> FrameKeeper::takePublished() {

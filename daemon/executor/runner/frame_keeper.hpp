@@ -48,6 +48,9 @@ class FrameKeeper {
     /// Runs steps, which wait for readers of frames and are counted in the statistics; see
     /// Loop::step().
     std::uint64_t step(std::uint64_t cycles, const std::atomic<bool>* given_up);
+    /// Runs one step, which does not wait for readers.
+    /// @return false if it has not run
+    bool stepOnce();
     /// @}
 
     /// @name Any thread
@@ -69,6 +72,7 @@ class FrameKeeper {
 
    private:
     void awaitReaders();
+    std::uint64_t waiting() const;
 
     Loop& loop_;
     CycleStatistics& statistics_;
@@ -78,6 +82,7 @@ class FrameKeeper {
     FrameMemory memory_;  // outlives the tables' rings
     Watches watches_;
     std::shared_ptr<const FrameTable> table_;  // table of the loop's frames; null before the first
+    std::uint64_t uncounted_ = 0;              // steps of stepOnce() since the last count
 
     mutable std::mutex mutex_;  // protects the following
     std::vector<std::shared_ptr<const FrameTable>> published_;

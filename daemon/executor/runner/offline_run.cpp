@@ -81,7 +81,7 @@ ReplayOutcome OfflineRun::beginReplay(const ReplayChunk& chunk, const Progress& 
         connectBridge(true);
         throw;
     }
-    replay_ = std::make_unique<Replay>(plan_->bridgeTable(), loop_, chunk.start_ns);
+    replay_ = std::make_unique<Replay>(plan_->bridgeTable(), loop_, frames_, chunk.start_ns);
     transactions_.setReplaying(true);
     ReplayOutcome outcome;
     replay_->describe(outcome);

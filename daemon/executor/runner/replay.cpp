@@ -34,8 +34,8 @@ void Replay::check(const BridgeTable& table, const std::vector<RecordedTopic>& t
     }
 }
 
-Replay::Replay(BridgeTable table, Loop& loop, std::int64_t start_ns)
-    : table_(std::move(table)), loop_(loop), next_ns_(start_ns) {
+Replay::Replay(BridgeTable table, Loop& loop, FrameKeeper& frames, std::int64_t start_ns)
+    : table_(std::move(table)), loop_(loop), frames_(frames), next_ns_(start_ns) {
     for (const auto& injector : table_.inputs) injectors_[injector->topic()] = injector.get();
 }
 
@@ -59,7 +59,7 @@ ReplayOutcome Replay::run(const ReplayChunk& chunk) {
             if (message.time_ns > next_ns_) break;
             inject(message);
         }
-        if (loop_.step(1) != 1) break;
+        if (!frames_.stepOnce()) break;
         bytes += takeOutputs(outcome.outputs);
         ++cycles_;
         next_ns_ += loop_.clock().period_ns;

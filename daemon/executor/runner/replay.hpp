@@ -13,6 +13,7 @@
 
 #include "bridge/bridge.hpp"
 #include "loop/loop.hpp"
+#include "runner/frame_keeper.hpp"
 
 namespace rtcf::executor {
 
@@ -57,7 +58,7 @@ class Replay {
 
     /// @param table table of the new components; no bridge serves it
     /// @param loop  has begun stepping at time `start_ns`; outlives this object
-    Replay(BridgeTable table, Loop& loop, std::int64_t start_ns);
+    Replay(BridgeTable table, Loop& loop, FrameKeeper& frames, std::int64_t start_ns);
 
     /// Lists the topics of inputs and outputs.
     void describe(ReplayOutcome& outcome) const;
@@ -75,6 +76,7 @@ class Replay {
     BridgeTable table_;
     std::map<std::string, Injector*> injectors_;
     Loop& loop_;
+    FrameKeeper& frames_;
     std::int64_t next_ns_;  // time of the next cycle
     std::uint64_t cycles_ = 0;
 };

@@ -15,9 +15,10 @@ namespace {
 
 constexpr auto kTick = std::chrono::milliseconds(20);
 constexpr std::int64_t kProbeTimeout = 100'000'000;
-// Time between two counts of cycles: as long as they fill only a part of the ring.
-constexpr std::chrono::milliseconds kShortestCount{1};
-constexpr std::chrono::milliseconds kLongestCount{64};
+// Time between two counts of cycles: so long that they fill only a part of the ring, even if a
+// loop without real time runs faster than its frequency.
+constexpr std::chrono::nanoseconds kShortestCount = std::chrono::milliseconds(1);
+constexpr std::chrono::nanoseconds kLongestCount = std::chrono::milliseconds(64);
 constexpr double kMuch = 0.3;
 constexpr double kLittle = 0.1;
 
@@ -120,12 +121,17 @@ void Runner::tick() {
 void Runner::countCycles() {
     const CrashContext crash_context(ThreadRole::Other);
     pthread_setname_np(pthread_self(), "rtcf-counts");
-    std::chrono::milliseconds pause = kLongestCount;
+    std::chrono::nanoseconds pause = kShortestCount;
     std::unique_lock<std::mutex> lock(counting_mutex_);
     while (!ending_) {
         const double filled = statistics_.count();
         if (filled > kMuch) pause = std::max(pause / 2, kShortestCount);
         if (filled < kLittle) pause = std::min(pause * 2, kLongestCount);
+        const std::chrono::duration<double, std::nano> full(
+            static_cast<double>(statistics_.capacity()) *
+            static_cast<double>(loop_.clock().period_ns));
+        const auto most = std::chrono::duration_cast<std::chrono::nanoseconds>(kMuch * full);
+        pause = std::max(std::min(pause, most), kShortestCount);
         counting_ends_.wait_for(lock, pause);
     }
 }

@@ -38,10 +38,12 @@ class Counter {
 class EventCounter : public Counter {
    public:
     /// Lets recent() count from a value. One thread only, at any time.
-    void restart(std::uint64_t from) noexcept { start_.store(from, std::memory_order_relaxed); }
+    void restart(std::uint64_t from) noexcept { start_.store(from, std::memory_order_release); }
     /// Events since the last restart(). Any thread.
     std::uint64_t recent() const noexcept {
-        return value() - start_.load(std::memory_order_relaxed);
+        // In this order, so that the difference is never negative.
+        const std::uint64_t start = start_.load(std::memory_order_acquire);
+        return value() - start;
     }
 
    private:

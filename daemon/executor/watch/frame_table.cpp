@@ -99,15 +99,16 @@ std::vector<Candidate> chosenOf(const Plan& plan, const FrameDemand& demand, Fra
     return found;
 }
 
-std::string shortnessOf(std::size_t kept, const std::vector<FrameRing::Source>& sources,
-                        double frequency_hz) {
-    std::size_t bytes = 0;
-    for (const FrameRing::Source& source : sources) bytes += source.size;
+// @param optional size of the values that the settings and watches select, bytes
+std::string shortnessOf(const FrameRing& ring, std::size_t optional, double frequency_hz) {
+    const std::size_t bytes = ring.wordsOfFrame() * FrameCopy::kWord;
     return fmt::format(
-        "frames hold the last {} cycles ({:.2g} s), not one second: each has {:.1f} KiB of values, "
-        "and the ring is limited to {} MiB: lower frame_kb of the runner, or watch fewer values",
-        kept, static_cast<double>(kept) / frequency_hz, static_cast<double>(bytes) / 1024.0,
-        FrameRing::kLargestRing >> 20U);
+        "frames hold the last {} cycles ({:.2g} s), not one second: each takes {:.1f} KiB, and the "
+        "ring is limited to {} MiB: {}",
+        ring.capacity(), static_cast<double>(ring.capacity()) / frequency_hz,
+        static_cast<double>(bytes) / 1024.0, FrameRing::kLargestRing >> 20U,
+        2 * optional >= bytes ? "lower frame_kb of the runner, or watch fewer values"
+                              : "spread the components over more runners");
 }
 
 }  // namespace
@@ -117,7 +118,9 @@ std::shared_ptr<const FrameTable> makeFrameTable(const Plan& plan, const FrameDe
     table->watches = demand.watches;
     table->kept = demand.most_bytes != 0 || !demand.watches.empty();
     std::vector<FrameRing::Source> sources;
+    std::size_t optional = 0;
     for (Candidate& candidate : chosenOf(plan, demand, *table)) {
+        if (!candidate.needed) optional += candidate.column.size;
         sources.push_back({candidate.from, candidate.column.size});
         table->columns.push_back(std::move(candidate.column));
     }
@@ -132,16 +135,20 @@ std::shared_ptr<const FrameTable> makeFrameTable(const Plan& plan, const FrameDe
     const std::size_t steps = table->components.size();
     const std::size_t capacity = FrameRing::capacityFor(sources, steps, frames);
     const FrameTable* const previous = demand.previous;
-    if (table->kept && capacity < frames)
-        table->shortness = shortnessOf(capacity, sources, demand.frequency_hz);
+    const auto note_shortness = [&] {
+        if (table->kept && capacity < frames)
+            table->shortness = shortnessOf(*table->ring, optional, demand.frequency_hz);
+    };
     if (previous != nullptr && previous->kept == table->kept &&
         previous->components == table->components && previous->ring->sources() == sources &&
-        previous->ring->capacity() == capacity && previous->shortness == table->shortness) {
+        previous->ring->capacity() == capacity) {
         table->ring = previous->ring;
-        return table;
+        note_shortness();
+        if (previous->shortness == table->shortness) return table;
     }
     table->ring = std::make_shared<FrameRing>(std::move(sources), steps, frames, counter,
                                               table->kept ? demand.memory : nullptr);
+    note_shortness();
     if (const auto& block = table->ring->block(); block != nullptr) {
         std::vector<std::string> remarks = table->notes;
         if (!table->shortness.empty()) remarks.push_back(table->shortness);

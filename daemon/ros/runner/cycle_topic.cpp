@@ -67,12 +67,13 @@ void CycleTopic::run() {
     constexpr auto kBusy = std::chrono::milliseconds(5);
     constexpr auto kIdle = std::chrono::milliseconds(50);  // without a loop
     while (!stop_) {
-        publishAll();
-        std::this_thread::sleep_for(runner_.loop().joinable() ? kBusy : kIdle);
+        const bool found = publishAll();
+        std::this_thread::sleep_for(found || runner_.loop().joinable() ? kBusy : kIdle);
     }
 }
 
-void CycleTopic::publishAll() {
+// @return true if there were cycles to publish
+bool CycleTopic::publishAll() {
     const std::lock_guard lock(mutex_);
     const auto wanted = [](const ros::Publisher& publisher) {
         return static_cast<bool>(publisher) && publisher.getNumSubscribers() > 0;
@@ -81,13 +82,16 @@ void CycleTopic::publishAll() {
     const bool iteration_info = wanted(iteration_info_);
     if (!cycles && !iteration_info) {
         runner_.skipCycles();
-        return;
+        return false;
     }
     executor::CycleRecord record{};
+    bool found = false;
     while (!stop_ && runner_.nextCycle(record)) {
+        found = true;
         if (cycles) cycles_.publish(cycleOf(record));
         if (iteration_info) iteration_info_.publish(infoOf(record));
     }
+    return found;
 }
 
 }  // namespace rtcf::ros1

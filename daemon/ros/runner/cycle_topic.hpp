@@ -34,7 +34,7 @@ class CycleTopic {
 
    private:
     void run();
-    void publishAll();
+    bool publishAll();
 
     executor::RunnerView& runner_;
     std::mutex mutex_;  // protects cycles_ and iteration_info_

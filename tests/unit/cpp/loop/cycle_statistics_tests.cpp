@@ -94,6 +94,18 @@ TEST(CycleReader, PassesOverCycles) {
     EXPECT_EQ(reader.lost(), 0U);
 }
 
+TEST(CycleReader, KeepsNoRingThatHasBeenRead) {
+    CycleReader reader;
+    CycleFrames first = framesOf(1);
+    reader.follow(first);
+    fill(first, 0);
+    EXPECT_EQ(allOf(reader).size(), 1U);
+    const std::weak_ptr<FrameRing> ring = first.ring;
+    first.ring.reset();
+    reader.follow(framesOf(1));
+    EXPECT_TRUE(ring.expired()) << "its memory is free for the next ring";
+}
+
 TEST(CycleReader, KeepsFewRingsForAReaderThatIsLate) {
     CycleReader reader;
     std::vector<std::weak_ptr<FrameRing>> rings;

@@ -3,9 +3,15 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
+#include <chrono>
+#include <cstdint>
 #include <cstring>
+#include <thread>
+#include <vector>
 
 #include "support/runner_fixture.hpp"
+#include "view/runner_view.hpp"
 
 namespace rtcf::test {
 namespace {
@@ -221,6 +227,56 @@ TEST_F(Stepping, ReplayHasExclusiveUseOfThePorts) {
     replay(chunk);
     EXPECT_EQ(taken("/R3_G2H1"), std::vector<double>{}) << "ROS receives nothing of the replay";
     EXPECT_NE(bridge().injector("/G2_R2"), nullptr);
+}
+
+// Steps and replays run faster than statistics are counted elsewhere.
+TEST_F(Stepping, EachStepAndEachReplayedCycleIsInTheStatistics) {
+    constexpr std::uint64_t kSteps = 100'000;
+    configure([](RunnerSettings& settings) { settings.loop.warmup_cycles = 0; });
+    load(definition("Ticker", "A"));
+    step(kSteps);
+    EXPECT_EQ(durations().duration().snapshot().count, kSteps);
+    EXPECT_EQ(durations().lost(), 0U);
+    EXPECT_EQ(runner().graph()->get("/A").statistics->duration.snapshot().count, kSteps);
+
+    const auto replay = [this](const executor::ReplayChunk& chunk) {
+        return onGraphThread([&] { return runner().replay(chunk, [](const std::string&) {}); });
+    };
+    executor::ReplayChunk chunk;
+    chunk.begin = true;
+    chunk.start_ns = 1'000'000'000;
+    replay(chunk);
+    chunk.begin = false;
+    chunk.until_ns = 31'000'000'000;
+    const auto outcome = replay(chunk);
+    EXPECT_GT(outcome.cycles, 20'000U);
+    EXPECT_EQ(durations().duration().snapshot().count, kSteps + outcome.cycles);
+    EXPECT_EQ(durations().lost(), 0U);
+}
+
+// As the ROS node does for subscribers of `cycles`.
+TEST_F(Stepping, StepsWaitForAReaderOfAllCycles) {
+    constexpr std::uint64_t kSteps = 20'000;
+    load(definition("Ticker", "A"));
+    executor::RunnerView& view = *bridge().runner;
+    executor::CycleRecord cycle{};
+    while (view.nextCycle(cycle)) {
+    }
+    std::atomic<bool> done{false};
+    std::vector<std::uint64_t> found;
+    std::thread reader([&] {
+        for (bool last = false; !last;) {
+            last = done;
+            while (view.nextCycle(cycle)) found.push_back(cycle.iteration);
+            std::this_thread::sleep_for(std::chrono::milliseconds(5));
+        }
+    });
+    step(kSteps);
+    done = true;
+    reader.join();
+    EXPECT_EQ(found.size(), kSteps);
+    EXPECT_TRUE(std::is_sorted(found.begin(), found.end()));
+    EXPECT_EQ(view.cyclesLost(), 0U);
 }
 
 }  // namespace

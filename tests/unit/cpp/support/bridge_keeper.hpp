@@ -23,6 +23,7 @@ class BridgeRecord {
     std::size_t everGiven(const std::string& topic) const;
     /// Used by the test to request a change of parameters, as ROS does.
     executor::ParameterRequest request;
+    executor::RunnerView* runner = nullptr;
 
    private:
     mutable std::mutex mutex_;
@@ -33,6 +34,7 @@ class BridgeRecord {
 class BridgeKeeper final : public executor::Bridge {
    public:
     explicit BridgeKeeper(std::shared_ptr<BridgeRecord> record) : record_(std::move(record)) {}
+    void attach(executor::RunnerView& runner) override { record_->runner = &runner; }
     void serveParameters(executor::ParameterRequest request) override {
         record_->request = std::move(request);
     }

@@ -35,8 +35,8 @@ TEST_F(FrameTables, HoldingLessThanASecondAreReported) {
     load(definition("Camera", "C"));
     ASSERT_EQ(warnings().size(), 1U);
     EXPECT_EQ(warnings()[0],
-              "frames hold the last 16 cycles (0.016 s), not one second: each has 1024.0 KiB of "
-              "values, and the ring is limited to 16 MiB: lower frame_kb of the runner, or "
+              "frames hold the last 16 cycles (0.016 s), not one second: each takes 1024.1 KiB, "
+              "and the ring is limited to 16 MiB: lower frame_kb of the runner, or "
               "watch fewer values");
     load(definition("Chatter", "D"));
     EXPECT_EQ(warnings().size(), 1U) << "no further warning";
