@@ -377,9 +377,9 @@ void Cycle::putBack(const Step& step, OutputBase& output) noexcept {
 
 // True if a component has completed an update() in this schedule.
 // @param running the step that is running
-bool Cycle::hasRun(const Step& step, const Step& running) const noexcept {
-    if (frames_->end() - scheduled_end_ >= step.every) return true;
-    return &step < &running && frames_->ended()[&step - schedule_->steps.data()] != 0;
+bool Cycle::hasRun(const Step& which, const Step& running) const noexcept {
+    if (frames_->end() - scheduled_end_ >= which.every) return true;
+    return &which < &running && frames_->ended()[&which - schedule_->steps.data()] != 0;
 }
 
 bool Cycle::copy(const Latch& latch) noexcept {

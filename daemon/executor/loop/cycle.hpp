@@ -134,7 +134,7 @@ class Cycle {
     bool copyLatches() noexcept;
     void putBack(const Step& step) noexcept;
     void putBack(const Step& step, OutputBase& output) noexcept;
-    bool hasRun(const Step& step, const Step& running) const noexcept;
+    bool hasRun(const Step& which, const Step& running) const noexcept;
     /// Effect of a non-finite value on an output declared Finite(OnNonFinite::Stop): end the loop,
     /// or go on.
     enum class OnBadOutput { End, GoOn };

@@ -48,7 +48,8 @@ class Ring:
     def durations_ns(self) -> "NDArray[np.int64]":
         """The calculation duration of each cycle."""
         ticks = self._signed(7) - self._signed(5)
-        return np.rint(ticks * self.layout.ns_per_tick).astype("i8")
+        durations: NDArray[np.int64] = np.rint(ticks * self.layout.ns_per_tick).astype("i8")
+        return durations
 
     @property
     def last_of_loop(self) -> "NDArray[np.bool_]":
