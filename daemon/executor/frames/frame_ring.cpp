@@ -44,7 +44,7 @@ std::size_t FrameRing::capacityFor(const std::vector<Source>& sources, std::size
 CycleTicks FrameRing::lastTicks() const noexcept RTCF_NONBLOCKING {
     const Word* const frame = at(end_.load(std::memory_order_relaxed) - 1);
     const auto get = [frame](Head place) {
-        return static_cast<std::int64_t>(frame[place].load(std::memory_order_relaxed));
+        return signedOf(frame[place].load(std::memory_order_relaxed));
     };
     return {get(kBegin), get(kReady), get(kEnd)};
 }

@@ -24,7 +24,7 @@ namespace rtcf::executor {
 /// Kinds of cycles. Numbers as in executor.proto.
 enum class FrameKind : std::uint64_t { Counted = 0, LastOfLoop = 1, WarmUp = 2 };
 
-/// What is known at the begin of a cycle.
+/// The parts of a frame that are known at the begin of its cycle.
 struct FrameHead {
     std::uint64_t iteration;
     std::int64_t stamp_ns;

@@ -86,7 +86,7 @@ struct Adoption {
     std::vector<Leaving> leaving;
     std::vector<StagedValue*> values;  ///< parameters and derived values
     std::int64_t period_ns = 0;        ///< the loop's new period, ns; 0 = no change
-    /// Ring that cycles fill from now on; null = no change, which a new schedule does not allow.
+    /// Ring that cycles fill from now on; null = no change. A new schedule requires one.
     FrameRing* frames = nullptr;
     /// Restores an earlier state before all other changes; if that fails, nothing else changes.
     Restoration* restoration = nullptr;

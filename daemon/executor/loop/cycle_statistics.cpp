@@ -57,9 +57,8 @@ void CycleStatistics::restart() {
     std::vector<EventCounter*> counters{&loop_.overruns,       &loop_.missed,
                                         &loop_.late_wake_ups,  &loop_.exchange_overruns,
                                         &loop_.frame_overruns, &loop_.catching_up};
-    const std::vector<std::shared_ptr<ComponentStatistics>> components =
-        reader_.present() == nullptr ? std::vector<std::shared_ptr<ComponentStatistics>>{}
-                                     : reader_.present()->components;
+    std::vector<std::shared_ptr<ComponentStatistics>> components;
+    if (const CycleFrames* const frames = reader_.present()) components = frames->components;
     for (const auto& component : components) counters.push_back(&component->overruns);
     std::vector<std::uint64_t> totals(counters.size());
     readSettled([&] {

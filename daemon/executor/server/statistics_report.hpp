@@ -31,7 +31,7 @@ class StatisticsReport {
     void restart();
 
    private:
-    /// Totals at the last reset of what is not counted from 0 then.
+    /// Totals at the last reset, for counters that it does not set to 0.
     struct Baseline {
         HistogramSnapshot adoption;
         std::uint64_t log_dropped = 0;

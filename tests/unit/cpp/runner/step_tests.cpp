@@ -29,6 +29,10 @@ class Stepping : public RunnerFixture {
         ASSERT_TRUE(bridge().injector(topic)->deliver(bytes.data(), sizeof number));
     }
 
+    executor::ReplayOutcome replay(const executor::ReplayChunk& chunk) {
+        return onGraphThread([&] { return runner().replay(chunk, [](const std::string&) {}); });
+    }
+
     std::vector<double> taken(const std::string& topic) {
         std::vector<double> values;
         while (bridge().tap(topic)->pop(
@@ -206,9 +210,6 @@ TEST_F(Stepping, ReplayHasExclusiveUseOfThePorts) {
     mapPapersTopics();
     const std::size_t given = bridge().everGiven("/R3_G2H1");
     ASSERT_GT(given, 0U);
-    const auto replay = [this](const executor::ReplayChunk& chunk) {
-        return onGraphThread([&] { return runner().replay(chunk, [](const std::string&) {}); });
-    };
     executor::ReplayChunk chunk;
     chunk.begin = true;
     chunk.start_ns = 1'000'000'000;
@@ -239,9 +240,6 @@ TEST_F(Stepping, EachStepAndEachReplayedCycleIsInTheStatistics) {
     EXPECT_EQ(durations().lost(), 0U);
     EXPECT_EQ(runner().graph()->get("/A").statistics->duration.snapshot().count, kSteps);
 
-    const auto replay = [this](const executor::ReplayChunk& chunk) {
-        return onGraphThread([&] { return runner().replay(chunk, [](const std::string&) {}); });
-    };
     executor::ReplayChunk chunk;
     chunk.begin = true;
     chunk.start_ns = 1'000'000'000;
