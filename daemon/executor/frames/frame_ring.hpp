@@ -1,5 +1,5 @@
 /// @file
-/// The ring of frames: the record of each cycle. At the begin of a cycle, the real-time thread
+/// The ring of frames: the record of each cycle. At the start of a cycle, the real-time thread
 /// begins the next frame; it notes the end of each component's update() there, and adds the values
 /// and the cycle's times at the end. There is one writer and any number of readers; the writer does
 /// not know the readers and never waits for them. A late reader finds its frame overwritten, and
@@ -24,20 +24,20 @@ namespace rtcf::executor {
 /// Kinds of cycles. Numbers as in executor.proto.
 enum class FrameKind : std::uint64_t { Counted = 0, LastOfLoop = 1, WarmUp = 2 };
 
-/// The parts of a frame that are known at the begin of its cycle.
+/// The parts of a frame that are known at the start of its cycle.
 struct FrameHead {
     std::uint64_t iteration;
     std::int64_t stamp_ns;
     std::int64_t latency_ns;
     std::int64_t begin_ticks;  ///< the end of the wait
-    std::int64_t ready_ticks;  ///< the begin of the first component
+    std::int64_t ready_ticks;  ///< the start of the first component
     FrameKind kind = FrameKind::Counted;
 };
 
 /// Times of a cycle, ticks of the cycle counter. All 0 in the last frame of a loop.
 struct CycleTicks {
     std::int64_t begin;  ///< the end of the wait
-    std::int64_t ready;  ///< the begin of the first component, after the exchange of values
+    std::int64_t ready;  ///< the start of the first component, after the exchange of values
     std::int64_t end;
 };
 

@@ -327,8 +327,8 @@ void Loop::followRealTime() noexcept {
         const std::int64_t time =
             device != nullptr ? afterLastCycle(wake_up.wake_ns) : wake_up.deadline_ns;
         if (!cycle_.run(time, wake_up.wake_ns - wake_up.deadline_ns)) break;
-        // A device begins the next cycle itself; waitForSource() counts missed beats.
         noteMissed(wake_up.missed);
+        // A device begins the next cycle itself; waitForSource() counts missed beats.
         const std::int64_t limit = time + cycle_.clock().period_ns;
         end = endOfCycle(wake_up, begin, limit);
         if (end >= limit) noteOverrun(wake_up, begin, end, behind);
