@@ -13,7 +13,7 @@ constexpr std::size_t kKilo = 1024;
 
 }  // namespace
 
-void SizeWatch::look(const std::map<std::string, std::shared_ptr<Tap>>& taps,
+void SizeWatch::look(const std::map<std::string, std::shared_ptr<SerializedTap>>& taps,
                      const std::map<std::string, std::shared_ptr<Injector>>& injectors,
                      std::size_t largest, std::int64_t now_ns) {
     for (auto known = known_.begin(); known != known_.end();)

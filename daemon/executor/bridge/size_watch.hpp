@@ -10,7 +10,7 @@
 #include <string>
 
 #include "exchange/injector.hpp"
-#include "exchange/tap.hpp"
+#include "exchange/serialized_tap.hpp"
 
 namespace rtcf::executor {
 
@@ -25,7 +25,7 @@ class SizeWatch {
 
     /// Checks all connections of a plan; reports each at most once in ten seconds.
     /// @param largest present limit, bytes
-    void look(const std::map<std::string, std::shared_ptr<Tap>>& taps,
+    void look(const std::map<std::string, std::shared_ptr<SerializedTap>>& taps,
               const std::map<std::string, std::shared_ptr<Injector>>& injectors,
               std::size_t largest, std::int64_t now_ns);
 

@@ -1,39 +1,48 @@
 #include "frames/frame_copy.hpp"
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 namespace rtcf::executor {
 
 namespace {
 
-constexpr std::size_t kMostGathered = 4;  // most words of a gathered value
-constexpr std::uint64_t kNothing = 0;     // pads the last group
+constexpr std::size_t kMostGathered = 8;            // most words of a gathered source
+constexpr std::array<std::uint64_t, 2> kNothing{};  // pads the last group of pairs
 
-bool isGathered(const FrameCopy::Source& source) {
-    return source.size % FrameCopy::kWord == 0 && source.size / FrameCopy::kWord <= kMostGathered;
+enum class Way { Pairs, Singles, Block };
+
+Way wayOf(const FrameCopy::Source& source) {
+    const std::size_t words = source.size / FrameCopy::kWord;
+    if (source.size % FrameCopy::kWord != 0 || words > kMostGathered) return Way::Block;
+    return words % 2 == 0 ? Way::Pairs : Way::Singles;
 }
 
 }  // namespace
 
 FrameCopy::FrameCopy(std::vector<Source> sources) : sources_(std::move(sources)) {
-    offsets_.resize(sources_.size());
-    for (std::size_t i = 0; i < sources_.size(); ++i) {
-        if (!isGathered(sources_[i])) continue;
-        offsets_[i] = gathered_.size() * kWord;
-        const auto* const from = static_cast<const std::uint8_t*>(sources_[i].from);
-        for (std::size_t at = 0; at < sources_[i].size; at += kWord) gathered_.push_back(from + at);
-    }
-    while (gathered_.size() % kAtOnce != 0) gathered_.push_back(&kNothing);
-    words_ = gathered_.size();
-    for (std::size_t i = 0; i < sources_.size(); ++i) {
-        const Source& source = sources_[i];
-        if (isGathered(source)) continue;
-        offsets_[i] = words_ * kWord;
-        blocks_.push_back({static_cast<const std::uint8_t*>(source.from),
-                           source.size / FrameCopy::kWord, source.size % FrameCopy::kWord});
-        words_ += (source.size + kWord - 1) / kWord;
-    }
+    places_.resize(sources_.size());
+    const auto each = [this](Way way, const auto& add) {
+        for (std::size_t i = 0; i < sources_.size(); ++i) {
+            if (wayOf(sources_[i]) != way) continue;
+            places_[i] = words_;
+            add(static_cast<const std::uint8_t*>(sources_[i].from), sources_[i].size);
+            words_ += (sources_[i].size + kWord - 1) / kWord;
+        }
+    };
+    each(Way::Pairs, [this](const std::uint8_t* from, std::size_t size) {
+        for (std::size_t at = 0; at < size; at += 2 * kWord) pairs_.push_back(from + at);
+    });
+    while (pairs_.size() % kAtOnce != 0) pairs_.push_back(kNothing.data());
+    words_ = 2 * pairs_.size();
+    each(Way::Singles, [this](const std::uint8_t* from, std::size_t size) {
+        for (std::size_t at = 0; at < size; at += kWord) singles_.push_back(from + at);
+    });
+    each(Way::Block, [this](const std::uint8_t* from, std::size_t size) {
+        blocks_.push_back({from, size / kWord, size % kWord});
+    });
+    copies_rest_ = !singles_.empty() || !blocks_.empty();
 }
 
 // Loads the bytes after the last whole word into a word, in memory order. On little-endian
@@ -50,8 +59,8 @@ std::uint64_t FrameCopy::loadRest(const std::uint8_t* from, std::size_t size) no
     return value;
 }
 
-void FrameCopy::copyBlocks(Word* to) const noexcept RTCF_NONBLOCKING {
-    to += gathered_.size();
+void FrameCopy::copyRest(Word* to) const noexcept RTCF_NONBLOCKING {
+    for (const void* from : singles_) put(*to++, load<std::uint64_t>(from));
     for (const Block& block : blocks_) {
         const std::uint8_t* next = block.from;
         for (std::size_t i = 0; i < block.words; ++i, next += kWord, ++to)
@@ -62,10 +71,10 @@ void FrameCopy::copyBlocks(Word* to) const noexcept RTCF_NONBLOCKING {
 
 void FrameCopy::copyBack(const Word* from, std::size_t source, void* to) const noexcept
     RTCF_NONBLOCKING {
-    from += offsets_[source] / kWord;
+    from += places_[source];
     auto* next = static_cast<std::uint8_t*>(to);
     for (std::size_t left = sources_[source].size; left != 0; ++from) {
-        const std::uint64_t word = from->load(std::memory_order_relaxed);
+        const std::uint64_t word = from->load(std::memory_order_acquire);
         const std::size_t bytes = std::min(left, kWord);
         std::memcpy(next, &word, bytes);
         next += bytes;

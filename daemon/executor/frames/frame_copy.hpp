@@ -1,7 +1,7 @@
 /// @file
-/// The list of a frame's values, and the code by which the real-time thread copies them. Most
-/// values are numbers of a few words: these are gathered several at a time. Larger values, and
-/// those that are not whole words, are copied one by one.
+/// The list of a frame's values, and the code by which the real-time thread copies them. Most are
+/// outputs of a few words, each with its stamp: these are gathered, two words at a time. Larger
+/// values, and those that are not whole words, are copied one by one.
 #pragma once
 
 #include <atomic>
@@ -9,6 +9,10 @@
 #include <cstdint>
 #include <cstring>
 #include <vector>
+
+#if defined(__SSE2__) && !defined(__SANITIZE_THREAD__)
+#include <emmintrin.h>
+#endif
 
 #include "rtcf/realtime.hpp"
 
@@ -19,42 +23,51 @@ class FrameCopy {
     using Word = std::atomic<std::uint64_t>;
     static constexpr std::size_t kWord = sizeof(std::uint64_t);  ///< bytes
 
-    /// A value of fixed size to copy.
+    /// Memory to copy: a value of fixed size, perhaps after its header.
     struct Source {
         const void* from;
-        std::size_t size;  ///< bytes
+        std::size_t size;      ///< bytes
+        std::size_t head = 0;  ///< bytes before the value; a multiple of a word
         friend bool operator==(const Source& a, const Source& b) noexcept {
-            return a.from == b.from && a.size == b.size;
+            return a.from == b.from && a.size == b.size && a.head == b.head;
         }
     };
 
     explicit FrameCopy(std::vector<Source> sources);
 
     const std::vector<Source>& sources() const noexcept { return sources_; }
-    /// Offset of a source's value among the values, bytes; a multiple of a word.
-    std::size_t offset(std::size_t source) const noexcept { return offsets_[source]; }
-    /// Size of all values, words.
-    std::size_t words() const noexcept { return words_; }
-    /// Copies all values. Words are stored with release order: a reader that loads one of them with
-    /// acquire order also sees all stores before it. Real-time safe.
-    void copy(Word* to) const noexcept RTCF_NONBLOCKING {
-        const void* const* from = gathered_.data();
-        const void* const* const end = from + gathered_.size();
-        Word* next = to;
-        for (; from != end; from += kAtOnce, next += kAtOnce) {
-            static_assert(kAtOnce == 4, "one line per word below");
-            put(next[0], load<std::uint64_t>(from[0]));
-            put(next[1], load<std::uint64_t>(from[1]));
-            put(next[2], load<std::uint64_t>(from[2]));
-            put(next[3], load<std::uint64_t>(from[3]));
-        }
-        if (!blocks_.empty()) copyBlocks(to);
+    /// Offset of a source's value among the copied words, bytes; a multiple of a word.
+    std::size_t offset(std::size_t source) const noexcept {
+        return places_[source] * kWord + sources_[source].head;
     }
-    /// Copies the value of a source out of copied words. Only by the writer; real-time safe.
+    /// Size of all sources, words.
+    std::size_t words() const noexcept { return words_; }
+    /// Copies all sources. A reader must check afterwards that the words were not overwritten.
+    /// Real-time safe.
+    void copy(Word* to) const noexcept RTCF_NONBLOCKING {
+        // The words follow the mark of an incomplete frame, see FrameRing.
+        std::atomic_signal_fence(std::memory_order_seq_cst);
+        const void* const* from = pairs_.data();
+        const void* const* const end = from + pairs_.size();
+        for (; from != end; from += kAtOnce, to += 2 * kAtOnce) {
+            static_assert(kAtOnce == 4, "one line per pair below");
+            putPair(to, from[0]);
+            putPair(to + 2, from[1]);
+            putPair(to + 4, from[2]);
+            putPair(to + 6, from[3]);
+        }
+        if (copies_rest_) copyRest(to);
+        std::atomic_signal_fence(std::memory_order_seq_cst);
+    }
+    /// Copies a source out of copied words. Real-time safe.
     void copyBack(const Word* from, std::size_t source, void* to) const noexcept RTCF_NONBLOCKING;
+    /// The first word of a source among copied words. Real-time safe.
+    std::uint64_t first(const Word* from, std::size_t source) const noexcept RTCF_NONBLOCKING {
+        return from[places_[source]].load(std::memory_order_acquire);
+    }
 
    private:
-    static constexpr std::size_t kAtOnce = 4;  // words gathered at a time
+    static constexpr std::size_t kAtOnce = 4;  // pairs gathered at a time
 
     template <typename T>
     static std::uint64_t load(const void* from) noexcept RTCF_NONBLOCKING {
@@ -67,9 +80,21 @@ class FrameCopy {
     static void put(Word& word, std::uint64_t value) noexcept RTCF_NONBLOCKING {
         word.store(value, std::memory_order_release);
     }
-    void copyBlocks(Word* to) const noexcept RTCF_NONBLOCKING;
+    static void putPair(Word* to, const void* from) noexcept RTCF_NONBLOCKING {
+#if defined(__SSE2__) && !defined(__SANITIZE_THREAD__)
+        // x86 stores each word as a whole, after all earlier stores.
+        static_assert(sizeof(Word) == kWord && Word::is_always_lock_free);
+        _mm_storeu_si128(reinterpret_cast<__m128i*>(to),
+                         _mm_loadu_si128(static_cast<const __m128i*>(from)));
+#else
+        const auto* const words = static_cast<const std::uint8_t*>(from);
+        put(to[0], load<std::uint64_t>(words));
+        put(to[1], load<std::uint64_t>(words + kWord));
+#endif
+    }
+    void copyRest(Word* to) const noexcept RTCF_NONBLOCKING;
 
-    /// A value that is not gathered.
+    /// A source that is not gathered.
     struct Block {
         const std::uint8_t* from;
         std::size_t words;  ///< whole words
@@ -77,11 +102,13 @@ class FrameCopy {
     };
 
     std::vector<Source> sources_;
-    std::vector<std::size_t> offsets_;
+    std::vector<std::size_t> places_;  // first word of each source
     std::size_t words_ = 0;
-    // Sources of the first words; padded to a multiple of kAtOnce.
-    std::vector<const void*> gathered_;
-    std::vector<Block> blocks_;  // values after the gathered ones
+    // Sources of the first words, two words each; padded to a multiple of kAtOnce.
+    std::vector<const void*> pairs_;
+    std::vector<const void*> singles_;  // sources of an odd number of words, after the pairs
+    std::vector<Block> blocks_;         // after these
+    bool copies_rest_ = false;          // there are singles or blocks
 };
 
 }  // namespace rtcf::executor

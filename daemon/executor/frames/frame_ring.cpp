@@ -49,11 +49,11 @@ CycleTicks FrameRing::lastTicks() const noexcept RTCF_NONBLOCKING {
     return {get(kBegin), get(kReady), get(kEnd)};
 }
 
-void FrameRing::putBack(void* value) const noexcept RTCF_NONBLOCKING {
+void FrameRing::putBack(void* from) const noexcept RTCF_NONBLOCKING {
     const std::uint64_t end = end_.load(std::memory_order_relaxed);
     const Word* const last = end == base_end_ ? base_.get() : at(end - 1) + kHeadWords + steps_;
     for (std::size_t i = 0; i < copy_.sources().size(); ++i) {
-        if (copy_.sources()[i].from == value) copy_.copyBack(last, i, value);
+        if (copy_.sources()[i].from == from) copy_.copyBack(last, i, from);
     }
 }
 
@@ -72,6 +72,22 @@ bool FrameRing::read(std::uint64_t number, Frame& frame, std::size_t words) cons
     frame.words_.resize(words);
     for (std::size_t i = 0; i < words; ++i) frame.words_[i] = get(kHeadWords + i);
     return get(kMark) == whole;
+}
+
+FrameRing::Reading FrameRing::readOutput(std::uint64_t number, std::size_t source,
+                                         std::int64_t known, SlotHeader& to,
+                                         std::int64_t& stamp_ns) const {
+    const Word* const frame = at(number);
+    const Word* const values = frame + kHeadWords + steps_;
+    const std::uint64_t whole = 2 * number + 2;
+    if (frame[kMark].load(std::memory_order_acquire) != whole) return Reading::Overwritten;
+    const bool is_known = signedOf(copy_.first(values, source)) == known;
+    if (!is_known) {
+        stamp_ns = signedOf(frame[kStamp].load(std::memory_order_acquire));
+        copy_.copyBack(values, source, &to);
+    }
+    if (frame[kMark].load(std::memory_order_acquire) != whole) return Reading::Overwritten;
+    return is_known ? Reading::Known : Reading::Copied;
 }
 
 }  // namespace rtcf::executor

@@ -18,6 +18,7 @@
 #include "frames/frame_memory.hpp"
 #include "realtime/cycle_counter.hpp"
 #include "rtcf/realtime.hpp"
+#include "rtcf/slot.hpp"
 
 namespace rtcf::executor {
 
@@ -108,10 +109,8 @@ class FrameRing {
         copy_.copy(base_.get());
         base_end_ = end_.load(std::memory_order_relaxed);
     }
-    /// Restores the value of a source from the last frame or setBase(). Does nothing if `value` is
-    /// not a source.
-    /// @param value address of the source's value
-    void putBack(void* value) const noexcept RTCF_NONBLOCKING;
+    /// Restores a source from the last frame or setBase(). Does nothing if `from` is not a source.
+    void putBack(void* from) const noexcept RTCF_NONBLOCKING;
     /// Adds the end of the cycle and makes the frame readable.
     [[gnu::always_inline]] void commit(std::int64_t end_ticks) noexcept RTCF_NONBLOCKING {
         Word* const frame = writing_;
@@ -143,6 +142,9 @@ class FrameRing {
     std::size_t steps() const noexcept { return steps_; }
     const CycleCounter& counter() const noexcept { return counter_; }
     std::size_t capacity() const noexcept { return mask_ + 1; }
+    /// Number of the first frame after the last setBase(). Graph thread, while the loop does no
+    /// work for it.
+    std::uint64_t base() const noexcept { return base_end_; }
     /// Size of a frame, words.
     std::size_t wordsOfFrame() const noexcept { return stride_; }
     /// Size of a frame's values, its last words.
@@ -162,6 +164,14 @@ class FrameRing {
     /// Copies a committed frame without its values.
     /// @return false if it has been overwritten
     bool readTicks(std::uint64_t number, Frame& frame) const { return read(number, frame, steps_); }
+    /// Result of readOutput().
+    enum class Reading { Overwritten, Known, Copied };
+    /// Copies an output from a committed frame, unless its stamp is `known`.
+    /// @param source its number; an output with its header
+    /// @param[out] to       SlotHeader and value, as in memory
+    /// @param[out] stamp_ns the frame's CycleRecord::stamp_ns
+    Reading readOutput(std::uint64_t number, std::size_t source, std::int64_t known, SlotHeader& to,
+                       std::int64_t& stamp_ns) const;
     /// Calls `copy`, which copies counters that the loop changes from commit() to settle(): a
     /// sequence lock.
     /// @return false if the loop changed them meanwhile

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "frames/frame_ring.hpp"
@@ -68,7 +69,13 @@ struct Leaving {
     Component* component;
     ComponentStatistics* statistics;
     std::vector<Latch> latches;  ///< latches of its outputs
-    std::vector<Tap*> taps;      ///< taps of its outputs
+    /// @name Taps of its outputs
+    /// @{
+    std::vector<SerializedTap*> serialized_taps;
+    std::vector<FrameTap*> frame_taps;
+    /// @}
+    /// Filled at the boundary: ROS time of the last cycle; unset = the loop does not run.
+    std::optional<std::int64_t> last_stamp_ns = std::nullopt;
 };
 
 /// All changes of one cycle boundary. Owned by the graph thread, which waits until Cycle::apply()

@@ -85,7 +85,8 @@ void Cycle::moveTime(std::int64_t by_ns) {
     }
     for (const Latch& latch : schedule_->latches) move(latch.to);
     for (const Feed& feed : schedule_->feeds) move(feed.injector->front());
-    for (Tap* tap : schedule_->taps) tap->moveTime(by_ns);
+    for (SerializedTap* tap : schedule_->serialized_taps) tap->moveTime(by_ns);
+    for (FrameTap* tap : schedule_->frame_taps) tap->moveTime(by_ns);
 }
 
 // The only place that catches exceptions of components. `Plain` leaves out features that most
@@ -184,7 +185,7 @@ bool Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NON
     notes_.leaveComponents();
     if ((special_ & kExchange) != 0 && completed) {
         for (QueueBase* queue : schedule_->queues) queue->receive();
-        for (Tap* tap : schedule_->taps) tap->push(clock_.stamp_ns);
+        for (SerializedTap* tap : schedule_->serialized_taps) tap->push(clock_.stamp_ns);
         given_ticks_ = readCycleCounter();
     }
     finish();
@@ -337,7 +338,7 @@ void Cycle::makeSafe(Component& component, ComponentStatistics& statistics,
 void Cycle::putBack(const Step& step) noexcept {
     for (OutputBase* output : step.component->outputs()) {
         if (!output->staged()) {
-            putBack(step, *output);
+            frames_->putBack(output->slot().get());
             continue;
         }
         try {
@@ -346,40 +347,6 @@ void Cycle::putBack(const Step& step) noexcept {
             output->discard();  // no memory for the component's copy; readers have theirs
         }
     }
-}
-
-// Restores the value from the last frame, and the stamp from the readers' read positions.
-void Cycle::putBack(const Step& step, OutputBase& output) noexcept {
-    SlotHeader& slot = *output.slot();
-    frames_->putBack(valueOf(output.type(), slot));
-    if (slot.stamp != clock_.time_ns) return;  // not written in this cycle
-    slot.stamp = 0;
-    bool read = false;
-    const auto known = [&](std::int64_t stamp) {
-        read = true;
-        if (stamp != 0 && (slot.stamp == 0 || stamp > slot.stamp)) slot.stamp = stamp;
-    };
-    for (const Step& reader : schedule_->steps) {
-        for (const InputPort* input : reader.component->inputs()) {
-            // A component that has not run yet has not read either.
-            if (&input->slot() == &slot && (input->seen() != 0 || hasRun(reader, step)))
-                known(input->seen());
-            if (input->awaits(slot)) known(input->since());
-        }
-    }
-    for (const Tap* tap : schedule_->taps)
-        if (tap->source() == &slot) known(tap->lastStamp());
-    for (const Latch& latch : schedule_->latches)
-        if (latch.from == &slot) known(latch.to->stamp);
-    // Without readers, the earlier cycles of the component tell whether there is a value.
-    if (!read && hasRun(step, step)) slot.stamp = clock_.time_ns - clock_.elapsed_ns;
-}
-
-// True if a component has completed an update() in this schedule.
-// @param running the step that is running
-bool Cycle::hasRun(const Step& which, const Step& running) const noexcept {
-    if (frames_->end() - scheduled_end_ >= which.every) return true;
-    return &which < &running && frames_->ended()[&which - schedule_->steps.data()] != 0;
 }
 
 bool Cycle::copy(const Latch& latch) noexcept {
@@ -417,12 +384,11 @@ void Cycle::makeSafe(std::int64_t time_ns) noexcept {
         makeSafe(*step.component, *step.statistics, OnBadOutput::GoOn);
     }
     dropConnected();
-    for (Tap* tap : schedule_->taps) tap->push(clock_.stamp_ns);
+    for (SerializedTap* tap : schedule_->serialized_taps) tap->push(clock_.stamp_ns);
     leaveOut(schedule_->steps.data(),
              frames_->begin({clock_.iteration, clock_.stamp_ns, 0, 0, 0, FrameKind::LastOfLoop}));
     frames_->take();
     frames_->commit(0);
-    ++scheduled_end_;  // no component has run update()
     settle();
 }
 
@@ -430,7 +396,7 @@ void Cycle::noteSpecial() noexcept RTCF_NONBLOCKING {
     const Schedule& schedule = *schedule_;
     special_ = 0;
     if (!schedule.feeds.empty() || !schedule.latches.empty() || !schedule.queues.empty() ||
-        !schedule.taps.empty())
+        !schedule.serialized_taps.empty())
         special_ |= kExchange;
     if (schedule.selective) special_ |= kSelective;
     if (clock_.iteration < warmup_cycles_) special_ |= kWarmUp;

@@ -133,8 +133,6 @@ class Cycle {
     bool copy(const Latch& latch) noexcept;
     bool copyLatches() noexcept;
     void putBack(const Step& step) noexcept;
-    void putBack(const Step& step, OutputBase& output) noexcept;
-    bool hasRun(const Step& which, const Step& running) const noexcept;
     /// Effect of a non-finite value on an output declared Finite(OnNonFinite::Stop): end the loop,
     /// or go on.
     enum class OnBadOutput { End, GoOn };
@@ -146,7 +144,7 @@ class Cycle {
 
     // Features that a plain cycle does not have.
     enum Special : unsigned {
-        kExchange = 1,   // feeds, latches, queues or taps
+        kExchange = 1,   // feeds, latches, queues or serialized taps
         kSelective = 2,  // steps that are not plain
         kWarmUp = 4,     // device statistics do not count yet
         kWaiting = 8,    // inputs wait for their new writers
@@ -171,10 +169,9 @@ class Cycle {
     bool monotonic_ = false;             // loop time is CLOCK_MONOTONIC of this boot
     std::int64_t boundary_time_ns_ = 0;  // loop time of the cycle after the present boundary
     std::int64_t total_elapsed_ns_ = 0;  // sum of elapsed_ns of all cycles
-    std::uint64_t scheduled_end_ = 0;    // frames_->end() minus the cycles of this schedule
     std::vector<Waiting> waiting_;       // inputs that wait for a new writer, in schedule order
     std::size_t next_waiting_ = 0;       // the first one whose component has not run in this cycle
-    std::int64_t given_ticks_ = 0;       // when values were last given to queues and taps
+    std::int64_t given_ticks_ = 0;  // when values were last given to queues and serialized taps
     LoopFault fault_;
     LoopStatistics statistics_;
     DeviceStatistics uncounted_;  // device statistics of cycles that are not counted

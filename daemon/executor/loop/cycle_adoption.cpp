@@ -17,12 +17,9 @@ void Cycle::apply(Adoption& adoption) noexcept {
     for (const Audience& audience : adoption.audiences)
         audience.output->setConnected(audience.present);
     for (StagedValue* value : adoption.values) value->commit();
-    const std::uint64_t cycles = frames_->end() - scheduled_end_;
     if (adoption.frames != nullptr) frames_ = adoption.frames;
-    scheduled_end_ = frames_->end() - cycles;
     if (adoption.schedule != nullptr) {
         schedule_ = adoption.schedule;
-        scheduled_end_ = frames_->end();
         waiting_.swap(adoption.waiting);
         dropConnected();
     }
@@ -58,7 +55,7 @@ void Cycle::changeComponents(Adoption& adoption) noexcept {
         successor.takeOver(Predecessor(*hand_over.previous));
     }
     if (active_) {
-        for (const Leaving& leaving : adoption.leaving) {
+        for (Leaving& leaving : adoption.leaving) {
             // If the component threw, its safe() has already run. A fault of a leaving component
             // does not end the loop.
             leaving.component->setTime(boundary_time_ns_);
@@ -66,7 +63,8 @@ void Cycle::changeComponents(Adoption& adoption) noexcept {
             if (!leaving.component->context().disabled)
                 makeSafe(*leaving.component, *leaving.statistics, OnBadOutput::GoOn);
             for (const Latch& latch : leaving.latches) copy(latch);
-            for (Tap* tap : leaving.taps) tap->push(clock_.stamp_ns);
+            for (SerializedTap* tap : leaving.serialized_taps) tap->push(clock_.stamp_ns);
+            leaving.last_stamp_ns = clock_.stamp_ns;
         }
     }
     std::for_each(new_inputs, adoption.rewires.end(), [](Rewire& each) { each.apply(); });
@@ -112,7 +110,7 @@ bool Cycle::restore(Restoration& restoration) noexcept {
     }
     for (const Restoration::Input& input : restoration.inputs)
         input.put(&input.input->slot(), later);
-    for (Tap* tap : schedule_->taps) tap->forget();
+    for (SerializedTap* tap : schedule_->serialized_taps) tap->forget();
     for (const Restoration::Turn& turn : restoration.turns) {
         turn.context->updated_ns = turn.updated_ns;
         turn.context->elapsed_ns = turn.elapsed_ns;

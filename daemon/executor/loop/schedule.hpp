@@ -9,8 +9,9 @@
 #include <vector>
 
 #include "exchange/injector.hpp"
-#include "exchange/tap.hpp"
+#include "exchange/serialized_tap.hpp"
 #include "loop/faults.hpp"
+#include "loop/frame_tap.hpp"
 #include "rtcf/component.hpp"
 #include "statistics/counter.hpp"
 #include "statistics/histogram.hpp"
@@ -80,7 +81,8 @@ struct Schedule {
     std::vector<Latch> latches;
     std::vector<QueueBase*> queues;  ///< queues fed by components of this loop
     std::vector<Step> steps;
-    std::vector<Tap*> taps;
+    std::vector<SerializedTap*> serialized_taps;
+    std::vector<FrameTap*> frame_taps;
     Source* source = nullptr;  ///< component that paces the loop; null = the clock does
     std::vector<Stretch> stretches;
     bool selective = false;              ///< true = some steps are not plain

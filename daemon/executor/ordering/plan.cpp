@@ -12,10 +12,10 @@ namespace rtcf::executor {
 
 namespace {
 
-// A tap holds the values of half a second, because its reader is a thread that shares the machine
-// with everything else.
+// A serialized tap holds the values of half a second, because its reader is a thread that shares
+// the machine with everything else.
 constexpr double kTapSeconds = 0.5;
-constexpr std::size_t kVariableTapValues = 2;  // number of largest values in a tap of variable size
+constexpr std::size_t kVariableTapValues = 2;  // number of largest values, if they are not flat
 // Taps of larger types hold fewer values, but at least two, because rings are locked memory.
 constexpr std::size_t kMiB = 1024 * 1024;
 constexpr std::size_t kLargestTap = 8 * kMiB;
@@ -23,7 +23,7 @@ constexpr std::size_t kAllTaps = 256 * kMiB;
 
 std::size_t tapCapacity(const TypeInfo& type, double frequency_hz, std::size_t largest) {
     if (!type.flat) return kVariableTapValues * (largest + 24);
-    const std::size_t record = Tap::recordBytes(type);
+    const std::size_t record = SerializedTap::recordBytes(type);
     const auto values =
         static_cast<std::size_t>(std::clamp(frequency_hz * kTapSeconds, 64.0, 16384.0));
     return std::min(record * values, kLargestTap);
@@ -94,24 +94,42 @@ class Builder {
     }
 
     void addTap(const std::string& key, const std::string& name, const Writer& writer) {
-        const OutputBase& output = *writer.output;
-        const std::size_t capacity =
-            tapCapacity(output.type(), frequency_hz_, bridge_.largest_message);
-        std::shared_ptr<Tap> tap;
-        if (const auto found = previous_.taps.find(key);
-            found != previous_.taps.end() && found->second->source() == output.slot().get() &&
-            (output.type().fixed_size || found->second->largest() == bridge_.largest_message)) {
+        const std::shared_ptr<const SlotHeader> slot = writer.output->slot();
+        const std::uint32_t decimation = decimated_.matches(name) ? bridge_.decimation : 1;
+        if (writer.output->type().fixed_size) {
+            const auto found = previous_.frame_taps.find(key);
+            const std::shared_ptr<FrameTap> tap =
+                found != previous_.frame_taps.end() && found->second->source() == slot.get()
+                    ? found->second
+                    : std::make_shared<FrameTap>(name, writer.output->type(), slot);
+            tap->setDecimation(decimation);
+            plan_.schedule.frame_taps.push_back(tap.get());
+            plan_.frame_taps.emplace(key, tap);
+        } else {
+            const std::shared_ptr<SerializedTap> tap = serializedTap(key, name, *writer.output);
+            tap->setDecimation(decimation);
+            plan_.schedule.serialized_taps.push_back(tap.get());
+            plan_.serialized_taps.emplace(key, tap);
+        }
+    }
+
+    std::shared_ptr<SerializedTap> serializedTap(const std::string& key, const std::string& name,
+                                                 const OutputBase& output) {
+        const std::size_t largest = bridge_.largest_message;
+        const std::size_t capacity = tapCapacity(output.type(), frequency_hz_, largest);
+        std::shared_ptr<SerializedTap> tap;
+        if (const auto found = previous_.serialized_taps.find(key);
+            found != previous_.serialized_taps.end() &&
+            found->second->source() == output.slot().get() && found->second->largest() == largest) {
             tap = found->second;
         } else {
-            tap = std::make_shared<Tap>(name, output.type(), output.slot(), capacity,
-                                        bridge_.largest_message);
+            tap = std::make_shared<SerializedTap>(name, output.type(), output.slot(), capacity,
+                                                  largest);
         }
         // Also counts the size that the tap would have at the present frequency, so that the same
         // graph can be built again later.
-        requireRoom(std::max(tap->ringBytes(), Tap::ringBytes(output.type(), capacity)));
-        tap->setDecimation(decimated_.matches(name) ? bridge_.decimation : 1);
-        plan_.schedule.taps.push_back(tap.get());
-        plan_.taps.emplace(key, std::move(tap));
+        requireRoom(std::max(tap->ringBytes(), SerializedTap::ringBytes(output.type(), capacity)));
+        return tap;
     }
 
     void requireRoom(std::size_t ring_bytes) {
@@ -119,9 +137,9 @@ class Builder {
         if (tap_bytes_ <= kAllTaps) return;
         throw Error(
             ErrorKind::ResourceExhausted,
-            fmt::format("the rings of all published outputs (taps) would take more than the {} MiB "
-                        "of locked memory allowed: reduce the whitelist, the frequency or the "
-                        "largest message",
+            fmt::format("the rings of all published outputs of variable size (taps) would take "
+                        "more than the {} MiB of locked memory allowed: reduce the whitelist, the "
+                        "frequency or the largest message",
                         kAllTaps / kMiB));
     }
 
@@ -253,15 +271,17 @@ class Builder {
         for (const std::size_t index : previous_.wiring.order) {
             const Instance& instance = *previous_.graph.nodes()[index].instance;
             if (staying.count(&instance) != 0) continue;
-            Leaving leaving{&instance.component(), instance.statistics().get(), {}, {}};
+            Leaving leaving{&instance.component(), instance.statistics().get(), {}, {}, {}};
             for (const OutputBase* output : instance.component().outputs()) {
                 const SlotHeader* const slot = output->slot().get();
                 if (const auto found = previous_.latches.find(slot);
                     found != previous_.latches.end())
                     leaving.latches.push_back(
                         {&output->type(), found->second.get(), slot, leaving.component});
-                for (const auto& [topic, tap] : previous_.taps)
-                    if (tap->source() == slot) leaving.taps.push_back(tap.get());
+                for (const auto& [topic, tap] : previous_.serialized_taps)
+                    if (tap->source() == slot) leaving.serialized_taps.push_back(tap.get());
+                for (const auto& [topic, tap] : previous_.frame_taps)
+                    if (tap->source() == slot) leaving.frame_taps.push_back(tap.get());
             }
             adoption_.leaving.push_back(std::move(leaving));
         }
@@ -293,7 +313,8 @@ void Plan::noteHeld(const Adoption& adoption, const Plan& previous) noexcept {
 
 BridgeTable Plan::bridgeTable() const {
     BridgeTable table;
-    for (const auto& [name, tap] : taps) table.outputs.push_back(tap);
+    for (const auto& [name, tap] : serialized_taps) table.outputs.push_back(tap);
+    for (const auto& [name, tap] : frame_taps) table.outputs.push_back(tap);
     for (const auto& [name, injector] : injectors) {
         if (wiring.connections.at(name).subscribed) table.inputs.push_back(injector);
     }

@@ -34,8 +34,11 @@ struct Plan {
     Schedule schedule;
     std::map<const InputPort*, Binding> bindings;
     std::map<const SlotHeader*, std::shared_ptr<SlotHeader>> latches;  ///< by the writer's slot
-    /// By topic; by topic and port if the topic has several writers.
-    std::map<std::string, std::shared_ptr<Tap>> taps;
+    /// @name By topic; by topic and port if the topic has several writers.
+    /// @{
+    std::map<std::string, std::shared_ptr<SerializedTap>> serialized_taps;
+    std::map<std::string, std::shared_ptr<FrameTap>> frame_taps;
+    /// @}
     std::map<std::string, std::shared_ptr<Injector>> injectors;  ///< by topic
 
     /// Records the earlier values that inputs still refer to. After the loop has adopted the plan.
@@ -46,7 +49,7 @@ struct Plan {
 
 /// Builds a plan.
 /// @param previous the plan that the loop executes
-/// @param frequency_hz the loop's frequency, for the sizes of taps
+/// @param frequency_hz the loop's frequency, for the sizes of serialized taps
 /// @param adoption receives the schedule and the inputs to rewire
 /// @param bridge decimation and sizes of values that leave and enter the loop
 /// @throws Error if the taps' rings would take too much memory

@@ -105,7 +105,7 @@ void FaultReports::reportLostMessages(const Plan& plan, std::size_t largest) {
     const std::int64_t now = monotonicNow();
     if (now < sizes_due_ns_) return;
     sizes_due_ns_ = now + kSecond / 2;
-    sizes_.look(plan.taps, plan.injectors, largest, now);
+    sizes_.look(plan.serialized_taps, plan.injectors, largest, now);
 }
 
 }  // namespace rtcf::executor

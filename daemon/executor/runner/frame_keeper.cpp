@@ -29,11 +29,12 @@ std::shared_ptr<const FrameTable> FrameKeeper::prepare(const Plan& plan, double 
     return table;
 }
 
-void FrameKeeper::publish(std::shared_ptr<const FrameTable> table) noexcept {
+void FrameKeeper::publish(std::shared_ptr<const FrameTable> table, bool restored) noexcept {
     const std::shared_ptr<const FrameTable> previous = std::exchange(table_, std::move(table));
     logErrors(log_, "publishing frames", [&] {
         const CycleFrames frames{table_->ring, table_->components};
         statistics_.follow(frames);
+        for (const auto& [tap, output] : table_->taps) tap->follow(table_->ring, output, restored);
         {
             const std::lock_guard<std::mutex> lock(mutex_);
             cycles_.follow(frames);
@@ -91,7 +92,9 @@ void FrameKeeper::awaitReaders() {
 // Number of frames that the slowest reader has yet to take.
 std::uint64_t FrameKeeper::waiting() const {
     const std::lock_guard<std::mutex> lock(mutex_);
-    return std::max(table_->ring->waiting(), reads_cycles_ ? cycles_.waiting() : 0);
+    std::uint64_t most = std::max(table_->ring->waiting(), reads_cycles_ ? cycles_.waiting() : 0);
+    for (const auto& each : table_->taps) most = std::max(most, each.tap->waiting());
+    return most;
 }
 
 std::vector<std::shared_ptr<const FrameTable>> FrameKeeper::takePublished() {

@@ -90,9 +90,15 @@ std::vector<std::string> Transactions::adopt(Change change, const Progress& prog
     plan->noteHeld(adoption, *plan_);
     // Destroyed last: leaving components use it until they are cleaned up.
     const std::unique_ptr<Plan> previous = plan_.replace(std::move(plan));
-    frames_.publish(std::move(frames));
+    frames_.publish(std::move(frames), change.restoration != nullptr);
     // From here on, an error does not undo the change.
-    logErrors(log_, "publishing a change", [&] { adopted(change); });
+    logErrors(log_, "publishing a change", [&] {
+        for (const Leaving& leaving : adoption.leaving) {
+            if (!leaving.last_stamp_ns) continue;
+            for (FrameTap* tap : leaving.frame_taps) tap->finish(*leaving.last_stamp_ns);
+        }
+        adopted(change);
+    });
     // The leaving components are out of the loop, so their hooks may take long.
     for (const auto& instance : change.leaving) {
         control_.reportFaults(*instance);
@@ -146,7 +152,8 @@ void Transactions::checkTaps(const Wiring& wiring) const {
     for (const auto& [name, connection] : wiring.connections)
         taps += connection.published ? 1 + connection.others.size() : 0;
     // If the limit was lowered, existing taps may stay, and their number may shrink.
-    if (taps <= most_taps_ || taps <= plan_->taps.size()) return;
+    const std::size_t present = plan_->serialized_taps.size() + plan_->frame_taps.size();
+    if (taps <= most_taps_ || taps <= present) return;
     throw Error(ErrorKind::ResourceExhausted,
                 fmt::format("{} published outputs (taps) are more than the {} allowed: reduce the "
                             "whitelist, or raise taps under [limits] in rtcfd's settings",

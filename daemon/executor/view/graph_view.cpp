@@ -84,7 +84,8 @@ std::shared_ptr<const GraphView> makeGraphView(const Plan& plan, const GraphView
     for (const auto& [name, connection] : plan.wiring.connections) {
         result->connections.emplace(name, viewOf(plan.graph, connection));
     }
-    for (const auto& [name, tap] : plan.taps) result->taps.push_back(tap);
+    for (const auto& [name, tap] : plan.serialized_taps) result->taps.push_back(tap);
+    for (const auto& [name, tap] : plan.frame_taps) result->taps.push_back(tap);
     for (const auto& [name, injector] : plan.injectors) result->injectors.push_back(injector);
     return result;
 }

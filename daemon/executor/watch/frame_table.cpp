@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <utility>
 
 #include "common/error.hpp"
@@ -14,16 +15,29 @@ namespace {
 
 constexpr double kSeconds = 1.0;             // that kept frames hold
 constexpr double kStatisticsSeconds = 0.25;  // of frames for statistics, which count them sooner
+constexpr double kTapSeconds = 0.5;          // of frames for taps
 constexpr std::size_t kNamesInMessage = 8;
 
-// A column and the address of its value.
+// A column and its place in memory.
 struct Candidate {
     FrameColumn column;
-    const void* from;
-    bool needed;  // needed to restore the output after an update() that throws
+    FrameRing::Source source;
+    bool needed;  // for a tap, or to restore the output after an update() that throws
 };
 
+// The slot of an output of fixed size: its stamp and value.
+FrameRing::Source sourceOf(const TypeInfo& type, const SlotHeader& slot) {
+    const auto head = static_cast<std::size_t>(valueOf(type, slot) -
+                                               reinterpret_cast<const std::uint8_t*>(&slot));
+    // As the stamp is a word, slots consist of whole words.
+    constexpr std::size_t kWord = FrameCopy::kWord;
+    static_assert(alignof(SlotHeader) == kWord && sizeof(SlotHeader) == kWord);
+    return {&slot, (head + type.size + kWord - 1) / kWord * kWord, head};
+}
+
 std::vector<Candidate> candidatesOf(const Plan& plan) {
+    std::set<const SlotHeader*> tapped;
+    for (const auto& [topic, tap] : plan.frame_taps) tapped.insert(tap->source());
     std::vector<Candidate> found;
     for (const std::size_t index : plan.wiring.order) {
         const Instance& instance = *plan.graph.nodes()[index].instance;
@@ -35,8 +49,8 @@ std::vector<Candidate> candidatesOf(const Plan& plan) {
             if (!type.fixed_size) continue;
             found.push_back({{instance.fullName(), output.name(), type.name, output.unit(),
                               instance.outputNames()[port], &type, type.size, instance.code()},
-                             valueOf(type, *output.slot()),
-                             !output.staged()});
+                             sourceOf(type, *output.slot()),
+                             !output.staged() || tapped.count(output.slot().get()) != 0});
         }
         for (const StateDeclaration& state : component.states()) {
             found.push_back({{instance.fullName(),
@@ -47,7 +61,7 @@ std::vector<Candidate> candidatesOf(const Plan& plan) {
                               nullptr,
                               state.size,
                               instance.code()},
-                             state.value,
+                             {state.value, state.size},
                              false});
         }
     }
@@ -99,6 +113,18 @@ std::vector<Candidate> chosenOf(const Plan& plan, const FrameDemand& demand, Fra
     return found;
 }
 
+// The stamps of outputs of other sizes, which are restored, too, after an update() that throws.
+std::vector<FrameRing::Source> stampsOf(const Plan& plan) {
+    std::vector<FrameRing::Source> found;
+    for (const Step& step : plan.schedule.steps) {
+        for (const OutputBase* output : step.component->outputs()) {
+            if (!output->type().fixed_size && !output->staged())
+                found.push_back({output->slot().get(), sizeof(SlotHeader)});
+        }
+    }
+    return found;
+}
+
 // @param optional size of the values that the settings and watches select, bytes
 std::string shortnessOf(const FrameRing& ring, std::size_t optional, double frequency_hz) {
     const std::size_t bytes = ring.wordsOfFrame() * FrameCopy::kWord;
@@ -121,16 +147,25 @@ std::shared_ptr<const FrameTable> makeFrameTable(const Plan& plan, const FrameDe
     std::size_t optional = 0;
     for (Candidate& candidate : chosenOf(plan, demand, *table)) {
         if (!candidate.needed) optional += candidate.column.size;
-        sources.push_back({candidate.from, candidate.column.size});
+        sources.push_back(candidate.source);
         table->columns.push_back(std::move(candidate.column));
     }
+    for (const auto& [topic, tap] : plan.frame_taps) {
+        const auto source = std::find_if(
+            sources.begin(), sources.end(),
+            [&tap = tap](const FrameRing::Source& each) { return each.from == tap->source(); });
+        table->taps.push_back({tap, static_cast<std::size_t>(source - sources.begin())});
+    }
+    for (const FrameRing::Source& stamp : stampsOf(plan)) sources.push_back(stamp);
     for (const std::size_t index : plan.wiring.order)
         table->components.push_back(plan.graph.nodes()[index].instance->statistics());
     const CycleCounter& counter = demand.counter;
     if (std::any_of(demand.watches.begin(), demand.watches.end(),
                     [](const auto& watch) { return watch.second.turns; }))
         table->turns = {plan.schedule, counter};
-    const double seconds = table->kept ? kSeconds : kStatisticsSeconds;
+    const double seconds = table->kept           ? kSeconds
+                           : table->taps.empty() ? kStatisticsSeconds
+                                                 : kTapSeconds;
     const auto frames = static_cast<std::size_t>(std::ceil(seconds * demand.frequency_hz));
     const std::size_t steps = table->components.size();
     const std::size_t capacity = FrameRing::capacityFor(sources, steps, frames);

@@ -29,7 +29,12 @@ struct Watch {
 using Watches = std::map<std::uint64_t, Watch>;
 
 struct FrameTable {
-    std::vector<FrameColumn> columns;  ///< in schedule order, like the ring's sources
+    /// A tap that reads the frames.
+    struct TapSource {
+        std::shared_ptr<FrameTap> tap;
+        std::size_t output;  ///< number among the ring's sources
+    };
+    std::vector<FrameColumn> columns;  ///< in schedule order, like the ring's first sources
     std::vector<std::string> notes;    ///< omitted values, one line each
     std::string shortness;             ///< message if less than one second is kept; else empty
     std::shared_ptr<FrameRing> ring;
@@ -37,6 +42,7 @@ struct FrameTable {
     std::vector<std::shared_ptr<ComponentStatistics>> components;
     ComponentTurns turns;  ///< empty unless a watch takes them
     Watches watches;       ///< watches that read the ring
+    std::vector<TapSource> taps;
     /// Frames are kept for watches or an incident; else only for the loop and its statistics.
     bool kept = false;
 };
@@ -46,7 +52,8 @@ struct FrameDemand {
     const Watches& watches;
     double frequency_hz;  ///< frequency of the loop; a ring that is kept holds about one second
     /// Most bytes of states and staged outputs per frame, watched or not; 0 = only watched ones.
-    /// Other outputs are always in the frame: the loop restores them after an update() that throws.
+    /// Other outputs are always in the frame: taps publish them, or the loop restores them after an
+    /// update() that throws.
     std::size_t most_bytes;
     const CycleCounter& counter;  ///< counter of the loop
     FrameMemory* memory;          ///< memory that outlives the process; may be null

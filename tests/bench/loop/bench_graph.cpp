@@ -89,6 +89,7 @@ void BenchGraph::adopt(const executor::Graph& graph) {
     loop_.adopt(adoption, kAdoptionTimeoutNs);
     statistics_.follow({frames->ring, frames->components});
     cycles_.follow({frames->ring, frames->components});
+    for (const auto& [tap, output] : frames->taps) tap->follow(frames->ring, output);
     frames_ = std::move(frames);
     plan->noteHeld(adoption, *plan_);
     std::swap(plan_, plan);

@@ -17,7 +17,8 @@
 
 #include "child_process.hpp"
 #include "exchange/injector.hpp"
-#include "exchange/tap.hpp"
+#include "frames/frame_ring.hpp"
+#include "loop/frame_tap.hpp"
 #include "ros/logging/rosout.hpp"
 #include "ros/ros_node.hpp"
 
@@ -28,20 +29,29 @@ class Source {
    public:
     explicit Source(const std::string& topic)
         : slot_(std::make_shared<rtcf::Slot<std_msgs::Float64>>()),
-          tap_(std::make_shared<rtcf::executor::Tap>(topic, rtcf::typeInfo<std_msgs::Float64>(),
-                                                     slot_, 1 << 16)) {}
+          ring_(std::make_shared<rtcf::executor::FrameRing>(
+              std::vector<rtcf::executor::FrameRing::Source>{
+                  {slot_.get(), sizeof *slot_, sizeof(rtcf::SlotHeader)}},
+              0, 4096, rtcf::executor::CycleCounter())),
+          tap_(std::make_shared<rtcf::executor::FrameTap>(
+              topic, rtcf::typeInfo<std_msgs::Float64>(), slot_)) {
+        tap_->follow(ring_, 0);
+    }
 
-    const std::shared_ptr<rtcf::executor::Tap>& tap() const { return tap_; }
+    std::shared_ptr<rtcf::executor::Tap> tap() const { return tap_; }
     /// @param stamp_ns stamp of the cycle
     void write(double value, std::int64_t stamp_ns = 0) {
         slot_->value.data = value;
         ++slot_->stamp;
-        tap_->push(stamp_ns);
+        ring_->begin({0, stamp_ns, 0, 0, 0});
+        ring_->take();
+        ring_->commit(0);
     }
 
    private:
     std::shared_ptr<rtcf::Slot<std_msgs::Float64>> slot_;
-    std::shared_ptr<rtcf::executor::Tap> tap_;
+    std::shared_ptr<rtcf::executor::FrameRing> ring_;
+    std::shared_ptr<rtcf::executor::FrameTap> tap_;
 };
 
 /// An input of the loop: value() is the value read by a cycle.

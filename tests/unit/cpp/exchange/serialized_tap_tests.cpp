@@ -1,4 +1,4 @@
-#include "exchange/tap.hpp"
+#include "exchange/serialized_tap.hpp"
 
 #include <gtest/gtest.h>
 #include <std_msgs/String.h>
@@ -41,6 +41,7 @@ struct rtcf::PortType<rtcf::test::Words>
 namespace rtcf::test {
 namespace {
 
+using executor::SerializedTap;
 using executor::Tap;
 
 template <typename T>
@@ -61,9 +62,9 @@ std::vector<double> takeAll(Tap& tap) {
     return values;
 }
 
-TEST(Tap, PassesEachWrittenValueOnce) {
+TEST(SerializedTap, PassesEachWrittenValueOnce) {
     const auto slot = std::make_shared<Slot<double>>();
-    Tap tap("/x", typeInfo<double>(), slot, 1024);
+    SerializedTap tap("/x", typeInfo<double>(), slot, 1024);
     tap.push(0);
     EXPECT_TRUE(takeAll(tap).empty()) << "nothing was written yet";
     write(slot, 1.0);
@@ -76,9 +77,9 @@ TEST(Tap, PassesEachWrittenValueOnce) {
 }
 
 // A restored value may have the stamp of the one before.
-TEST(Tap, PassesAReplacedValueOfTheSameStamp) {
+TEST(SerializedTap, PassesAReplacedValueOfTheSameStamp) {
     const auto slot = std::make_shared<Slot<double>>();
-    Tap tap("/x", typeInfo<double>(), slot, 1024);
+    SerializedTap tap("/x", typeInfo<double>(), slot, 1024);
     tap.forget();
     tap.push(0);
     EXPECT_TRUE(takeAll(tap).empty()) << "nothing was written yet";
@@ -91,9 +92,9 @@ TEST(Tap, PassesAReplacedValueOfTheSameStamp) {
     EXPECT_EQ(takeAll(tap), (std::vector<double>{1.0, 2.0}));
 }
 
-TEST(Tap, HasTheStampOfTheCycleThatWroteAValue) {
+TEST(SerializedTap, HasTheStampOfTheCycleThatWroteAValue) {
     const auto slot = std::make_shared<Slot<double>>();
-    Tap tap("/x", typeInfo<double>(), slot, 64);
+    SerializedTap tap("/x", typeInfo<double>(), slot, 64);
     for (std::int64_t stamp = 1'700'000'000'000'000'000; stamp < 1'700'000'000'000'000'020;
          ++stamp) {
         write(slot, 1.0);
@@ -106,9 +107,9 @@ TEST(Tap, HasTheStampOfTheCycleThatWroteAValue) {
 }
 
 // Building a message allocates; the cycle only copies the value.
-TEST(Tap, BuildsMessagesInTheReadersThread) {
+TEST(SerializedTap, BuildsMessagesInTheReadersThread) {
     const auto slot = std::make_shared<Slot<Words>>();
-    Tap tap("/x", typeInfo<Words>(), slot, 1024, 64);
+    SerializedTap tap("/x", typeInfo<Words>(), slot, 1024, 64);
     WordsOnRos::converted_by = {};
     std::thread loop([&] {
         for (const std::uint32_t letters : {3U, 5U}) {
@@ -132,9 +133,9 @@ TEST(Tap, BuildsMessagesInTheReadersThread) {
     EXPECT_EQ(stamps, (std::vector<std::int64_t>{3, 5}));
 }
 
-TEST(Tap, CountsMessagesThatCannotBeBuilt) {
+TEST(SerializedTap, CountsMessagesThatCannotBeBuilt) {
     const auto slot = std::make_shared<Slot<Words>>();
-    Tap tap("/x", typeInfo<Words>(), slot, 1024, 64);
+    SerializedTap tap("/x", typeInfo<Words>(), slot, 1024, 64);
     for (const std::uint32_t letters : {13U, 100U, 1U}) {
         write(slot, Words{letters});
         tap.push(0);
@@ -148,9 +149,9 @@ TEST(Tap, CountsMessagesThatCannotBeBuilt) {
 }
 
 // A topic that is closed and reopened while its old reader still exists.
-TEST(Tap, OneOfTwoSimultaneousReadersFindsNothing) {
+TEST(SerializedTap, OneOfTwoSimultaneousReadersFindsNothing) {
     const auto slot = std::make_shared<Slot<double>>();
-    Tap tap("/x", typeInfo<double>(), slot, 1024);
+    SerializedTap tap("/x", typeInfo<double>(), slot, 1024);
     for (const double value : {1.0, 2.0}) {
         write(slot, value);
         tap.push(0);
@@ -164,9 +165,9 @@ TEST(Tap, OneOfTwoSimultaneousReadersFindsNothing) {
     EXPECT_EQ(takeAll(tap), std::vector<double>{2.0});
 }
 
-TEST(Tap, PassesTheFirstValueAndThenEachNth) {
+TEST(SerializedTap, PassesTheFirstValueAndThenEachNth) {
     const auto slot = std::make_shared<Slot<double>>();
-    Tap tap("/x", typeInfo<double>(), slot, 1024);
+    SerializedTap tap("/x", typeInfo<double>(), slot, 1024);
     tap.setDecimation(3);
     for (int i = 1; i <= 8; ++i) {
         write(slot, static_cast<double>(i));
@@ -180,9 +181,9 @@ TEST(Tap, PassesTheFirstValueAndThenEachNth) {
     EXPECT_EQ(tap.dropped(), 0U);
 }
 
-TEST(Tap, CountsValuesAboveTheLimit) {
+TEST(SerializedTap, CountsValuesAboveTheLimit) {
     const auto slot = std::make_shared<Slot<std_msgs::String>>();
-    Tap tap("/x", typeInfo<std_msgs::String>(), slot, 1024, 104);
+    SerializedTap tap("/x", typeInfo<std_msgs::String>(), slot, 1024, 104);
     std_msgs::String text;
     text.data.assign(100, 'x');  // plus its length, 4 bytes
     write(slot, text);
@@ -198,10 +199,10 @@ TEST(Tap, CountsValuesAboveTheLimit) {
     EXPECT_FALSE(tap.pop([](const std::uint8_t*, std::uint32_t, std::int64_t) {}));
 }
 
-TEST(Tap, WrapsAroundAtTheEndOfItsRing) {
+TEST(SerializedTap, WrapsAroundAtTheEndOfItsRing) {
     for (const std::size_t capacity : {32, 40, 48, 56, 104}) {
         const auto slot = std::make_shared<Slot<double>>();
-        Tap tap("/x", typeInfo<double>(), slot, capacity);
+        SerializedTap tap("/x", typeInfo<double>(), slot, capacity);
         for (int i = 1; i < 100; ++i) {
             write(slot, static_cast<double>(i));
             tap.push(0);
@@ -212,9 +213,9 @@ TEST(Tap, WrapsAroundAtTheEndOfItsRing) {
     }
 }
 
-TEST(Tap, FullRingDropsTheNewestAndCounts) {
+TEST(SerializedTap, FullRingDropsTheNewestAndCounts) {
     const auto slot = std::make_shared<Slot<double>>();
-    Tap tap("/x", typeInfo<double>(), slot, 128);  // five records of 16 + 8 bytes
+    SerializedTap tap("/x", typeInfo<double>(), slot, 128);  // five records of 16 + 8 bytes
     for (int i = 1; i <= 7; ++i) {
         write(slot, static_cast<double>(i));
         tap.push(0);
@@ -226,17 +227,17 @@ TEST(Tap, FullRingDropsTheNewestAndCounts) {
     EXPECT_EQ(takeAll(tap), std::vector<double>{8.0});
 }
 
-TEST(Tap, RingTooSmallForAValueIsEnlarged) {
+TEST(SerializedTap, RingTooSmallForAValueIsEnlarged) {
     const auto slot = std::make_shared<Slot<double>>();
-    Tap tap("/x", typeInfo<double>(), slot, 1);
+    SerializedTap tap("/x", typeInfo<double>(), slot, 1);
     write(slot, 1.0);
     tap.push(0);
     EXPECT_EQ(takeAll(tap).size(), 1U);
 }
 
-TEST(Tap, ValueLargerThanTheRingIsDroppedAndCounted) {
+TEST(SerializedTap, ValueLargerThanTheRingIsDroppedAndCounted) {
     const auto slot = std::make_shared<Slot<std_msgs::String>>();
-    Tap tap("/x", typeInfo<std_msgs::String>(), slot, 128);
+    SerializedTap tap("/x", typeInfo<std_msgs::String>(), slot, 128);
     std_msgs::String text;
     text.data.assign(200, 'x');
     write(slot, text);
@@ -249,9 +250,9 @@ TEST(Tap, ValueLargerThanTheRingIsDroppedAndCounted) {
         [](const std::uint8_t*, std::uint32_t size, std::int64_t) { EXPECT_EQ(size, 9U); }));
 }
 
-TEST(Tap, ValuesOfAllLengthsAreUnchanged) {
+TEST(SerializedTap, ValuesOfAllLengthsAreUnchanged) {
     const auto slot = std::make_shared<Slot<std_msgs::String>>();
-    Tap tap("/x", typeInfo<std_msgs::String>(), slot, 256);
+    SerializedTap tap("/x", typeInfo<std_msgs::String>(), slot, 256);
     for (std::size_t length = 0; length < 500; ++length) {
         std_msgs::String text;
         text.data.assign(length % 90, static_cast<char>('a' + length % 26));
@@ -266,10 +267,10 @@ TEST(Tap, ValuesOfAllLengthsAreUnchanged) {
     EXPECT_EQ(tap.dropped(), 0U);
 }
 
-TEST(Tap, ConsumerInAnotherThreadGetsAllValuesNotDropped) {
+TEST(SerializedTap, ConsumerInAnotherThreadGetsAllValuesNotDropped) {
     constexpr int kCount = 100'000;
     const auto slot = std::make_shared<Slot<double>>();
-    Tap tap("/x", typeInfo<double>(), slot, 1000);
+    SerializedTap tap("/x", typeInfo<double>(), slot, 1000);
     std::atomic<bool> done{false};
     std::thread producer([&] {
         for (int i = 1; i <= kCount; ++i) {

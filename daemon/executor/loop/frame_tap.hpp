@@ -1,0 +1,90 @@
+/// @file
+/// The tap of a type whose messages all have one size. Its values are in the loop's frames, so it
+/// costs the cycle nothing: the reader's thread finds new values there by their stamps, and builds
+/// the messages.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "exchange/tap.hpp"
+#include "frames/frame_ring.hpp"
+#include "statistics/counter.hpp"
+
+namespace rtcf::executor {
+
+class FrameTap final : public Tap {
+   public:
+    /// @param topic  mapped name of the connection
+    /// @param type   type of the output, of fixed size
+    /// @param source slot of the output; the tap keeps it alive
+    FrameTap(std::string topic, const TypeInfo& type, std::shared_ptr<const SlotHeader> source);
+
+    /// @name Graph thread
+    /// @{
+    /// Goes on with the frames of a ring, from FrameRing::base() on, after all frames so far. Does
+    /// nothing if the tap follows this ring already, unless `replaced`.
+    /// @param ring     the loop has begun to fill it
+    /// @param output   number of the output among the ring's sources
+    /// @param replaced the present value is new, whatever its stamp: it was restored
+    void follow(std::shared_ptr<const FrameRing> ring, std::size_t output, bool replaced = false);
+    /// Follows a move of the loop's time by `by` ns. Between two cycles.
+    void moveTime(std::int64_t by);
+    /// Adds the present value as the last one. The output's component has left the loop.
+    /// @param stamp_ns ROS time of the value
+    void finish(std::int64_t stamp_ns);
+    /// @}
+
+    bool pop(const Use& use) override;
+    std::uint64_t dropped() const noexcept override { return dropped_.value(); }
+    std::uint64_t tooLarge() const noexcept override { return 0; }
+    /// Number of frames that the reader has yet to take; 0 without a reader. Any thread.
+    std::uint64_t waiting() const;
+
+   private:
+    // Frames of a ring, up to the next part's first frame if that is in the same ring.
+    struct Part {
+        std::shared_ptr<const FrameRing> ring;
+        std::size_t output;
+        std::uint64_t first;  // frame
+        // The values' stamps since the frames before:
+        std::int64_t moved_by;  // ns
+        bool replaced;
+    };
+    // Parts that the reader may be behind. A reader that has taken nothing for kPatience, e.g. of a
+    // node that is disabled, must not keep the memory of old rings.
+    static constexpr std::size_t kMostParts = 8;
+    static constexpr std::chrono::seconds kPatience{10};
+
+    void add(Part part);
+    void enterNext();
+    std::uint64_t endOfFirst() const;
+    void lose(std::uint64_t frames);
+    bool findNext();
+    bool isDue();
+    bool build();
+
+    std::mutex consumer_;       // held in pop()
+    mutable std::mutex mutex_;  // protects the following; message_ also needs consumer_
+    std::deque<Part> parts_;    // the first one is being read
+    std::uint64_t next_ = 0;    // next frame of the first part
+    std::uint64_t lost_ = 0;    // frames that were overwritten since the last one read
+    std::int64_t last_stamp_ = 0;
+    std::uint32_t passed_over_;          // values skipped since the last one taken
+    std::shared_ptr<SlotHeader> value_;  // the last value read
+    std::int64_t stamp_ns_ = 0;          // its ROS time
+    std::shared_ptr<SlotHeader> final_;  // of finish(); null = none
+    std::int64_t final_stamp_ns_ = 0;
+    std::chrono::steady_clock::time_point popped_at_;
+    bool popped_ = false;
+    std::vector<std::uint8_t> message_;
+    Counter dropped_;
+};
+
+}  // namespace rtcf::executor
