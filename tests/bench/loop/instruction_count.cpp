@@ -3,7 +3,7 @@
 // instructions so far. The loop's statistics, its calculation duration and that of each
 // component, are then instruction counts, exact and reproducible. `whole` is a full step,
 // including the pacing. Prints JSON. x86-64 only.
-// Usage: instruction_count LIBRARY fig1|mapped|CHAIN [CYCLES]
+// Usage: instruction_count LIBRARY fig1|published|subscribed|message|LENGTH [CYCLES]
 #include <fmt/format.h>
 #include <sys/ptrace.h>
 #include <sys/user.h>
@@ -15,6 +15,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <exception>
+#include <map>
 #include <string>
 
 #include "bench_graph.hpp"
@@ -22,15 +23,23 @@
 
 namespace {
 
-constexpr const char* kTopics = ".*R3_G2H1|.*R1_H1R2|.*G2_R2";
+// Variants of Fig. 1, with their mapped connections: none, three outputs, or one input, in the last
+// variant with a message in each cycle.
+const std::map<std::string, std::string> kVariants{
+    {"fig1", ""},
+    {"published", ".*R3_G2H1|.*R1_H1R2|.*H1_F1"},
+    {"subscribed", ".*G2_R2"},
+    {"message", ".*G2_R2"},
+};
 constexpr std::uint64_t kWarmUp = 10;  // cycles
 
 // The child: stops itself before and after the counted part.
 int runCounted(const std::string& library, const std::string& which, std::uint64_t cycles) {
     using namespace rtcf;
-    const bool paper = which == "fig1" || which == "mapped";
+    const auto variant = kVariants.find(which);
+    const bool paper = variant != kVariants.end();
     bench::BenchGraph graph(paper ? bench::paperGraph() : bench::chain(std::stoul(which)), library,
-                            which == "mapped" ? kTopics : "");
+                            paper ? variant->second : "");
     executor::LoopSettings settings;
     settings.warmup_cycles = kWarmUp;
     graph.loop().beginStepping(settings, graph.loop().stops());
@@ -45,7 +54,7 @@ int runCounted(const std::string& library, const std::string& which, std::uint64
     };
     std::int64_t whole = 0;
     for (std::uint64_t i = 0; i < cycles; ++i) {
-        graph.deliver();
+        if (which == "message") graph.deliver();
         whole += taken(1) - taken(0);
     }
     raise(SIGSTOP);
@@ -106,7 +115,9 @@ bool count(pid_t child) {
 
 int main(int argc, char** argv) try {
     if (argc < 3 || argc > 4) {
-        std::fputs("usage: instruction_count LIBRARY fig1|mapped|LENGTH [CYCLES]\n", stderr);
+        std::fputs(
+            "usage: instruction_count LIBRARY fig1|published|subscribed|message|LENGTH [CYCLES]\n",
+            stderr);
         return 2;
     }
     const std::uint64_t cycles = argc == 4 ? std::stoull(argv[3]) : 50;
