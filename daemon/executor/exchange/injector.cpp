@@ -1,5 +1,7 @@
 #include "exchange/injector.hpp"
 
+#include <utility>
+
 namespace rtcf::executor {
 
 Injector::Injector(std::string topic, const TypeInfo& type)
@@ -61,6 +63,11 @@ void Injector::deliverUntil(std::int64_t arrived_ns, double rate) {
     }
 }
 
+void Injector::setAttention(std::shared_ptr<Attention> attention) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    attention_ = std::move(attention);
+}
+
 void Injector::setBacklogs(std::vector<std::shared_ptr<Backlog>> backlogs) {
     const std::lock_guard<std::mutex> lock(mutex_);
     backlogs_ = std::move(backlogs);
@@ -83,6 +90,7 @@ bool Injector::store(const std::uint8_t* bytes, std::uint32_t size, std::int64_t
     for (const auto& backlog : backlogs_) backlog->store(bytes, size, age_ns);
     slots_[back_]->stamp = age_ns;
     const std::uint32_t before = middle_.exchange(back_ | kFresh, std::memory_order_acq_rel);
+    if (attention_ != nullptr) attention_->request(Attention::kArrived);
     if ((before & kFresh) != 0) passOver();
     back_ = before & ~kFresh;
     delivered_.fetch_add(1, std::memory_order_relaxed);

@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "exchange/attention.hpp"
 #include "exchange/backlog.hpp"
 #include "realtime/cycle_counter.hpp"
 #include "rtcf/port.hpp"
@@ -53,6 +54,8 @@ class Injector {
     /// skipped. Queues get all of them. Any thread; not real-time safe.
     /// @param rate loop time per real time; a message's age is its real age times this
     void deliverUntil(std::int64_t arrived_ns, double rate = 0.0);
+    /// Sets the word by which a cycle sees that there is a message. Any thread; not real-time safe.
+    void setAttention(std::shared_ptr<Attention> attention);
     /// Sets the backlogs of queues, which get each message in order. Any thread; not real-time
     /// safe.
     void setBacklogs(std::vector<std::shared_ptr<Backlog>> backlogs);
@@ -116,8 +119,9 @@ class Injector {
     std::uint32_t fixed_size_ = 0;  // size of a message of a type of fixed size, bytes
     std::uint32_t front_ = 0;       // of the cycle thread
     std::atomic<std::uint32_t> middle_{1};
-    std::mutex mutex_;  // of the delivering threads: back_, backlogs_ and waiting_
+    std::mutex mutex_;  // of the delivering threads; protects the members up to waiting_bytes_
     std::uint32_t back_ = 2;
+    std::shared_ptr<Attention> attention_;  // null before the first schedule
     std::vector<std::shared_ptr<Backlog>> backlogs_;
     bool queueing_ = false;
     std::deque<Waiting> waiting_;

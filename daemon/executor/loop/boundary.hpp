@@ -8,6 +8,7 @@
 
 #include <atomic>
 
+#include "exchange/attention.hpp"
 #include "rtcf/realtime.hpp"
 
 namespace rtcf::executor {
@@ -31,17 +32,25 @@ class BoundaryWork {
 /// The place where the work waits.
 class Boundary {
    public:
+    /// @param attention of the cycle thread; outlives this object
+    explicit Boundary(Attention& attention) : attention_(attention) {}
+
     /// @name Graph thread
     /// @{
-    void offer(BoundaryWork& work) noexcept { place_.store(&work, std::memory_order_release); }
+    void offer(BoundaryWork& work) noexcept {
+        place_.store(&work, std::memory_order_release);
+        attention_.request(Attention::kBoundary);
+    }
     bool pending() const noexcept { return place_.load(std::memory_order_acquire) != nullptr; }
     /// Withdraws the work. Waits while it is being performed.
     /// @return false if it has been performed
     bool withdraw(BoundaryWork& work) noexcept {
         while (true) {
             BoundaryWork* expected = &work;
-            if (place_.compare_exchange_strong(expected, nullptr, std::memory_order_acq_rel))
+            if (place_.compare_exchange_strong(expected, nullptr, std::memory_order_acq_rel)) {
+                attention_.take(Attention::kBoundary);
                 return true;
+            }
             if (expected == nullptr) return false;
             sched_yield();  // the work is being performed, which takes a moment
         }
@@ -59,6 +68,7 @@ class Boundary {
         // Claims the work, so that the graph thread cannot withdraw it meanwhile.
         if (!place_.compare_exchange_strong(work, &claimed_, std::memory_order_acq_rel)) return;
         const bool done = work->perform(cycle);
+        if (done) attention_.take(Attention::kBoundary);
         place_.store(done ? nullptr : work, std::memory_order_release);
     }
     /// @}
@@ -67,6 +77,7 @@ class Boundary {
     class Claimed final : public BoundaryWork {
         bool perform(Cycle& /*cycle*/) noexcept override { return true; }
     };
+    Attention& attention_;
     std::atomic<BoundaryWork*> place_{nullptr};
     Claimed claimed_;  // in place_ while the work is being performed
 };

@@ -27,10 +27,15 @@ class DeviceLoan {
 
 }  // namespace
 
-Cycle::Cycle(FlightRecorder& recorder)
+Cycle::Cycle(FlightRecorder& recorder) : Cycle(recorder, std::make_shared<Attention>()) {}
+
+Cycle::Cycle(FlightRecorder& recorder, std::shared_ptr<Attention> attention)
     : schedule_(&empty_),
       frames_(&no_frames_),
+      attention_(*attention),
       notes_(recorder.realtimeNotes()),
+      shared_attention_(std::move(attention)),
+      boundary_(attention_),
       counter_(CycleCounter::calibrate()),
       no_frames_({}, 0, FrameRing::kFewestFrames, counter_) {
     statistics_.adoption.allocate();
@@ -55,7 +60,7 @@ void Cycle::begin(std::int64_t period_ns, std::uint64_t warmup_cycles, std::int6
         step.context->disabled = false;
         step.statistics->faults.clear();
     }
-    noteSpecial();
+    noteWork();
     // Hooks may have written outputs since the last cycle.
     frames_->setBase();
     statistics_.iteration.store(0, std::memory_order_relaxed);
@@ -152,7 +157,7 @@ template <bool Plain>
 
 bool Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NONBLOCKING {
     const std::int64_t begin = readCycleCounter();
-    if (special_ != 0 || boundary_.waiting()) return runSpecial(begin, time_ns, latency_ns);
+    if (attention_.work() != 0) return runSpecial(begin, time_ns, latency_ns);
     setTimes(time_ns);
     notes_.setIteration(clock_.iteration);
     FrameRing::Word* const ended =
@@ -164,32 +169,35 @@ bool Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NON
     return true;
 }
 
-// A cycle with any special feature.
+// A cycle with any work besides its components.
 [[gnu::noinline]] bool Cycle::runSpecial(std::int64_t begin_ticks, std::int64_t time_ns,
                                          std::int64_t latency_ns) noexcept {
+    constexpr unsigned kBefore = Attention::kExchange | Attention::kBoundary | Attention::kArrived;
+    constexpr unsigned kLasting = Attention::kWarmUp | Attention::kWaiting | Attention::kSelective;
     std::int64_t ready = begin_ticks;
-    if ((special_ & kExchange) != 0 || boundary_.waiting()) {
+    if ((attention_.work() & kBefore) != 0) {
         if (!exchange(time_ns)) return false;  // the inputs' values are undefined
         ready = readCycleCounter();  // the exchange is not part of any component's duration
     }
+    const unsigned work = attention_.work();  // a change may have set it
     setTimes(time_ns);
     notes_.setIteration(clock_.iteration);
-    counted_ = (special_ & kWarmUp) == 0;
+    counted_ = (work & Attention::kWarmUp) == 0;
     FrameRing::Word* const ended =
         frames_->begin({clock_.iteration, clock_.stamp_ns, latency_ns, begin_ticks, ready,
                         counted_ ? FrameKind::Counted : FrameKind::WarmUp});
     const std::vector<Step>& steps = schedule_->steps;
-    const bool completed = (special_ & ~kExchange) != 0
-                               ? updateSelective(ended)
+    const bool completed = (work & kLasting) != 0
+                               ? updateSelective(work, ended)
                                : update<true>(steps.data(), steps.data() + steps.size(), ended);
     notes_.leaveComponents();
-    if ((special_ & kExchange) != 0 && completed) {
+    if ((work & Attention::kExchange) != 0 && completed) {
         for (QueueBase* queue : schedule_->queues) queue->receive();
         for (SerializedTap* tap : schedule_->serialized_taps) tap->push(clock_.stamp_ns);
         given_ticks_ = readCycleCounter();
     }
     finish();
-    if ((special_ & (kWarmUp | kWaiting)) != 0) noteSpecial();
+    if ((work & (Attention::kWarmUp | Attention::kWaiting)) != 0) noteWork();
     return true;
 }
 
@@ -211,13 +219,14 @@ bool Cycle::exchange(std::int64_t time_ns) noexcept {
 
 // Runs steps of which some are not plain, or none is, because statistics of devices do not count
 // yet, or inputs wait for their writers.
+// @param work  of the cycle
 // @param ended frame's words for the ends of the steps
 // @return false if a fault ended the loop
-[[gnu::noinline]] bool Cycle::updateSelective(FrameRing::Word* ended) noexcept {
+[[gnu::noinline]] bool Cycle::updateSelective(unsigned work, FrameRing::Word* ended) noexcept {
     next_waiting_ = 0;
-    if ((special_ & kSelective) != 0) total_elapsed_ns_ += clock_.elapsed_ns;
+    if ((work & Attention::kSelective) != 0) total_elapsed_ns_ += clock_.elapsed_ns;
     const Step* const first = schedule_->steps.data();
-    if ((special_ & (kWarmUp | kWaiting)) != 0) {
+    if ((work & (Attention::kWarmUp | Attention::kWaiting)) != 0) {
         const bool completed = updateSelected(first, first + schedule_->steps.size(), ended);
         dropConnected();
         return completed;
@@ -392,18 +401,20 @@ void Cycle::makeSafe(std::int64_t time_ns) noexcept {
     settle();
 }
 
-void Cycle::noteSpecial() noexcept RTCF_NONBLOCKING {
+void Cycle::noteWork() noexcept RTCF_NONBLOCKING {
     const Schedule& schedule = *schedule_;
-    special_ = 0;
-    if (!schedule.feeds.empty() || !schedule.latches.empty() || !schedule.queues.empty() ||
-        !schedule.serialized_taps.empty())
-        special_ |= kExchange;
-    if (schedule.selective) special_ |= kSelective;
-    if (clock_.iteration < warmup_cycles_) special_ |= kWarmUp;
-    if (!waiting_.empty()) special_ |= kWaiting;
+    unsigned work = 0;
+    if (!schedule.latches.empty() || !schedule.queues.empty() || !schedule.serialized_taps.empty())
+        work |= Attention::kExchange;
+    if (schedule.selective) work |= Attention::kSelective;
+    if (clock_.iteration < warmup_cycles_) work |= Attention::kWarmUp;
+    if (!waiting_.empty()) work |= Attention::kWaiting;
+    attention_.setLasting(work);
 }
 
 void Cycle::feed() noexcept RTCF_NONBLOCKING {
+    if ((attention_.work() & Attention::kArrived) == 0) return;
+    attention_.take(Attention::kArrived);
     for (const Feed& feed : schedule_->feeds) {
         if (!feed.injector->adopt(clock_)) continue;
         for (const auto& backlog : feed.backlogs) backlog->enter(clock_.time_ns);

@@ -6,8 +6,10 @@
 
 #include <atomic>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
+#include "exchange/attention.hpp"
 #include "faults/flight_recorder.hpp"
 #include "frames/frame_ring.hpp"
 #include "loop/adoption.hpp"
@@ -55,6 +57,7 @@ class Cycle {
     /// Undoes begin() if no thread can run the cycles.
     void abandon() noexcept { active_ = false; }
     Boundary& boundary() noexcept { return boundary_; }
+    const std::shared_ptr<Attention>& attention() const noexcept { return shared_attention_; }
     /// The fault that ended the loop; after the last cycle.
     const LoopFault& fault() const noexcept { return fault_; }
     /// @}
@@ -110,6 +113,7 @@ class Cycle {
     /// @}
 
    private:
+    Cycle(FlightRecorder& recorder, std::shared_ptr<Attention> attention);
     void setTimes(std::int64_t time_ns) noexcept RTCF_NONBLOCKING {
         clock_.time_ns = time_ns;
         clock_.stamp_ns = time_ns + stamp_offset_ns_.load(std::memory_order_relaxed);
@@ -119,7 +123,7 @@ class Cycle {
     bool runSpecial(std::int64_t begin_ticks, std::int64_t time_ns,
                     std::int64_t latency_ns) noexcept;
     bool exchange(std::int64_t time_ns) noexcept;
-    bool updateSelective(FrameRing::Word* ended) noexcept;
+    bool updateSelective(unsigned work, FrameRing::Word* ended) noexcept;
     void finish() noexcept RTCF_NONBLOCKING;
     template <bool Plain>
     bool update(const Step* next, const Step* end, FrameRing::Word* ended) noexcept;
@@ -139,26 +143,19 @@ class Cycle {
     void commit(Component& component, ComponentStatistics& statistics, OnBadOutput may);
     bool threw(const Step& step, const char* text) noexcept;
     void makeSafe(Component& component, ComponentStatistics& statistics, OnBadOutput may) noexcept;
-    void noteSpecial() noexcept RTCF_NONBLOCKING;
+    void noteWork() noexcept RTCF_NONBLOCKING;
     bool restore(Restoration& restoration) noexcept;
-
-    // Features that a plain cycle does not have.
-    enum Special : unsigned {
-        kExchange = 1,   // feeds, latches, queues or serialized taps
-        kSelective = 2,  // steps that are not plain
-        kWarmUp = 4,     // device statistics do not count yet
-        kWaiting = 8,    // inputs wait for their new writers
-    };
 
     // Members that every cycle touches, in two cache lines: after a sleep, cache misses cost more
     // than computation. Owned by the cycle thread.
     alignas(64) const Schedule* schedule_;
-    FrameRing* frames_;     // filled by the cycles; has a word per step of the schedule
-    unsigned special_ = 0;  // of the next cycle; 0 = it is plain
+    FrameRing* frames_;  // filled by the cycles; has a word per step of the schedule
+    Attention& attention_;
     const FlightRecorder::RealtimeNotes notes_;
     LoopClock clock_;
     // Shared.
     std::atomic<std::int64_t> stamp_offset_ns_{0};  // CLOCK_REALTIME minus CLOCK_MONOTONIC
+    const std::shared_ptr<Attention> shared_attention_;
     Boundary boundary_;
 
     CycleCounter counter_;

@@ -22,8 +22,10 @@ void Cycle::apply(Adoption& adoption) noexcept {
         schedule_ = adoption.schedule;
         waiting_.swap(adoption.waiting);
         dropConnected();
+        // There may be messages for its new feeds.
+        attention_.request(Attention::kArrived);
     }
-    noteSpecial();
+    noteWork();
     if (adoption.frames != nullptr || adoption.restoration != nullptr) frames_->setBase();
     if (adoption.period_ns != 0) {
         clock_.period_ns = adoption.period_ns;

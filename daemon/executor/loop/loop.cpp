@@ -166,6 +166,10 @@ bool Loop::perform(BoundaryWork& work, std::int64_t timeout_ns) {
 }
 
 bool Loop::adopt(Adoption& adoption, std::int64_t timeout_ns) {
+    if (adoption.schedule != nullptr) {
+        for (const Feed& feed : adoption.schedule->feeds)
+            feed.injector->setAttention(cycle_.attention());
+    }
     AdoptionWork work(adoption);
     return perform(work, timeout_ns);
 }
