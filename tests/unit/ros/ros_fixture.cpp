@@ -70,7 +70,8 @@ void RosFixture::startMaster(const std::vector<std::string>& command) {
     master_ = std::make_unique<ChildProcess>(command, environment());
     ASSERT_TRUE(eventually([this] {
         const std::atomic<bool> never{false};
-        rtcf::ros1::MasterClient client({"127.0.0.1", static_cast<std::uint32_t>(port_)}, 500ms,
+        // Longer than the delay of any slow master.
+        rtcf::ros1::MasterClient client({"127.0.0.1", static_cast<std::uint32_t>(port_)}, 3s,
                                         never);
         XmlRpc::XmlRpcValue arguments;
         arguments[0] = std::string("/test");
