@@ -9,7 +9,7 @@ import rtcf
 from rtcf.v1 import runner_pb2
 
 from rtcfctl.terminal.output import Output
-from rtcfctl.terminal.words import amount, counted, microseconds
+from rtcfctl.terminal.words import amount, counted, losses, microseconds
 
 _FIELDS = ("min_ns", "mean_ns", "p50_ns", "p99_ns", "p999_ns", "max_ns")
 _SHORTEST_WATCH_S, _LONGEST_WATCH_S = 0.1, 86400.0
@@ -114,9 +114,8 @@ def _print(found: runner_pb2.RunnerStatistics, output: Output) -> None:
     for count, cause in causes:
         if count:
             output.line(f"{count} of {counted(found.overruns, 'overrun')} {cause}", "yellow")
-    for count, what in ((found.log_dropped, "log record"), (found.tap_dropped, "mapped value")):
-        if count:
-            output.line(f"{counted(count, what)} dropped (ring full)", "yellow")
+    for line in losses(found.log_dropped, found.tap_dropped):
+        output.line(line, "yellow")
     if found.uncounted:
         output.line(
             f"{counted(found.uncounted, 'cycle')} missing in the durations: overwritten before "

@@ -8,7 +8,7 @@ from rtcf.v1 import runner_pb2
 
 from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.plain import enumerator
-from rtcfctl.terminal.words import counted
+from rtcfctl.terminal.words import counted, losses
 
 STYLES = {
     runner_pb2.RUNNER_STATE_RUNNING: "green",
@@ -136,9 +136,8 @@ def _details(runner: runner_pb2.RunnerStatus, output: Output) -> None:
             "`rtcfctl runner set --largest-message`",
             "yellow",
         )
-    for count, what in ((runner.log_dropped, "log record"), (runner.tap_dropped, "mapped value")):
-        if count:
-            output.line(f"{runner.runner}: {counted(count, what)} dropped (ring full)", "yellow")
+    for line in losses(runner.log_dropped, runner.tap_dropped):
+        output.line(f"{runner.runner}: {line}", "yellow")
 
 
 def _cpu(runner: runner_pb2.RunnerStatus) -> str:

@@ -69,6 +69,16 @@ def counted(count: int, what: str) -> str:
     return f"{count} {what}{'' if count == 1 else 's'}"
 
 
+def losses(log_records: int, published: int) -> list[str]:
+    """Return one line for each kind of loss in a runner."""
+    lines = []
+    if log_records:
+        lines.append(f"{counted(log_records, 'log record')} dropped (ring full)")
+    if published:
+        lines.append(f"{counted(published, 'published value')} lost: the ROS node was late")
+    return lines
+
+
 def value(found: graph_pb2.ParameterValue) -> str:
     """Return a parameter's value as it is written on the command line."""
     content: Any = plain(found)

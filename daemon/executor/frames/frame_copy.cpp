@@ -60,6 +60,7 @@ std::uint64_t FrameCopy::loadRest(const std::uint8_t* from, std::size_t size) no
 }
 
 void FrameCopy::copyRest(Word* to) const noexcept RTCF_NONBLOCKING {
+    to += 2 * pairs_.size();
     for (const void* from : singles_) put(*to++, load<std::uint64_t>(from));
     for (const Block& block : blocks_) {
         const std::uint8_t* next = block.from;

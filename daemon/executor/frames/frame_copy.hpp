@@ -49,12 +49,12 @@ class FrameCopy {
         std::atomic_signal_fence(std::memory_order_seq_cst);
         const void* const* from = pairs_.data();
         const void* const* const end = from + pairs_.size();
-        for (; from != end; from += kAtOnce, to += 2 * kAtOnce) {
+        for (Word* next = to; from != end; from += kAtOnce, next += 2 * kAtOnce) {
             static_assert(kAtOnce == 4, "one line per pair below");
-            putPair(to, from[0]);
-            putPair(to + 2, from[1]);
-            putPair(to + 4, from[2]);
-            putPair(to + 6, from[3]);
+            putPair(next, from[0]);
+            putPair(next + 2, from[1]);
+            putPair(next + 4, from[2]);
+            putPair(next + 6, from[3]);
         }
         if (copies_rest_) copyRest(to);
         std::atomic_signal_fence(std::memory_order_seq_cst);

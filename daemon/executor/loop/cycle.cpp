@@ -103,9 +103,6 @@ template <bool Plain>
                                                  FrameRing::Word* ended) noexcept {
     const FlightRecorder::RealtimeNotes notes = notes_;
     const std::int64_t time = clock_.time_ns;
-    const auto note = [](FrameRing::Word& word, std::int64_t ticks) {
-        word.store(static_cast<std::uint64_t>(ticks), std::memory_order_release);
-    };
     while (true) {
         bool goes_on = false;
         try {
@@ -113,7 +110,7 @@ template <bool Plain>
                 if (!Plain) {
                     connectWaiting(*next);
                     if (!due(*next)) {
-                        note(*ended, 0);
+                        ended->store(0, std::memory_order_release);
                         continue;
                     }
                 }
@@ -121,13 +118,13 @@ template <bool Plain>
                 Component& component = *next->component;
                 component.setTime(time);
                 if (Plain) {
-                    component.update();
+                    next->update(&component);
                 } else {
                     const DeviceLoan loan(*next->context, counted_ ? nullptr : &uncounted_);
                     component.update();
                     commit(component, *next->statistics, OnBadOutput::End);
                 }
-                note(*ended, readCycleCounter());
+                noteCycleCounter(*ended);
             }
             return true;
         } catch (const std::exception& error) {
@@ -139,7 +136,7 @@ template <bool Plain>
             leaveOut(next, ended);
             return false;
         }
-        note(*ended, readCycleCounter());
+        noteCycleCounter(*ended);
         ++next;
         ++ended;
     }

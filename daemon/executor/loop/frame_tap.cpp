@@ -8,8 +8,8 @@ namespace rtcf::executor {
 FrameTap::FrameTap(std::string topic, const TypeInfo& type,
                    std::shared_ptr<const SlotHeader> source)
     : Tap(std::move(topic), type, std::move(source)),
-      passed_over_(UINT32_MAX - 1),  // so that the first value is taken
       value_(type.make_slot(nullptr)),
+      passed_over_(UINT32_MAX - 1),  // so that the first value is taken
       popped_at_(std::chrono::steady_clock::now()) {}
 
 void FrameTap::follow(std::shared_ptr<const FrameRing> ring, std::size_t output, bool replaced) {
@@ -76,17 +76,13 @@ bool FrameTap::pop(const Use& use) {
     // If a topic is closed and opened again, a new reader can start before the old one has ended.
     const std::unique_lock<std::mutex> reading(consumer_, std::try_to_lock);
     if (!reading.owns_lock()) return false;
-    std::int64_t stamp_ns = 0;
-    bool built = false;
     {
         const std::lock_guard<std::mutex> lock(mutex_);
         popped_ = true;
         popped_at_ = std::chrono::steady_clock::now();
         if (!findNext()) return false;
-        stamp_ns = stamp_ns_;
-        built = build();
     }
-    if (built) use(message_.data(), static_cast<std::uint32_t>(message_.size()), stamp_ns);
+    if (build()) use(message_.data(), static_cast<std::uint32_t>(message_.size()), stamp_ns_);
     return true;
 }
 

@@ -70,21 +70,22 @@ class FrameTap final : public Tap {
     bool isDue();
     bool build();
 
-    std::mutex consumer_;       // held in pop()
-    mutable std::mutex mutex_;  // protects the following; message_ also needs consumer_
+    std::mutex consumer_;                // held in pop(); protects the following
+    std::shared_ptr<SlotHeader> value_;  // the last value read
+    std::int64_t stamp_ns_ = 0;          // its ROS time
+    std::uint32_t passed_over_;          // values skipped since the last one taken
+    std::vector<std::uint8_t> message_;
+    Counter dropped_;
+
+    mutable std::mutex mutex_;  // protects the following
     std::deque<Part> parts_;    // the first one is being read
     std::uint64_t next_ = 0;    // next frame of the first part
     std::uint64_t lost_ = 0;    // frames that were overwritten since the last one read
     std::int64_t last_stamp_ = 0;
-    std::uint32_t passed_over_;          // values skipped since the last one taken
-    std::shared_ptr<SlotHeader> value_;  // the last value read
-    std::int64_t stamp_ns_ = 0;          // its ROS time
     std::shared_ptr<SlotHeader> final_;  // of finish(); null = none
     std::int64_t final_stamp_ns_ = 0;
     std::chrono::steady_clock::time_point popped_at_;
     bool popped_ = false;
-    std::vector<std::uint8_t> message_;
-    Counter dropped_;
 };
 
 }  // namespace rtcf::executor

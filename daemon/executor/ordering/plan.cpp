@@ -244,9 +244,10 @@ class Builder {
         for (const std::size_t index : plan_.wiring.order) {
             Instance& instance = *plan_.graph.nodes()[index].instance;
             const ComponentDefinition& definition = instance.definition();
-            plan_.schedule.steps.push_back(
-                {&instance.component(), &instance.context(), instance.statistics().get(),
-                 instance.slot(), definition.every, instance.phase(), definition.optional});
+            plan_.schedule.steps.push_back({&instance.component(), updateOf(instance.component()),
+                                            &instance.context(), instance.statistics().get(),
+                                            instance.slot(), definition.every, instance.phase(),
+                                            definition.optional});
             if (Source* source = instance.source(); source != nullptr)
                 plan_.schedule.source = source;
         }

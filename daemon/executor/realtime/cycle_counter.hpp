@@ -4,6 +4,7 @@
 /// CLOCK_MONOTONIC.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <ctime>
 
@@ -42,6 +43,16 @@ inline std::int64_t readCycleCounter() noexcept RTCF_NONBLOCKING {
     return ticks;
 #else
     return monotonicNow();
+#endif
+}
+
+/// Reads the counter into a word that other threads read. Real-time safe.
+inline void noteCycleCounter(std::atomic<std::uint64_t>& word) noexcept RTCF_NONBLOCKING {
+#if defined(__x86_64__) && !defined(__SANITIZE_THREAD__)
+    // As the counter comes in two registers, this is the shortest way.
+    asm volatile("rdtsc; movl %%eax, %0; movl %%edx, 4+%0" : "=m"(word) : : "rax", "rdx");
+#else
+    word.store(static_cast<std::uint64_t>(readCycleCounter()), std::memory_order_release);
 #endif
 }
 

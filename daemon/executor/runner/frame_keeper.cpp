@@ -91,10 +91,10 @@ void FrameKeeper::awaitReaders() {
 
 // Number of frames that the slowest reader has yet to take.
 std::uint64_t FrameKeeper::waiting() const {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    std::uint64_t most = std::max(table_->ring->waiting(), reads_cycles_ ? cycles_.waiting() : 0);
+    std::uint64_t most = table_->ring->waiting();
     for (const auto& each : table_->taps) most = std::max(most, each.tap->waiting());
-    return most;
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return reads_cycles_ ? std::max(most, cycles_.waiting()) : most;
 }
 
 std::vector<std::shared_ptr<const FrameTable>> FrameKeeper::takePublished() {

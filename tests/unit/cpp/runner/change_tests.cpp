@@ -1,7 +1,13 @@
 // Changes of a graph while its loop runs: completely, at one boundary, or not at all.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <atomic>
+#include <chrono>
 #include <cmath>
+#include <cstring>
+#include <thread>
+#include <vector>
 
 #include "support/built_plans.hpp"
 #include "support/runner_fixture.hpp"
@@ -331,6 +337,84 @@ TEST_F(Change, TopicsFollowTheWhitelistOfARunningLoop) {
         [&] { return tap->pop([](const std::uint8_t*, std::uint32_t, std::int64_t) {}); }));
     load(recorder("B"));
     EXPECT_EQ(bridge().tap("/A_out"), tap) << "unchanged topics keep their taps";
+}
+
+// Through changes of the graph, and through a stop and a start.
+TEST_F(Change, EachValueIsPublishedOnce) {
+    configure([](RunnerSettings& settings) { settings.whitelist = "/T_out"; });
+    ComponentDefinition ticker = definition("Ticker", "T");
+    ticker.remaps = {{"out", "T_out"}};
+    load(ticker);
+    const auto tap = bridge().tap("/T_out");
+    ASSERT_NE(tap, nullptr);
+    start();
+    std::atomic<bool> done{false};
+    std::vector<double> taken;
+    std::thread reader([&] {
+        for (bool last = false; !last;) {
+            last = done;
+            while (tap->pop([&](const std::uint8_t* bytes, std::uint32_t size, std::int64_t) {
+                ASSERT_EQ(size, sizeof(double));
+                std::memcpy(&taken.emplace_back(), bytes, size);
+            })) {
+            }
+            std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        }
+    });
+    for (int i = 0; i < 20; ++i) {
+        load(recorder("B"));
+        EXPECT_TRUE(runs(3));
+        if (i % 5 == 4) {
+            stop();
+            start();
+        }
+        unload("/B");
+        EXPECT_TRUE(runs(3));
+    }
+    stop();
+    done = true;
+    reader.join();
+    EXPECT_EQ(tap->dropped(), 0U);
+    ASSERT_GT(taken.size(), 100U);
+    EXPECT_EQ(std::count(taken.begin(), taken.end(), 0.0), 5) << "the first cycles of five loops";
+    for (std::size_t i = 1; i < taken.size(); ++i) {
+        if (taken[i] != 0.0) {
+            EXPECT_EQ(taken[i], taken[i - 1] + 1.0);
+        }
+    }
+}
+
+// A message may come while a change is made, or while the cycle looks for one.
+TEST_F(Change, ALoopSeesTheLastMessage) {
+    startWithA();
+    configure([](RunnerSettings& settings) { settings.whitelist = "/A_in"; });
+    const auto injector = bridge().injector("/A_in");
+    ASSERT_NE(injector, nullptr);
+    std::atomic<bool> sends{true};
+    std::atomic<bool> done{false};
+    std::atomic<double> sent{0.0};
+    std::thread sender([&] {
+        while (!done) {
+            if (sends) {
+                const double number = sent + 1.0;
+                std::uint8_t bytes[sizeof number];
+                std::memcpy(bytes, &number, sizeof number);
+                EXPECT_TRUE(injector->deliver(bytes, sizeof bytes));
+                sent = number;
+            } else {
+                std::this_thread::sleep_for(std::chrono::microseconds(100));
+            }
+        }
+    });
+    for (int i = 0; i < 20; ++i) {
+        load(recorder("B"));
+        sends = false;
+        EXPECT_TRUE(eventually([&] { return value("/A", "in") == sent; })) << "round " << i;
+        sends = true;
+        unload("/B");
+    }
+    done = true;
+    sender.join();
 }
 
 // A writer in the loop ends an input's subscription; its unload restores it.
