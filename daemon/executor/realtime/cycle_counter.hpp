@@ -50,7 +50,12 @@ inline std::int64_t readCycleCounter() noexcept RTCF_NONBLOCKING {
 inline void noteCycleCounter(std::atomic<std::uint64_t>& word) noexcept RTCF_NONBLOCKING {
 #if defined(__x86_64__) && !defined(__SANITIZE_THREAD__)
     // As the counter comes in two registers, this is the shortest way.
-    asm volatile("rdtsc; movl %%eax, %0; movl %%edx, 4+%0" : "=m"(word) : : "rax", "rdx");
+    using Half [[gnu::may_alias]] = std::uint32_t;
+    auto* const halves = reinterpret_cast<Half*>(&word);
+    asm volatile("rdtsc; movl %%eax, %0; movl %%edx, %1"
+                 : "=m"(halves[0]), "=m"(halves[1])
+                 :
+                 : "rax", "rdx");
 #else
     word.store(static_cast<std::uint64_t>(readCycleCounter()), std::memory_order_release);
 #endif

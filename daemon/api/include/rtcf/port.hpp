@@ -99,10 +99,6 @@ class InputPort {
     const SlotHeader& slot() const noexcept RTCF_NONBLOCKING { return *input_.source_; }
     /// Stamp of the value of the last read().
     std::int64_t seen() const noexcept RTCF_NONBLOCKING { return input_.seen_; }
-    /// True if the input waits for the first write into `slot`.
-    bool awaits(const SlotHeader& slot) const noexcept RTCF_NONBLOCKING {
-        return awaited_ == &slot;
-    }
     /// Stamp of the awaited slot when the input was connected to it; 0 = none is awaited.
     std::int64_t since() const noexcept RTCF_NONBLOCKING { return waiting() ? since_ : 0; }
 

@@ -277,5 +277,31 @@ TEST_F(Stepping, StepsWaitForAReaderOfAllCycles) {
     EXPECT_EQ(view.cyclesLost(), 0U);
 }
 
+TEST_F(Stepping, StepsWaitForTheNode) {
+    constexpr std::uint64_t kSteps = 20'000;
+    configure([](RunnerSettings& settings) { settings.whitelist = "/A_out"; });
+    ComponentDefinition ticker = definition("Ticker", "A");
+    ticker.remaps = {{"out", "A_out"}};
+    load(ticker);
+    const auto tap = bridge().tap("/A_out");
+    ASSERT_NE(tap, nullptr);
+    const auto ignore = [](const std::uint8_t*, std::uint32_t, std::int64_t) {};
+    EXPECT_FALSE(tap->pop(ignore)) << "nothing was written yet";
+    std::atomic<bool> done{false};
+    std::uint64_t found = 0;
+    std::thread reader([&] {
+        for (bool last = false; !last;) {
+            last = done;
+            while (tap->pop(ignore)) ++found;
+            std::this_thread::sleep_for(std::chrono::milliseconds(1));
+        }
+    });
+    step(kSteps);
+    done = true;
+    reader.join();
+    EXPECT_EQ(found, kSteps);
+    EXPECT_EQ(tap->dropped(), 0U);
+}
+
 }  // namespace
 }  // namespace rtcf::test
