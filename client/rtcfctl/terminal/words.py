@@ -75,7 +75,7 @@ def losses(log_records: int, published: int) -> list[str]:
     if log_records:
         lines.append(f"{counted(log_records, 'log record')} dropped (ring full)")
     if published:
-        lines.append(f"{counted(published, 'published value')} lost: the ROS node was late")
+        lines.append(f"up to {counted(published, 'published value')} lost: the ROS node was late")
     return lines
 
 

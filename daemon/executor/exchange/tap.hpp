@@ -38,8 +38,8 @@ class Tap {
     /// removed without a call. Of two concurrent calls, one returns false. Not real-time safe.
     /// @return false if there is no value
     virtual bool pop(const Use& use) = 0;
-    /// Number of values that were lost, because the reader was late or their conversion threw. Any
-    /// thread.
+    /// Number of values that were lost, because the reader was late or their conversion threw; at
+    /// most, if they were lost with frames. Any thread.
     virtual std::uint64_t dropped() const noexcept = 0;
     /// Number of values that were lost because their messages were too large. Any thread.
     virtual std::uint64_t tooLarge() const noexcept = 0;

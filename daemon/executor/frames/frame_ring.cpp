@@ -67,7 +67,7 @@ bool FrameRing::read(std::uint64_t number, Frame& frame, std::size_t words) cons
     frame.ticks_ = {signedOf(get(kBegin)), signedOf(get(kReady)), signedOf(get(kEnd))};
     frame.cycle_ = {get(kIteration), signedOf(get(kStamp)), signedOf(get(kLatency)),
                     counter_.toNs(frame.ticks_.end - frame.ticks_.begin)};
-    frame.kind_ = static_cast<FrameKind>(get(kKind));
+    frame.kind_ = static_cast<FrameKind>(get(kKind) & ~kRestored);
     frame.steps_ = steps_;
     frame.words_.resize(words);
     for (std::size_t i = 0; i < words; ++i) frame.words_[i] = get(kHeadWords + i);
@@ -81,7 +81,8 @@ FrameRing::Reading FrameRing::readOutput(std::uint64_t number, std::size_t sourc
     const Word* const values = frame + kHeadWords + steps_;
     const std::uint64_t whole = 2 * number + 2;
     if (frame[kMark].load(std::memory_order_acquire) != whole) return Reading::Overwritten;
-    const bool is_known = signedOf(copy_.first(values, source)) == known;
+    const bool restored = (frame[kKind].load(std::memory_order_acquire) & kRestored) != 0;
+    const bool is_known = !restored && signedOf(copy_.first(values, source)) == known;
     if (!is_known) {
         stamp_ns = signedOf(frame[kStamp].load(std::memory_order_acquire));
         copy_.copyBack(values, source, &to);

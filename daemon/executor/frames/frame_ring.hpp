@@ -33,6 +33,8 @@ struct FrameHead {
     std::int64_t begin_ticks;  ///< the end of the wait
     std::int64_t ready_ticks;  ///< the start of the first component
     FrameKind kind = FrameKind::Counted;
+    /// The values were restored since the cycle before, so that stamps do not tell which are new.
+    bool restored = false;
 };
 
 /// Times of a cycle, ticks of the cycle counter. All 0 in the last frame of a loop.
@@ -95,7 +97,7 @@ class FrameRing {
         put(frame[kIteration], head.iteration);
         put(frame[kStamp], head.stamp_ns);
         put(frame[kLatency], head.latency_ns);
-        put(frame[kKind], head.kind);
+        put(frame[kKind], static_cast<std::uint64_t>(head.kind) | (head.restored ? kRestored : 0));
         put(frame[kBegin], head.begin_ticks);
         put(frame[kReady], head.ready_ticks);
         return frame + kHeadWords;
@@ -166,7 +168,8 @@ class FrameRing {
     bool readTicks(std::uint64_t number, Frame& frame) const { return read(number, frame, steps_); }
     /// Result of readOutput().
     enum class Reading { Overwritten, Known, Copied };
-    /// Copies an output from a committed frame, unless its stamp is `known`.
+    /// Copies an output from a committed frame, unless its stamp is `known` and the frame does not
+    /// follow a restoration.
     /// @param source its number; an output with its header
     /// @param[out] to       SlotHeader and value, as in memory
     /// @param[out] stamp_ns the frame's CycleRecord::stamp_ns
@@ -207,6 +210,9 @@ class FrameRing {
         kEnd,
         kHeadWords
     };
+
+    // Flag in kKind, beside a FrameKind.
+    static constexpr std::uint64_t kRestored = 4;
 
     template <typename T>
     static void put(Word& word, T value) noexcept RTCF_NONBLOCKING {

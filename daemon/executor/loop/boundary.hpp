@@ -38,8 +38,9 @@ class Boundary {
     /// @name Graph thread
     /// @{
     void offer(BoundaryWork& work) noexcept {
-        place_.store(&work, std::memory_order_release);
+        // In this order: a cycle that looks here for another reason may perform the work at once.
         attention_.request(Attention::kBoundary);
+        place_.store(&work, std::memory_order_release);
     }
     bool pending() const noexcept { return place_.load(std::memory_order_acquire) != nullptr; }
     /// Withdraws the work. Waits while it is being performed.

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <exception>
 #include <set>
+#include <utility>
 
 namespace rtcf::executor {
 
@@ -180,9 +181,9 @@ bool Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NON
     setTimes(time_ns);
     notes_.setIteration(clock_.iteration);
     counted_ = (work & Attention::kWarmUp) == 0;
-    FrameRing::Word* const ended =
-        frames_->begin({clock_.iteration, clock_.stamp_ns, latency_ns, begin_ticks, ready,
-                        counted_ ? FrameKind::Counted : FrameKind::WarmUp});
+    FrameRing::Word* const ended = frames_->begin(
+        {clock_.iteration, clock_.stamp_ns, latency_ns, begin_ticks, ready,
+         counted_ ? FrameKind::Counted : FrameKind::WarmUp, std::exchange(restored_, false)});
     const std::vector<Step>& steps = schedule_->steps;
     const bool completed = (work & kLasting) != 0
                                ? updateSelective(work, ended)
@@ -392,7 +393,8 @@ void Cycle::makeSafe(std::int64_t time_ns) noexcept {
     dropConnected();
     for (SerializedTap* tap : schedule_->serialized_taps) tap->push(clock_.stamp_ns);
     leaveOut(schedule_->steps.data(),
-             frames_->begin({clock_.iteration, clock_.stamp_ns, 0, 0, 0, FrameKind::LastOfLoop}));
+             frames_->begin({clock_.iteration, clock_.stamp_ns, 0, 0, 0, FrameKind::LastOfLoop,
+                             std::exchange(restored_, false)}));
     frames_->take();
     frames_->commit(0);
     settle();

@@ -163,6 +163,7 @@ class Cycle {
     std::uint64_t warmup_cycles_ = 0;
     bool active_ = false;                // from begin() to the last cycle
     bool counted_ = false;               // the present cycle's device statistics count
+    bool restored_ = false;              // values were restored since the last cycle
     bool monotonic_ = false;             // loop time is CLOCK_MONOTONIC of this boot
     std::int64_t boundary_time_ns_ = 0;  // loop time of the cycle after the present boundary
     std::int64_t total_elapsed_ns_ = 0;  // sum of elapsed_ns of all cycles

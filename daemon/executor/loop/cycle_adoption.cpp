@@ -113,6 +113,8 @@ bool Cycle::restore(Restoration& restoration) noexcept {
     for (const Restoration::Input& input : restoration.inputs)
         input.put(&input.input->slot(), later);
     for (SerializedTap* tap : schedule_->serialized_taps) tap->forget();
+    restored_ = true;
+    attention_.request(Attention::kArrived);  // a plain cycle does not look at restored_
     for (const Restoration::Turn& turn : restoration.turns) {
         turn.context->updated_ns = turn.updated_ns;
         turn.context->elapsed_ns = turn.elapsed_ns;

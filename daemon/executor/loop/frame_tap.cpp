@@ -12,11 +12,11 @@ FrameTap::FrameTap(std::string topic, const TypeInfo& type,
       passed_over_(UINT32_MAX - 1),  // so that the first value is taken
       popped_at_(std::chrono::steady_clock::now()) {}
 
-void FrameTap::follow(std::shared_ptr<const FrameRing> ring, std::size_t output, bool replaced) {
+void FrameTap::follow(std::shared_ptr<const FrameRing> ring, std::size_t output) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (!replaced && !parts_.empty() && parts_.back().ring == ring) return;
+    if (!parts_.empty() && parts_.back().ring == ring) return;
     const std::uint64_t first = ring->base();
-    add({std::move(ring), output, first, 0, replaced});
+    add({std::move(ring), output, first, 0});
 }
 
 void FrameTap::moveTime(std::int64_t by) {
@@ -25,7 +25,6 @@ void FrameTap::moveTime(std::int64_t by) {
     Part part = parts_.back();
     part.first = part.ring->end();
     part.moved_by = by;
-    part.replaced = false;
     add(std::move(part));
 }
 
@@ -41,23 +40,35 @@ void FrameTap::add(Part part) {
     parts_.push_back(std::move(part));
     if (parts_.size() == 1) next_ = parts_.front().first;
     const bool late = std::chrono::steady_clock::now() - popped_at_ > kPatience;
-    while (parts_.size() > 1 && (late || parts_.size() > kMostParts || next_ == endOfFirst()))
+    while (parts_.size() > 1 && (late || next_ == endOf(0) || parts_.size() > kMostParts ||
+                                 bytesOfOldRings() > kMostBytes))
         enterNext();
 }
 
 // Leaves the first part; its unread frames are lost.
 void FrameTap::enterNext() {
-    lose(endOfFirst() - next_);
+    lose(endOf(0) - next_);
     parts_.pop_front();
     const Part& part = parts_.front();
     next_ = part.first;
-    last_stamp_ = part.replaced ? 0 : movedStamp(last_stamp_, part.moved_by);
+    last_stamp_ = movedStamp(last_stamp_, part.moved_by);
 }
 
-std::uint64_t FrameTap::endOfFirst() const {
-    const FrameRing* const ring = parts_.front().ring.get();
+std::uint64_t FrameTap::endOf(std::size_t part) const {
+    const FrameRing* const ring = parts_[part].ring.get();
     // The loop fills the ring no more if there is another one.
-    return parts_.size() > 1 && parts_[1].ring.get() == ring ? parts_[1].first : ring->end();
+    const bool goes_on = part + 1 < parts_.size() && parts_[part + 1].ring.get() == ring;
+    return goes_on ? parts_[part + 1].first : ring->end();
+}
+
+std::size_t FrameTap::bytesOfOldRings() const {
+    std::size_t words = 0;
+    const FrameRing* counted = parts_.back().ring.get();
+    for (const Part& part : parts_) {
+        if (part.ring.get() == std::exchange(counted, part.ring.get())) continue;
+        words += part.ring->capacity() * part.ring->wordsOfFrame();
+    }
+    return words * FrameCopy::kWord;
 }
 
 void FrameTap::lose(std::uint64_t frames) {
@@ -69,7 +80,9 @@ std::uint64_t FrameTap::waiting() const {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!popped_ || parts_.empty() || std::chrono::steady_clock::now() - popped_at_ > kPatience)
         return 0;
-    return parts_.front().ring->end() - next_;
+    std::uint64_t frames = endOf(0) - next_;
+    for (std::size_t i = 1; i < parts_.size(); ++i) frames += endOf(i) - parts_[i].first;
+    return frames;
 }
 
 bool FrameTap::pop(const Use& use) {
@@ -91,7 +104,7 @@ bool FrameTap::pop(const Use& use) {
 bool FrameTap::findNext() {
     while (!parts_.empty()) {
         const FrameRing& ring = *parts_.front().ring;
-        const std::uint64_t end = endOfFirst();
+        const std::uint64_t end = endOf(0);
         while (next_ < end) {
             const std::uint64_t written = ring.end();
             if (written - next_ > ring.capacity()) {

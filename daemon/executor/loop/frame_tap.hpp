@@ -29,11 +29,10 @@ class FrameTap final : public Tap {
     /// @name Graph thread
     /// @{
     /// Goes on with the frames of a ring, from FrameRing::base() on, after all frames so far. Does
-    /// nothing if the tap follows this ring already, unless `replaced`.
-    /// @param ring     the loop has begun to fill it
-    /// @param output   number of the output among the ring's sources
-    /// @param replaced the present value is new, whatever its stamp: it was restored
-    void follow(std::shared_ptr<const FrameRing> ring, std::size_t output, bool replaced = false);
+    /// nothing if the tap follows this ring already.
+    /// @param ring   the loop has begun to fill it
+    /// @param output number of the output among the ring's sources
+    void follow(std::shared_ptr<const FrameRing> ring, std::size_t output);
     /// Follows a move of the loop's time by `by` ns. Between two cycles.
     void moveTime(std::int64_t by);
     /// Adds the present value as the last one. The output's component has left the loop.
@@ -52,19 +51,19 @@ class FrameTap final : public Tap {
     struct Part {
         std::shared_ptr<const FrameRing> ring;
         std::size_t output;
-        std::uint64_t first;  // frame
-        // The values' stamps since the frames before:
-        std::int64_t moved_by;  // ns
-        bool replaced;
+        std::uint64_t first;    // frame
+        std::int64_t moved_by;  // move of the stamps since the frames before, ns
     };
-    // Parts that the reader may be behind. A reader that has taken nothing for kPatience, e.g. of a
-    // node that is disabled, must not keep the memory of old rings.
-    static constexpr std::size_t kMostParts = 8;
+    // Old rings take memory from new ones, see FrameMemory. So a late reader keeps few of them, and
+    // one that has taken nothing for kPatience, e.g. of a node that is disabled, keeps none.
+    static constexpr std::size_t kMostParts = 7;
+    static constexpr std::size_t kMostBytes = std::size_t{8} * 1024 * 1024;
     static constexpr std::chrono::seconds kPatience{10};
 
     void add(Part part);
     void enterNext();
-    std::uint64_t endOfFirst() const;
+    std::uint64_t endOf(std::size_t part) const;
+    std::size_t bytesOfOldRings() const;
     void lose(std::uint64_t frames);
     bool findNext();
     bool isDue();

@@ -53,8 +53,8 @@ inline auto updateOf(const Component& component) noexcept {
     void (Component::* const update)() = &Component::update;
     std::uintptr_t offset = 0;
     std::memcpy(&offset, &update, sizeof offset);
-#if !defined(__aarch64__)
-    offset -= 1;  // Itanium C++ ABI, 2.3: plus 1 for virtual functions, which arm64 notes elsewhere
+#if !defined(__aarch64__) && !defined(__arm__)
+    offset -= 1;  // Itanium C++ ABI, 2.3: plus 1 for virtual functions, which ARM notes elsewhere
 #endif
     const char* table = nullptr;
     std::memcpy(&table, reinterpret_cast<const char*>(&component), sizeof table);

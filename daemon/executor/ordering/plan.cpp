@@ -314,8 +314,9 @@ void Plan::noteHeld(const Adoption& adoption, const Plan& previous) noexcept {
 
 BridgeTable Plan::bridgeTable() const {
     BridgeTable table;
-    for (const auto& [name, tap] : serialized_taps) table.outputs.push_back(tap);
-    for (const auto& [name, tap] : frame_taps) table.outputs.push_back(tap);
+    std::map<std::string, std::shared_ptr<Tap>> taps(frame_taps.begin(), frame_taps.end());
+    taps.insert(serialized_taps.begin(), serialized_taps.end());
+    for (const auto& [name, tap] : taps) table.outputs.push_back(tap);
     for (const auto& [name, injector] : injectors) {
         if (wiring.connections.at(name).subscribed) table.inputs.push_back(injector);
     }

@@ -29,12 +29,12 @@ std::shared_ptr<const FrameTable> FrameKeeper::prepare(const Plan& plan, double 
     return table;
 }
 
-void FrameKeeper::publish(std::shared_ptr<const FrameTable> table, bool restored) noexcept {
+void FrameKeeper::publish(std::shared_ptr<const FrameTable> table) noexcept {
     const std::shared_ptr<const FrameTable> previous = std::exchange(table_, std::move(table));
     logErrors(log_, "publishing frames", [&] {
         const CycleFrames frames{table_->ring, table_->components};
         statistics_.follow(frames);
-        for (const auto& [tap, output] : table_->taps) tap->follow(table_->ring, output, restored);
+        for (const auto& [tap, output] : table_->taps) tap->follow(table_->ring, output);
         {
             const std::lock_guard<std::mutex> lock(mutex_);
             cycles_.follow(frames);

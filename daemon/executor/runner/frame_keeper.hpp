@@ -43,8 +43,7 @@ class FrameKeeper {
     std::shared_ptr<const FrameTable> prepare(const Plan& plan, double frequency_hz,
                                               std::size_t most_bytes, Adoption& adoption);
     /// Passes a table to readers. After the loop has begun to fill its ring.
-    /// @param restored the values were restored at the boundary, so they are new
-    void publish(std::shared_ptr<const FrameTable> table, bool restored = false) noexcept;
+    void publish(std::shared_ptr<const FrameTable> table) noexcept;
 
     /// Runs steps, which wait for readers of frames and are counted in the statistics; see
     /// Loop::step().

@@ -90,15 +90,15 @@ std::vector<std::string> Transactions::adopt(Change change, const Progress& prog
     plan->noteHeld(adoption, *plan_);
     // Destroyed last: leaving components use it until they are cleaned up.
     const std::unique_ptr<Plan> previous = plan_.replace(std::move(plan));
-    frames_.publish(std::move(frames), change.restoration != nullptr);
+    frames_.publish(std::move(frames));
     // From here on, an error does not undo the change.
-    logErrors(log_, "publishing a change", [&] {
+    logErrors(log_, "publishing last values", [&] {
         for (const Leaving& leaving : adoption.leaving) {
             if (!leaving.last_stamp_ns) continue;
             for (FrameTap* tap : leaving.frame_taps) tap->finish(*leaving.last_stamp_ns);
         }
-        adopted(change);
     });
+    logErrors(log_, "publishing a change", [&] { adopted(change); });
     // The leaving components are out of the loop, so their hooks may take long.
     for (const auto& instance : change.leaving) {
         control_.reportFaults(*instance);

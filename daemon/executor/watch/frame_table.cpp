@@ -16,6 +16,7 @@ namespace {
 constexpr double kSeconds = 1.0;             // that kept frames hold
 constexpr double kStatisticsSeconds = 0.25;  // of frames for statistics, which count them sooner
 constexpr double kTapSeconds = 0.5;          // of frames for taps
+constexpr std::size_t kFewestTapFrames = 64;
 constexpr std::size_t kNamesInMessage = 8;
 
 // A column and its place in memory.
@@ -166,7 +167,8 @@ std::shared_ptr<const FrameTable> makeFrameTable(const Plan& plan, const FrameDe
     const double seconds = table->kept           ? kSeconds
                            : table->taps.empty() ? kStatisticsSeconds
                                                  : kTapSeconds;
-    const auto frames = static_cast<std::size_t>(std::ceil(seconds * demand.frequency_hz));
+    const auto frames = std::max(static_cast<std::size_t>(std::ceil(seconds * demand.frequency_hz)),
+                                 table->taps.empty() ? 0 : kFewestTapFrames);
     const std::size_t steps = table->components.size();
     const std::size_t capacity = FrameRing::capacityFor(sources, steps, frames);
     const FrameTable* const previous = demand.previous;

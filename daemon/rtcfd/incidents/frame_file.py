@@ -54,7 +54,7 @@ class Ring:
     @property
     def last_of_loop(self) -> "NDArray[np.bool_]":
         """Whether a cycle ends its loop: the components' safe() has run in it."""
-        flags: NDArray[np.bool_] = self.words[:, 4] == 1
+        flags: NDArray[np.bool_] = (self.words[:, 4] & 3) == 1
         return flags
 
     def schema(self) -> ports_pb2.PortSchema:

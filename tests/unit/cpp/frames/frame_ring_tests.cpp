@@ -148,6 +148,59 @@ TEST(FrameRing, HasTheEndOfEachComponent) {
     EXPECT_EQ(valueAt<double>(frame, ring.offset(0)), 2.5);
 }
 
+TEST(FrameRing, GivesAnOutputThatItsReaderDoesNotKnow) {
+    using Reading = FrameRing::Reading;
+    Slot<double> slot;
+    FrameRing ring = ringOf({{&slot, sizeof slot, sizeof(SlotHeader)}});
+    slot.stamp = 7;
+    slot.value = 0.5;
+    fill(ring, 0);
+    ring.begin({1, 20, 0, 0, 0, FrameKind::WarmUp, true});
+    ring.take();
+    ring.commit(0);
+    Slot<double> found;
+    std::int64_t stamp_ns = 0;
+    EXPECT_EQ(ring.readOutput(0, 0, 7, found, stamp_ns), Reading::Known);
+    EXPECT_EQ(ring.readOutput(0, 0, 6, found, stamp_ns), Reading::Copied);
+    EXPECT_EQ(found.stamp, 7);
+    EXPECT_EQ(found.value, 0.5);
+    EXPECT_EQ(ring.readOutput(1, 0, 7, found, stamp_ns), Reading::Copied) << "it was restored";
+    EXPECT_EQ(stamp_ns, 20);
+    EXPECT_EQ(ring.readOutput(2, 0, 7, found, stamp_ns), Reading::Overwritten) << "it is not there";
+    Frame frame;
+    ASSERT_TRUE(ring.read(1, frame));
+    EXPECT_FALSE(frame.counted());
+    EXPECT_FALSE(frame.lastOfLoop());
+    EXPECT_EQ(valueAt<double>(frame, ring.offset(0)), 0.5);
+}
+
+// As after an update() that throws.
+TEST(FrameRing, PutsBackAnOutputWithItsStamp) {
+    Slot<double> slot;
+    SlotHeader stamp;
+    FrameRing ring =
+        ringOf({{&slot, sizeof slot, sizeof(SlotHeader)}, {&stamp, sizeof(SlotHeader)}});
+    const auto set = [&](std::int64_t time, double value) {
+        slot.stamp = stamp.stamp = time;
+        slot.value = value;
+    };
+    set(1, 0.5);
+    ring.setBase();
+    set(2, 1.5);
+    ring.putBack(&slot);
+    EXPECT_EQ(slot.stamp, 1);
+    EXPECT_EQ(slot.value, 0.5);
+    EXPECT_EQ(stamp.stamp, 2);
+    set(3, 2.5);
+    fill(ring, 0);
+    set(4, 3.5);
+    ring.putBack(&slot);
+    ring.putBack(&stamp);
+    EXPECT_EQ(slot.stamp, 3);
+    EXPECT_EQ(slot.value, 2.5);
+    EXPECT_EQ(stamp.stamp, 3);
+}
+
 TEST(FrameRing, AFrameThatHasBegunCannotBeRead) {
     FrameRing ring = ringOf({});
     for (std::uint64_t i = 0; i < ring.capacity(); ++i) fill(ring, i);

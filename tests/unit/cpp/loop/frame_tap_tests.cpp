@@ -46,6 +46,7 @@ namespace rtcf::test {
 namespace {
 
 using executor::CycleCounter;
+using executor::FrameKind;
 using executor::FrameRing;
 using executor::FrameTap;
 using executor::Tap;
@@ -64,7 +65,7 @@ struct TappedOutputOf {
     }
     void cycle(std::int64_t stamp_ns = 0) {
         ++time;
-        ring->begin({0, stamp_ns, 0, 0, 0});
+        ring->begin({0, stamp_ns, 0, 0, 0, FrameKind::Counted, std::exchange(restored, false)});
         ring->take();
         ring->commit(0);
     }
@@ -84,11 +85,12 @@ struct TappedOutputOf {
         slot->value = value;
         slot->stamp = stamp;
         ring->setBase();
-        tap.follow(ring, 0, true);
+        restored = true;
     }
 
     const std::size_t capacity;
     std::int64_t time = 1000;  // of the last cycle
+    bool restored = false;     // since the last cycle
     const std::shared_ptr<Slot<T>> slot = std::make_shared<Slot<T>>();
     std::shared_ptr<FrameRing> ring;
     FrameTap tap{"/x", typeInfo<T>(), slot};

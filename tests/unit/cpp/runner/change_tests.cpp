@@ -384,6 +384,45 @@ TEST_F(Change, EachValueIsPublishedOnce) {
     }
 }
 
+// A restoration changes neither graph nor frames, and its values have old stamps.
+TEST_F(Change, EachValueIsPublishedOnceThroughRestorations) {
+    constexpr int kRestorations = 30;
+    configure([](RunnerSettings& settings) {
+        settings.whitelist = "/T_out";
+        settings.frequency_hz = 2000.0;
+    });
+    ComponentDefinition ticker = definition("Ticker", "T");
+    ticker.remaps = {{"out", "T_out"}};
+    load(ticker);
+    const auto tap = bridge().tap("/T_out");
+    ASSERT_NE(tap, nullptr);
+    start();
+    ASSERT_TRUE(runs());
+    const auto snapshot = onGraphThread([&] { return runner().takeSnapshot().snapshot; });
+    std::atomic<bool> done{false};
+    std::vector<double> taken;
+    std::thread reader([&] {
+        for (bool last = false; !last;) {
+            last = done;
+            while (tap->pop([&](const std::uint8_t* bytes, std::uint32_t size, std::int64_t) {
+                std::memcpy(&taken.emplace_back(), bytes, size);
+            })) {
+            }
+        }
+    });
+    for (int i = 0; i < kRestorations; ++i) {
+        EXPECT_TRUE(runs(5));
+        onGraphThread([&] { return runner().restore(snapshot, [](const std::string&) {}); });
+    }
+    stop();
+    done = true;
+    reader.join();
+    EXPECT_EQ(tap->dropped(), 0U);
+    int back = 0;
+    for (std::size_t i = 1; i < taken.size(); ++i) back += taken[i] == taken[i - 1] + 1.0 ? 0 : 1;
+    EXPECT_EQ(back, kRestorations);
+}
+
 // A message may come while a change is made, or while the cycle looks for one.
 TEST_F(Change, ALoopSeesTheLastMessage) {
     startWithA();
