@@ -165,12 +165,23 @@ TEST(FrameTap, KeepsFewRings) {
         loop.write(static_cast<double>(i));
         loop.takeRing();
     }
-    EXPECT_TRUE(rings[12].expired());
-    EXPECT_EQ(popAll(loop.tap), (std::vector<double>{14, 15, 16, 17, 18, 19, 20}));
+    EXPECT_TRUE(rings[13].expired());
+    EXPECT_EQ(popAll(loop.tap), (std::vector<double>{15, 16, 17, 18, 19, 20}));
     EXPECT_TRUE(rings[19].expired()) << "it was read";
     loop.write(21.0);
     EXPECT_EQ(popAll(loop.tap), std::vector<double>{21.0});
-    EXPECT_EQ(loop.tap.dropped(), 13U);
+    EXPECT_EQ(loop.tap.dropped(), 14U);
+}
+
+// Rings of which few have room beside each other.
+TEST(FrameTap, KeepsNoLargeRings) {
+    constexpr std::size_t kFrames = std::size_t{128} * 1024;  // of 80 bytes
+    TappedOutput loop(kFrames);
+    std::weak_ptr<const FrameRing> ring = loop.ring;
+    loop.write(1.0);
+    loop.takeRing();
+    EXPECT_TRUE(ring.expired());
+    EXPECT_TRUE(popAll(loop.tap).empty());
 }
 
 TEST(FrameTap, PassesNoValueAgainWhenTimeMoves) {
