@@ -171,7 +171,7 @@ bool Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NON
 [[gnu::noinline]] bool Cycle::runSpecial(std::int64_t begin_ticks, std::int64_t time_ns,
                                          std::int64_t latency_ns) noexcept {
     constexpr unsigned kBefore = Attention::kExchange | Attention::kBoundary | Attention::kArrived;
-    constexpr unsigned kLasting = Attention::kWarmUp | Attention::kWaiting | Attention::kSelective;
+    constexpr unsigned kNotPlain = Attention::kWarmUp | Attention::kWaiting | Attention::kSelective;
     std::int64_t ready = begin_ticks;
     if ((attention_.work() & kBefore) != 0) {
         if (!exchange(time_ns)) return false;  // the inputs' values are undefined
@@ -185,7 +185,7 @@ bool Cycle::run(std::int64_t time_ns, std::int64_t latency_ns) noexcept RTCF_NON
         {clock_.iteration, clock_.stamp_ns, latency_ns, begin_ticks, ready,
          counted_ ? FrameKind::Counted : FrameKind::WarmUp, std::exchange(restored_, false)});
     const std::vector<Step>& steps = schedule_->steps;
-    const bool completed = (work & kLasting) != 0
+    const bool completed = (work & kNotPlain) != 0
                                ? updateSelective(work, ended)
                                : update<true>(steps.data(), steps.data() + steps.size(), ended);
     notes_.leaveComponents();

@@ -28,6 +28,13 @@ std::string describe(const TypeInfo& type, const TypeInfo& other) {
 [[noreturn]] void refuseTypes(const std::string& name, const std::string& present,
                               const TypeInfo& present_type, const std::string& added,
                               const TypeInfo& added_type) {
+    if (std::string_view(present_type.name) == added_type.name && isPrivate(added_type)) {
+        throw Error(ErrorKind::TypesDiffer,
+                    fmt::format("types differ on {}: {} and {} are {} of different source files or "
+                                "builds; name the fields of the struct, or declare it in a header, "
+                                "in a named namespace",
+                                name, present, added, added_type.name));
+    }
     throw Error(
         ErrorKind::TypesDiffer,
         fmt::format("types differ on {}: {} is {}, {} is {}; remap one of them to another name",

@@ -16,12 +16,15 @@
 ///
 ///         static std::vector<rtcf::ByteCopy> copies() { return {{0, 0, sizeof(Gains)}}; }
 ///
-/// Two components can exchange values of such a type if both were built with the same definition;
-/// rtcf compares name, size and alignment. The type must contain no pointers, as values are copied
-/// byte by byte.
+/// Two components can exchange values of such a type if both were built with the same definition.
+/// rtcf compares name, size and alignment, and the fields of structs that name them (see
+/// state_type.hpp). A type of an anonymous namespace must name its fields to be exchanged between
+/// components of different source files or builds. The type must contain no pointers, as values are
+/// copied byte by byte.
 #pragma once
 
 #include <cxxabi.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
@@ -35,7 +38,9 @@
 #include <utility>
 #include <vector>
 
+#include "rtcf/finite.hpp"
 #include "rtcf/message_type.hpp"
+#include "rtcf/state_type.hpp"
 
 namespace rtcf {
 
@@ -57,6 +62,63 @@ const char* cppName() {
 template <typename T>
 constexpr bool kIsBytes = std::is_trivially_copyable_v<T> && std::is_default_constructible_v<T> &&
                           !std::is_pointer_v<T> && !std::is_reference_v<T>;
+
+/// True for a struct that names its fields, and for sequences of such structs.
+template <typename T, typename = void>
+struct HasLayout : NamesFields<T> {};
+template <typename T>
+struct HasLayout<T, std::void_t<typename T::value_type>> : HasLayout<typename T::value_type> {};
+
+/// A hash of the names, types and offsets of a struct's fields, down to their own fields. Libraries
+/// of different builds, and compilers, have the same hash for the same definition.
+template <typename T>
+std::uint64_t layoutOf();
+
+struct FieldLayouts {
+    const void* object;
+    std::uint64_t hash;
+    template <typename Field>
+    void operator()(const char* name, const Field& field) {
+        const auto offset =
+            reinterpret_cast<const char*>(&field) - static_cast<const char*>(object);
+        hash = stateHash(name, hash);
+        hash = stateHash(layoutOf<Field>(), hash);
+        hash = stateHash(static_cast<std::uint64_t>(offset), hash);
+    }
+};
+
+template <typename T>
+std::uint64_t layoutOf() {
+    if constexpr (NamesFields<T>::value) {
+        T object{};
+        FieldLayouts visitor{&object, stateHash("struct")};
+        object.fields(visitor);
+        return visitor.hash;
+    } else if constexpr (std::is_array_v<T>) {
+        return stateHash(std::extent_v<T>, stateHash("array", layoutOf<std::remove_extent_t<T>>()));
+    } else if constexpr (IsEigenMatrix<T>::value || IsEigenQuaternion<T>::value ||
+                         IsEigenTransform<T>::value ||
+                         (std::is_arithmetic_v<T> && !std::is_same_v<T, long double>)) {
+        return StateType<T>::identity();
+    } else if constexpr (IsSequence<T>::value) {
+        return stateHash(sizeof(T), stateHash("array", layoutOf<typename T::value_type>()));
+    } else {
+        return stateHash(alignof(T), stateHash(sizeof(T), stateHash(ownName<T>())));
+    }
+}
+
+/// The hash as text; empty if there are no named fields.
+template <typename T>
+const char* layoutText() {
+    if constexpr (!HasLayout<T>::value) {
+        return "";
+    } else if constexpr (NamesFields<T>::value) {
+        static const std::string text = fmt::format("{:016x}", layoutOf<T>());
+        return text.c_str();
+    } else {
+        return layoutText<typename T::value_type>();
+    }
+}
 
 /// Conversion of values to bytes: for types of fixed size, and for sequences of them.
 template <typename T>
@@ -143,7 +205,7 @@ struct PortType<T, std::enable_if_t<detail::Bytes<T>::kPossible && !std::is_arit
     using Bytes = detail::Bytes<T>;
     static constexpr bool kFixedSize = Bytes::kFixedSize;
     static const char* name() { return detail::cppName<T>(); }
-    static const char* md5() { return ""; }
+    static const char* md5() { return detail::layoutText<T>(); }
     /// @name Empty: there is no ROS message
     /// @{
     static const char* rosType() { return ""; }

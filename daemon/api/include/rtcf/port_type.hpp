@@ -39,7 +39,9 @@ struct TypeInfo {
     /// message, size and alignment.
     /// @{
     const char* name;  ///< e.g. "std_msgs/Float64", "double"
-    const char* md5;   ///< MD5 of the ROS definition; for other types, of the mapped message
+    /// MD5 of the ROS definition, or of the mapped message. For a struct that names its fields, a
+    /// hash of these.
+    const char* md5;
     std::size_t size;
     std::size_t alignment;
     /// @}
@@ -88,6 +90,13 @@ struct TypeInfo {
     /// real-time safe.
     ByteCopies (*copies)();
 };
+
+/// True if only a type's source file knows its definition: it is of an anonymous namespace, and
+/// does not name its fields. Not real-time: it searches a text.
+inline bool isPrivate(const TypeInfo& type) noexcept {
+    return *type.md5 == '\0' &&
+           std::string_view(type.name).find("(anonymous namespace)") != std::string_view::npos;
+}
 
 /// True if ports of the two types can be connected. Not real-time: it compares texts.
 bool sameType(const TypeInfo& a, const TypeInfo& b) noexcept;
@@ -256,7 +265,8 @@ inline bool sameType(const TypeInfo& a, const TypeInfo& b) noexcept {
     // Each library has its own TypeInfo objects, so compare the content.
     if (&a == &b) return true;
     if (a.size != b.size || a.alignment != b.alignment) return false;
-    if (std::string_view(a.name) == b.name) return std::string_view(a.md5) == b.md5;
+    if (std::string_view(a.name) == b.name)
+        return std::string_view(a.md5) == b.md5 && !isPrivate(a);
     return a.plain && b.plain && std::string_view(a.ros_type) == b.ros_type &&
            std::string_view(a.ros_md5) == b.ros_md5;
 }

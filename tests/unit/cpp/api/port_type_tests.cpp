@@ -9,9 +9,12 @@
 #include <std_msgs/Float64MultiArray.h>
 #include <std_msgs/String.h>
 
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <string>
+#include <type_traits>
 #include <vector>
 
 #include "rtcf/component.hpp"
@@ -222,6 +225,46 @@ TEST(EigenType, MatrixWithoutLayoutIsAcceptedByItsSize) {
     ASSERT_TRUE(deserialize(roscppBytes(message), value));
     EXPECT_EQ(value(0, 1), 2.0);
     EXPECT_EQ(value(1, 0), 3.0);
+}
+
+struct Point {
+    double x = 0.0;
+    double y = 0.0;
+    template <typename Visit>
+    void fields(Visit&& visit) {
+        visit("x", x);
+        visit("y", y);
+    }
+};
+
+// Structs that differ from each other in one thing.
+template <int Variant>
+struct Shape {
+    std::conditional_t<Variant == 1, float, double> width = 0;
+    Point corner;
+    std::array<std::int32_t, Variant == 2 ? 3 : 2> sides{};
+    float edges[2] = {0.0F, 0.0F};  // NOLINT(modernize-avoid-c-arrays): a type that users have
+    template <typename Visit>
+    void fields(Visit&& visit) {
+        visit(Variant == 3 ? "breadth" : "width", width);
+        if (Variant != 4) visit("corner", corner);
+        visit("sides", sides);
+        visit("edges", edges);
+    }
+};
+
+TEST(AnyType, IsKnownByTheFieldsThatItNames) {
+    const std::string layout = typeInfo<Shape<0>>().md5;
+    EXPECT_EQ(layout.size(), 16U);
+    EXPECT_EQ(layout, typeInfo<Shape<5>>().md5) << "the definitions are the same";
+    EXPECT_NE(layout, typeInfo<Shape<1>>().md5);
+    EXPECT_NE(layout, typeInfo<Shape<2>>().md5);
+    EXPECT_NE(layout, typeInfo<Shape<3>>().md5);
+    EXPECT_NE(layout, typeInfo<Shape<4>>().md5);
+    using Shapes = std::array<Shape<0>, 2>;
+    EXPECT_EQ(layout, typeInfo<Shapes>().md5);
+    EXPECT_EQ(layout, typeInfo<std::vector<Shapes>>().md5);
+    EXPECT_STREQ(typeInfo<std::string>().md5, "");
 }
 
 TEST(AnyType, IsCopiedByteByByte) {

@@ -6,6 +6,8 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <set>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -484,6 +486,32 @@ TEST_F(Change, OutputOfADoubleFeedsAFloat64) {
     load(reader);
     step(4);
     EXPECT_EQ(value("/B", "in"), 4.0);
+}
+
+TEST_F(Change, StructsOfTwoBuildsAreComparedByTheirFields) {
+    const auto loadFrom = [&](int version, const std::string& type, const std::string& name,
+                              const std::set<std::string>& connected) {
+        ComponentDefinition component = definition(type, name);
+        for (const char* port : {"command", "target", "limits"}) {
+            const std::string own = connected.count(port) != 0 ? "" : name + "_";
+            component.remaps.emplace_back(port, own + port);
+        }
+        const std::string file =
+            RTCF_UNIT_COMPONENTS "/versioned_" + std::to_string(version) + ".so";
+        return errorOf([&] {
+            onGraphThread(
+                [&] { return runner().load(component, file, [](const std::string&) {}); });
+        });
+    };
+    EXPECT_EQ(loadFrom(1, "Sender", "S", {"command", "target", "limits"}), "");
+    EXPECT_EQ(loadFrom(1, "Receiver", "A", {"command", "target", "limits"}), "");
+    EXPECT_EQ(loadFrom(2, "Receiver", "B", {"limits"}), "") << "the fields are the same";
+    const std::string target = loadFrom(2, "Receiver", "C", {"target"});
+    EXPECT_NE(target.find("types differ on /target: "), std::string::npos) << target;
+    EXPECT_EQ(loadFrom(2, "Receiver", "C", {"command"}),
+              "types differ on /command: /S.command and /C.command are "
+              "(anonymous namespace)::Command of different source files or builds; name the "
+              "fields of the struct, or declare it in a header, in a named namespace");
 }
 
 // 16 values, not the 1000 of half a second: frames are locked memory.
