@@ -3,7 +3,9 @@
 // instructions so far. The loop's statistics, its calculation duration and that of each
 // component, are then instruction counts, exact and reproducible. `whole` is a full step,
 // including the pacing. Prints JSON. x86-64 only.
-// Usage: instruction_count LIBRARY fig1|published|subscribed|message|LENGTH [CYCLES]
+// Usage: instruction_count LIBRARY fig1|published|subscribed|message|LENGTH [CYCLES | trace]
+// `trace` prints the instructions of one cycle instead, one per line, in hexadecimal numbers: its
+// bytes, rip, rsp, rax, rbx, rcx, rdx, rsi, rdi, rbp, r8 to r15, and the base of fs.
 #include <fmt/format.h>
 #include <sys/ptrace.h>
 #include <sys/user.h>
@@ -34,6 +36,7 @@ const std::map<std::string, std::string> kVariants{
 constexpr std::uint64_t kWarmUp = 10;  // cycles
 
 // The child: stops itself before and after the counted part.
+// @param cycles 0 = one cycle to be traced
 int runCounted(const std::string& library, const std::string& which, std::uint64_t cycles) {
     using namespace rtcf;
     const auto variant = kVariants.find(which);
@@ -46,6 +49,13 @@ int runCounted(const std::string& library, const std::string& which, std::uint64
     graph.loop().step(kWarmUp);
     ptrace(PTRACE_TRACEME, 0, nullptr, nullptr);
     raise(SIGSTOP);
+    if (cycles == 0) {
+        (void)executor::readCycleCounter();
+        graph.loop().step(1);
+        (void)executor::readCycleCounter();
+        raise(SIGSTOP);
+        return 0;
+    }
     // The end of a cycle, after its last counter read, is visible from here only.
     const auto taken = [&](std::uint64_t steps) {
         const std::int64_t begin = executor::readCycleCounter();
@@ -89,13 +99,30 @@ bool readsCounter(pid_t child, const user_regs_struct& registers) {
     return errno == 0 && (word & 0xffff) == kOpcode;
 }
 
+// Prints the instruction that the child is about to execute.
+void print(pid_t child, const user_regs_struct& of) {
+    errno = 0;
+    const auto low = static_cast<unsigned long>(ptrace(PTRACE_PEEKTEXT, child, of.rip, nullptr));
+    const auto high =
+        static_cast<unsigned long>(ptrace(PTRACE_PEEKTEXT, child, of.rip + 8, nullptr));
+    for (unsigned i = 0; i < 8; ++i) fmt::print("{:02x}", (low >> (8 * i)) & 0xff);
+    for (unsigned i = 0; i < 8; ++i) fmt::print("{:02x}", (high >> (8 * i)) & 0xff);
+    for (const unsigned long long value :
+         {of.rip, of.rsp, of.rax, of.rbx, of.rcx, of.rdx, of.rsi, of.rdi, of.rbp, of.r8, of.r9,
+          of.r10, of.r11, of.r12, of.r13, of.r14, of.r15, of.fs_base})
+        fmt::print(" {:x}", value);
+    fmt::print("\n");
+}
+
 // Single-steps the child from its first SIGSTOP to its second.
-bool count(pid_t child) {
+// @param traces prints the instructions
+bool count(pid_t child, bool traces) {
     if (!waitForStop(child)) return false;
     for (std::uint64_t instructions = 0;; ++instructions) {
         user_regs_struct registers{};
         ptrace(PTRACE_GETREGS, child, nullptr, &registers);
         const bool counter = readsCounter(child, registers);
+        if (traces) print(child, registers);
         if (ptrace(PTRACE_SINGLESTEP, child, nullptr, nullptr) != 0) return false;
         int status = 0;
         if (waitpid(child, &status, 0) != child || !WIFSTOPPED(status)) return false;
@@ -120,10 +147,11 @@ int main(int argc, char** argv) try {
             stderr);
         return 2;
     }
-    const std::uint64_t cycles = argc == 4 ? std::stoull(argv[3]) : 50;
+    const bool traces = argc == 4 && std::string(argv[3]) == "trace";
+    const std::uint64_t cycles = traces ? 0 : argc == 4 ? std::stoull(argv[3]) : 50;
     const pid_t child = fork();
     if (child == 0) return runCounted(argv[1], argv[2], cycles);
-    if (count(child)) return 0;
+    if (count(child, traces)) return 0;
     std::fputs("instruction_count: the counted process failed\n", stderr);
     return 1;
 } catch (const std::exception& error) {
