@@ -1,4 +1,4 @@
-"""Number of distinct cache lines that a cycle touches: what it costs after its caches were swept."""
+"""Number of distinct cache lines of a cycle: misses after its caches were swept."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -36,7 +36,7 @@ def _steps(trace: str) -> Iterator[tuple[bytes, dict[str, int]]]:
         registers = {name: int(value, 16) for name, value in zip(_REGISTERS, values, strict=True)}
         steps.append((bytes.fromhex(code), registers))
     reads = [place for place, (code, _) in enumerate(steps) if code.startswith(_RDTSC)]
-    if len(reads) < 4:  # noqa: PLR2004 - two around the cycle, and two in it
+    if len(reads) < 4:  # two around the cycle, and two in it
         raise Failed("the trace contains no cycle")
     yield from steps[reads[1] : reads[-1]]
 
@@ -44,7 +44,7 @@ def _steps(trace: str) -> Iterator[tuple[bytes, dict[str, int]]]:
 def lines_of(trace: str) -> Lines:
     """Return the lines of the traced cycle.  Raises Failed."""
     try:
-        import capstone  # noqa: PLC0415 - only this bench needs it
+        import capstone  # only this bench needs it
     except ImportError as error:
         raise Failed("python3-capstone is not installed") from error
     decoder = capstone.Cs(capstone.CS_ARCH_X86, capstone.CS_MODE_64)
