@@ -9,7 +9,6 @@ FrameTap::FrameTap(std::string topic, const TypeInfo& type,
                    std::shared_ptr<const SlotHeader> source)
     : Tap(std::move(topic), type, std::move(source)),
       value_(type.make_slot(nullptr)),
-      passed_over_(UINT32_MAX - 1),  // so that the first value is taken
       popped_at_(std::chrono::steady_clock::now()) {}
 
 void FrameTap::follow(std::shared_ptr<const FrameRing> ring, std::size_t output) {

@@ -72,7 +72,8 @@ class FrameTap final : public Tap {
     std::mutex consumer_;                // held in pop(); protects the following
     std::shared_ptr<SlotHeader> value_;  // the last value read
     std::int64_t stamp_ns_ = 0;          // its ROS time
-    std::uint32_t passed_over_;          // values skipped since the last one taken
+    // Values skipped since the last one taken; the first one is taken.
+    std::uint32_t passed_over_ = UINT32_MAX - 1;
     std::vector<std::uint8_t> message_;
     Counter dropped_;
 

@@ -57,9 +57,10 @@ inline auto updateOf(const Component& component) noexcept {
     offset -= 1;  // Itanium C++ ABI, 2.3: plus 1 for virtual functions, which ARM notes elsewhere
 #endif
     const char* table = nullptr;
-    std::memcpy(&table, reinterpret_cast<const char*>(&component), sizeof table);
+    std::memcpy(static_cast<void*>(&table), reinterpret_cast<const char*>(&component),
+                sizeof table);
     void (*function)(Component*) = nullptr;
-    std::memcpy(&function, table + offset, sizeof function);
+    std::memcpy(static_cast<void*>(&function), table + offset, sizeof function);
     return function;
 }
 

@@ -164,9 +164,8 @@ std::shared_ptr<const FrameTable> makeFrameTable(const Plan& plan, const FrameDe
     if (std::any_of(demand.watches.begin(), demand.watches.end(),
                     [](const auto& watch) { return watch.second.turns; }))
         table->turns = {plan.schedule, counter};
-    const double seconds = table->kept           ? kSeconds
-                           : table->taps.empty() ? kStatisticsSeconds
-                                                 : kTapSeconds;
+    double seconds = table->taps.empty() ? kStatisticsSeconds : kTapSeconds;
+    if (table->kept) seconds = kSeconds;
     const auto frames = std::max(static_cast<std::size_t>(std::ceil(seconds * demand.frequency_hz)),
                                  table->taps.empty() ? 0 : kFewestTapFrames);
     const std::size_t steps = table->components.size();

@@ -148,7 +148,8 @@ int main(int argc, char** argv) try {
         return 2;
     }
     const bool traces = argc == 4 && std::string(argv[3]) == "trace";
-    const std::uint64_t cycles = traces ? 0 : argc == 4 ? std::stoull(argv[3]) : 50;
+    std::uint64_t cycles = traces ? 0 : 50;
+    if (argc == 4 && !traces) cycles = std::stoull(argv[3]);
     const pid_t child = fork();
     if (child == 0) return runCounted(argv[1], argv[2], cycles);
     if (count(child, traces)) return 0;
