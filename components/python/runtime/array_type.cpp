@@ -76,10 +76,12 @@ std::string nameOfMatrix(const TypeTable& type) {
 }
 
 struct FreeSlot {
-    std::align_val_t alignment;
+    ComponentMemory* memory;
+    std::size_t size;
+    std::size_t alignment;
     void operator()(SlotHeader* slot) const noexcept {
         slot->~SlotHeader();
-        ::operator delete(slot, alignment);
+        detail::releaseTo(memory, slot, size, alignment);
     }
 };
 
@@ -189,12 +191,12 @@ StateDeclaration stateOf(const TypeTable& type) {
 }
 
 std::shared_ptr<SlotHeader> rtcf_python_make_slot(const TypeTable* type, const SlotHeader* sample) {
-    const auto alignment =
-        static_cast<std::align_val_t>(std::max(alignmentOf(*type), alignof(SlotHeader)));
+    const std::size_t alignment = std::max(alignmentOf(*type), alignof(SlotHeader));
     const std::size_t size = valueOffset(*type) + sizeOf(*type);
-    void* const memory = ::operator new(size, alignment);
-    std::memset(memory, 0, size);
-    std::shared_ptr<SlotHeader> slot(new (memory) SlotHeader, FreeSlot{alignment});
+    ComponentMemory* const memory = detail::construction_memory;
+    void* const block = detail::allocateFrom(memory, size, alignment);
+    std::memset(block, 0, size);
+    std::shared_ptr<SlotHeader> slot(new (block) SlotHeader, FreeSlot{memory, size, alignment});
     if (sample != nullptr)
         std::memcpy(valueOf(*type, slot.get()), valueOf(*type, sample), sizeOf(*type));
     return slot;

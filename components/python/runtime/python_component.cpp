@@ -10,7 +10,7 @@ namespace rtcf::python {
 
 namespace {
 
-constexpr std::align_val_t kCacheLine{64};
+constexpr std::size_t kCacheLine = 64;
 
 /// Result of a hook that raises: constant bytes that identify the exception and its line.
 struct Raised {
@@ -34,14 +34,18 @@ bool isMessageOutput(const OutputTable& output) { return output.message != nullp
 
 }  // namespace
 
-PythonComponent::Record::Record(const ComponentTable& table) {
-    const auto size = static_cast<std::size_t>(table.record_size);
-    bytes_.reset(static_cast<std::byte*>(::operator new(size, kCacheLine)));
+PythonComponent::Record::Record(const ComponentTable& table)
+    : Record(table, static_cast<std::size_t>(table.record_size), detail::construction_memory) {}
+
+PythonComponent::Record::Record(const ComponentTable& table, std::size_t size,
+                                ComponentMemory* memory)
+    : bytes_(static_cast<std::byte*>(detail::allocateFrom(memory, size, kCacheLine)),
+             Free{memory, size}) {
     std::memcpy(bytes_.get(), table.record, size);
 }
 
 void PythonComponent::Record::Free::operator()(std::byte* bytes) const noexcept {
-    ::operator delete(bytes, kCacheLine);
+    detail::releaseTo(memory, bytes, size, kCacheLine);
 }
 
 PythonComponent::PythonComponent(const ComponentTable& table)

@@ -37,8 +37,12 @@ class PythonComponent final : public Component {
 
        private:
         struct Free {
+            ComponentMemory* memory;
+            std::size_t size;
             void operator()(std::byte* bytes) const noexcept;
         };
+        Record(const ComponentTable& table, std::size_t size, ComponentMemory* memory);
+
         std::unique_ptr<std::byte, Free> bytes_;
     };
 

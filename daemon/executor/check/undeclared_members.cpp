@@ -1,7 +1,6 @@
 #include "check/undeclared_members.hpp"
 
 #include <fmt/format.h>
-#include <malloc.h>
 
 #include <algorithm>
 
@@ -16,7 +15,7 @@ constexpr std::size_t kWord = 8;  // granularity, as a number rarely changes in 
 UndeclaredMembers::UndeclaredMembers(const Component& component) {
     const void* complete = dynamic_cast<const void*>(&component);  // the complete object
     object_ = static_cast<const std::byte*>(complete);
-    const std::size_t size = malloc_usable_size(const_cast<std::byte*>(object_));
+    const std::size_t size = detail::ObjectHead::of(complete).size;
     before_.assign(object_, object_ + size);
     changed_.resize(size);
     add(&component, sizeof component, "the base class", true);

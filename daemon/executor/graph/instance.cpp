@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/error.hpp"
+#include "realtime/component_arena.hpp"
 
 namespace rtcf::executor {
 
@@ -90,6 +91,7 @@ Instance::Instance(ComponentDefinition definition, std::shared_ptr<const Library
     context_.recorder_slot = slot();
     context_.device = &statistics_->device;
     context_.log = &log;
+    context_.memory = ComponentArena::ofProcess();
     level_.emplace(log.levels(), context_);
     context_.gate = gate;
     for (const auto& [from, to] : definition_.remaps) {

@@ -19,19 +19,22 @@ std::shared_ptr<const ComponentView> viewOf(const GraphNode& node) {
     result->library = instance.library().path();
     result->doc = instance.record().doc;
     const auto& inputs = instance.component().inputs();
+    const auto& outputs = instance.component().outputs();
+    result->ports.reserve(inputs.size() + outputs.size());
     for (std::size_t i = 0; i < inputs.size(); ++i) {
         result->ports.push_back(
             {inputs[i]->name(), false, instance.inputNames()[i], &inputs[i]->type(), {}});
     }
-    const auto& outputs = instance.component().outputs();
     for (std::size_t i = 0; i < outputs.size(); ++i) {
         result->ports.push_back({outputs[i]->name(), true, instance.outputNames()[i],
                                  &outputs[i]->type(), outputs[i]->unit()});
     }
     const auto& parameters = instance.component().parameters();
+    result->parameters.reserve(parameters.size());
     for (std::size_t i = 0; i < parameters.size(); ++i) {
         result->parameters.push_back({parameters[i]->declaration(), instance.parameterValues()[i]});
     }
+    result->states.reserve(instance.component().states().size());
     for (const StateDeclaration& state : instance.component().states()) {
         result->states.push_back(
             {state.name, state.type, state.unit, state.doc, state.print(state.initial.data())});
@@ -49,6 +52,7 @@ ConnectionView viewOf(const Graph& graph, const ConnectionPlan& plan) {
         result.writer = {component(plan.writer->node), plan.writer->output->name(), false};
     for (const Writer& writer : plan.others)
         result.other_writers.push_back({component(writer.node), writer.output->name(), false});
+    result.readers.reserve(plan.readers.size());
     for (const Reader& reader : plan.readers) {
         result.readers.push_back({component(reader.node), reader.input->name(), reader.broken});
     }

@@ -1,7 +1,7 @@
-// Runs Fig. 1 of the paper in the executor's real-time loop and writes the calculation
+// Runs Fig. 1 of the paper, or a chain, in the executor's real-time loop and writes the calculation
 // duration and wake-up latency of each cycle, one line "duration_ns latency_ns" per cycle.
 // ROS mappings are off.
-// Usage: paper_run LIBRARY FREQUENCY_HZ SECONDS PRIORITY CPU SPIN_US FILE
+// Usage: paper_run LIBRARY FREQUENCY_HZ SECONDS PRIORITY CPU SPIN_US FILE [LENGTH]
 #include <fmt/format.h>
 
 #include <cstdio>
@@ -10,6 +10,7 @@
 #include <exception>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "bench_graph.hpp"
 #include "realtime/realtime.hpp"
@@ -23,7 +24,7 @@ struct Close {
     void operator()(std::FILE* file) const { std::fclose(file); }
 };
 
-int run(char** argv) {
+int run(char** argv, const std::vector<rtcf::bench::Node>& nodes) {
     using namespace rtcf;
     executor::prepareProcess();
     executor::LoopSettings settings;
@@ -38,7 +39,7 @@ int run(char** argv) {
         fmt::print(stderr, "paper_run: cannot write {}\n", argv[7]);
         return 1;
     }
-    bench::BenchGraph graph(bench::paperGraph(), argv[1]);
+    bench::BenchGraph graph(nodes, argv[1]);
     const auto say = [](const executor::RealtimeProblems& problems) {
         for (const auto& problem : problems) fmt::print(stderr, "paper_run: {}\n", problem.text);
     };
@@ -66,8 +67,10 @@ int run(char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) try {
-    if (argc == 8) return run(argv);
-    std::fputs("usage: paper_run LIBRARY FREQUENCY_HZ SECONDS PRIORITY CPU SPIN_US FILE\n", stderr);
+    if (argc == 8) return run(argv, rtcf::bench::paperGraph());
+    if (argc == 9) return run(argv, rtcf::bench::chain(std::stoul(argv[8])));
+    std::fputs("usage: paper_run LIBRARY FREQUENCY_HZ SECONDS PRIORITY CPU SPIN_US FILE "
+               "[LENGTH]\n", stderr);
     return 2;
 } catch (const std::exception& error) {
     std::fprintf(stderr, "paper_run: %s\n", error.what());

@@ -27,8 +27,8 @@ def run(setting: Setting) -> Result:
         with hal_components(setting):
             for _ in range(_ROUNDS):
                 rtcf.append(summary(run_rtcf(setting, _SECONDS).durations_ns, 1e-3))
-                hal.append(summary(run_hal(_SECONDS), 1e-3))
-                sums.append(summary(run_hal(_SECONDS, HAL_SUM), 1e-3))
+                hal.append(summary(run_hal(_SECONDS).durations_ns, 1e-3))
+                sums.append(summary(run_hal(_SECONDS, HAL_SUM).durations_ns, 1e-3))
     except Failed as failure:
         result.skipped = str(failure)
         return result

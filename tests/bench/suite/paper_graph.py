@@ -1,8 +1,9 @@
-"""Runs of Fig. 1 of the paper in real time: in rtcf's loop and in LinuxCNC HAL."""
+"""Runs of Fig. 1 of the paper and of chains in real time: in rtcf's loop and in LinuxCNC HAL."""
 
 import contextlib
 import json
 import os
+import re
 import subprocess
 import tempfile
 import time
@@ -20,7 +21,7 @@ _MODULES = Path("/usr/lib/linuxcnc/modules")
 HAL_MIMO = "rtcf_mimo"  # sums only new values, as rtcf's Mimo
 HAL_SUM = "rtcf_sum"  # sums all values
 HAL_COMPONENTS = (HAL_MIMO, HAL_SUM, "rtcf_record")
-_SKIP = 3000  # cycles during which the threads get their priority
+_SKIP_S = 1.5  # during which the threads get their priority
 _NOBODY = 65534
 
 
@@ -39,16 +40,26 @@ def run_rtcf(
     frequency_hz: int = FREQUENCY_HZ,
     spin_us: int = 0,
     samples: Path | None = None,
+    length: int = 0,
 ) -> PaperRun:
-    """Run Fig. 1 in rtcf. `samples` is the file for durations and latencies."""
+    """Run Fig. 1 in rtcf, or a chain. `samples` is the file for durations and latencies."""
     file = samples or setting.output / "rtcf.samples"
     command = [
         *(setting.program("paper_run"), str(setting.library), str(frequency_hz), str(seconds)),
         *(str(PRIORITY), str(setting.cpu), str(spin_us), str(file)),
+        *([str(length)] if length else []),
     ]
     found = json.loads(output_of(command, seconds))
     pairs = np.fromfile(file, sep=" ")
     return PaperRun(pairs[0::2], pairs[1::2], found["missed"])
+
+
+@dataclass
+class HalRun:
+    """The cycles of one run of HAL."""
+
+    durations_ns: Samples
+    ends_ns: Samples  # from the deadline to the end of the cycle, the recorder's time included
 
 
 @contextlib.contextmanager
@@ -76,22 +87,52 @@ def hal_components(setting: Setting) -> Iterator[None]:
                 link.unlink()
 
 
-def run_hal(seconds: float, component: str = HAL_MIMO) -> Samples:
-    """Run Fig. 1 in HAL, within hal_components(); return the cycles' durations in ns."""
+def _chain(component: str, length: int) -> str:
+    """Return the lines of a HAL file for a chain, in place of those for Fig. 1."""
+    name = component.replace("_", "-")
+    nets = []
+    for i in range(1, length):
+        nets.append(f"net c{i} {name}.{i - 1}.out1 => {name}.{i}.in1")
+        if component == HAL_MIMO:
+            nets.append(f"net n{i} {name}.{i - 1}.out1-count => {name}.{i}.in1-count")
+    functions = [f"addf {name}.{i} cycle" for i in range(length)]
+    return "\n".join([*nets, *functions])
+
+
+def _hal_file(component: str, length: int, values: dict[str, str]) -> str:
+    """Return the text of a HAL file. `length` is that of a chain; 0 = Fig. 1."""
+    text = (_HAL / "fig1.hal.in").read_text()
+    if length:
+        text = text.replace("names=H1,F1,R1,R2,R3", f"count={length}")
+        own = re.compile(r"(@COUNTS@)?(net \S+ [HFR]\d|newsig|sets|net r3-h1|addf [HFR])")
+        lines = [line for line in text.splitlines() if not own.match(line)]
+        place = next(i for i, line in enumerate(lines) if line.startswith("net thread-time"))
+        text = "\n".join([*lines[:place], _chain(component, length), *lines[place:], ""])
+    for key, value in values.items():
+        text = text.replace(f"@{key}@", value)
+    return text
+
+
+def run_hal(
+    seconds: float,
+    component: str = HAL_MIMO,
+    frequency_hz: int = FREQUENCY_HZ,
+    length: int = 0,
+) -> HalRun:
+    """Run Fig. 1 in HAL, or a chain, within hal_components()."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         folder.chmod(0o777)  # HAL drops its privileges before it writes
-        text = (_HAL / "fig1.hal.in").read_text()
-        for key, value in {
+        skip = int(_SKIP_S * frequency_hz)
+        values = {
             "COMPONENT": component,
             "COUNTS": "" if component == HAL_MIMO else "# ",
             "SAMPLES": str(folder / "samples"),
-            "SKIP": str(_SKIP),
-            "PERIOD_NS": str(1_000_000_000 // FREQUENCY_HZ),
-            "SECONDS": str(seconds + _SKIP / FREQUENCY_HZ),
-        }.items():
-            text = text.replace(f"@{key}@", value)
-        (folder / "fig1.hal").write_text(text)
+            "SKIP": str(skip),
+            "PERIOD_NS": str(1_000_000_000 // frequency_hz),
+            "SECONDS": str(seconds + _SKIP_S),
+        }
+        (folder / "fig1.hal").write_text(_hal_file(component, length, values))
         environment = {
             **os.environ,
             "RTAPI_UID": str(_NOBODY),
@@ -103,7 +144,7 @@ def run_hal(seconds: float, component: str = HAL_MIMO) -> Samples:
                 ["halrun", str(folder / "fig1.hal")], env=environment, stdout=log, stderr=log
             )
             try:
-                _make_realtime(process, deadline_s=_SKIP / FREQUENCY_HZ)
+                _make_realtime(process, deadline_s=_SKIP_S)
                 process.wait(seconds + 60)
             except subprocess.TimeoutExpired:
                 raise Failed("halrun does not end") from None
@@ -116,7 +157,8 @@ def run_hal(seconds: float, component: str = HAL_MIMO) -> Samples:
                     )
         if process.returncode != 0 or not (folder / "samples").exists():
             raise Failed(f"halrun: {(folder / 'log').read_text().strip()}")
-        return np.fromfile(folder / "samples", sep=" ")
+        pairs = np.fromfile(folder / "samples", sep=" ")
+        return HalRun(pairs[0::2], pairs[1::2])
 
 
 def _make_realtime(process: "subprocess.Popen[bytes]", deadline_s: float) -> None:

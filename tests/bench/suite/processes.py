@@ -58,3 +58,20 @@ def load(kind: str) -> Iterator[None]:
     finally:
         os.killpg(process.pid, signal.SIGTERM)
         process.wait()
+
+
+@contextlib.contextmanager
+def swept_caches(cpu: int) -> Iterator[None]:
+    """Stream through more memory than the caches hold, on one CPU whenever it is idle."""
+    process = subprocess.Popen(
+        [
+            *("stress-ng", "--quiet", "--stream", "1", "--stream-l3-size", "256M"),
+            *("--taskset", str(cpu), "--timeout", "1h"),
+        ],
+        start_new_session=True,
+    )
+    try:
+        yield
+    finally:
+        os.killpg(process.pid, signal.SIGTERM)
+        process.wait()

@@ -105,8 +105,8 @@ def _read(folder: Path, with_hal: bool) -> dict[str, Samples]:
         found[f"cyclictest.{kind}"] = np.array(latencies)
         if with_hal:
             for name in ("hal", "hal-sums"):
-                samples = np.fromfile(folder / f"{name}.{kind}", sep=" ")
-                found[f"{name}.duration.{kind}"] = samples
+                pairs = np.fromfile(folder / f"{name}.{kind}", sep=" ")
+                found[f"{name}.duration.{kind}"] = pairs[0::2]
     return found
 
 

@@ -56,7 +56,9 @@ struct AbiProbe {
              offsetof(Context, updated_ns), offsetof(Context, disabled),
              offsetof(Context, recorder_slot), offsetof(Context, device), offsetof(Context, log),
              offsetof(Context, gate), offsetof(Context, remaps), offsetof(Context, log_level),
-             offsetof(Context, said), sizeof(LogMemory)});
+             offsetof(Context, said), sizeof(LogMemory), offsetof(Context, memory)});
+        add({sizeof(detail::ObjectHead), offsetof(detail::ObjectHead, memory),
+             offsetof(detail::ObjectHead, size), offsetof(detail::ObjectHead, alignment)});
         add({sizeof(LoopClock), offsetof(LoopClock, iteration), offsetof(LoopClock, time_ns),
              offsetof(LoopClock, stamp_ns), offsetof(LoopClock, period_ns),
              offsetof(LoopClock, elapsed_ns)});

@@ -10,14 +10,17 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <new>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
+#include "rtcf/component_memory.hpp"
 #include "rtcf/derived.hpp"
 #include "rtcf/logging.hpp"
 #include "rtcf/mailbox.hpp"
@@ -60,7 +63,12 @@ struct ComponentContext {
     std::vector<std::pair<std::string, std::string>> remaps;  ///< resolved names (from, to)
     std::atomic<LogLevel> log_level{LogLevel::Info};          ///< least severe level that is logged
     LogMemory said;  ///< state of the _ONCE and _THROTTLE macros
+    ComponentMemory* memory = nullptr;  ///< of the component and its values; null = the heap
 };
+
+inline ComponentMemory* detail::memoryOf(const ComponentContext* context) noexcept {
+    return context != nullptr ? context->memory : nullptr;
+}
 
 /// Base class of all components.
 class Component {
@@ -69,6 +77,21 @@ class Component {
     virtual ~Component() = default;
     Component(const Component&) = delete;
     Component& operator=(const Component&) = delete;
+
+    /// @name Memory
+    /// The executor's, see component_memory.hpp. Not real-time.
+    /// @{
+    static void* operator new(std::size_t size) {
+        return detail::newObject(size, alignof(std::max_align_t));
+    }
+    static void* operator new(std::size_t size, std::align_val_t alignment) {
+        return detail::newObject(size, static_cast<std::size_t>(alignment));
+    }
+    static void operator delete(void* object) noexcept { detail::deleteObject(object); }
+    static void operator delete(void* object, std::align_val_t /*alignment*/) noexcept {
+        detail::deleteObject(object);
+    }
+    /// @}
 
     /// @name Hooks
     /// A hook fails by returning false or by throwing. The executor then rejects the change that

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "rtcf/component_memory.hpp"
 #include "rtcf/finite.hpp"
 #include "rtcf/realtime.hpp"
 #include "rtcf/slot.hpp"
@@ -135,7 +136,7 @@ namespace detail {
 
 template <typename T>
 std::shared_ptr<SlotHeader> makeSlot(const SlotHeader* sample) {
-    auto slot = std::make_shared<Slot<T>>();
+    auto slot = makeBeside<Slot<T>>();
     if (sample != nullptr) slot->value = static_cast<const Slot<T>*>(sample)->value;
     return slot;
 }

@@ -5,6 +5,7 @@
 
 #include <cstdint>
 
+#include "rtcf/component_memory.hpp"
 #include "rtcf/version.hpp"
 
 namespace rtcf {
@@ -51,12 +52,21 @@ struct __attribute__((visibility("hidden"))) Registration {
 /// Context of the component that is being constructed in this library.
 __attribute__((visibility("hidden"))) inline ComponentContext* under_construction = nullptr;
 
+/// The context's memory for components; null = the heap.
+ComponentMemory* memoryOf(const ComponentContext* context) noexcept;
+
 /// Constructs a component whose constructor may log.
 template <typename T, typename... Arguments>
 T* construct(ComponentContext* context, const Arguments&... arguments) {
     struct Guard {
-        explicit Guard(ComponentContext* present) { under_construction = present; }
-        ~Guard() { under_construction = nullptr; }
+        explicit Guard(ComponentContext* present) {
+            under_construction = present;
+            construction_memory = memoryOf(present);
+        }
+        ~Guard() {
+            under_construction = nullptr;
+            construction_memory = nullptr;
+        }
         Guard(const Guard&) = delete;
         Guard& operator=(const Guard&) = delete;
     };

@@ -1,0 +1,44 @@
+/// @file
+/// The memory of components and of their outputs' values. One per process: a value may outlive its
+/// component and its runner's graph.
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <mutex>
+#include <utility>
+
+#include "rtcf/component_memory.hpp"
+
+namespace rtcf::executor {
+
+/// Takes blocks one after another from large chunks. A free block is used again for a block of the
+/// same size, and is never returned to the system: components of the same types come and go.
+class ComponentArena final : public ComponentMemory {
+   public:
+    /// Larger blocks are on the heap.
+    static constexpr std::size_t kLargest = 16384;  // bytes
+    static constexpr std::size_t kFirstChunk = std::size_t{64} * 1024;
+    /// A huge page of x86-64: many components then need one entry of the address cache (TLB).
+    static constexpr std::size_t kChunk = std::size_t{2} * 1024 * 1024;
+
+    /// The arena of the process; null if a sanitizer has to see each block.
+    static ComponentArena* ofProcess();
+
+    void* allocate(std::size_t size, std::size_t alignment) override;
+    void release(void* block, std::size_t size, std::size_t alignment) noexcept override;
+
+   private:
+    struct Free {
+        Free* next;
+    };
+    using Kind = std::pair<std::size_t, std::size_t>;  // size and alignment
+    void addChunk();
+
+    std::mutex mutex_;  // protects all members below
+    std::map<Kind, Free*> free_;
+    std::byte* next_ = nullptr;  // of the present chunk
+    std::byte* end_ = nullptr;
+};
+
+}  // namespace rtcf::executor
