@@ -24,7 +24,7 @@ UndeclaredMembers::UndeclaredMembers(const Component& component) {
     for (const OutputBase* output : component.outputs())
         add(output, sizeof *output, "output " + output->name(), true);
     for (const ParameterBase* parameter : component.parameters())
-        add(parameter, sizeof *parameter, "parameter " + parameter->declaration().name, false);
+        add(parameter->place(), 0, "parameter " + parameter->declaration().name, false);
     for (const StateDeclaration& state : component.states())
         add(state.value, state.size, "state " + state.name, true);
     std::sort(fields_.begin(), fields_.end(),
@@ -33,9 +33,9 @@ UndeclaredMembers::UndeclaredMembers(const Component& component) {
 
 void UndeclaredMembers::add(const void* begin, std::size_t size, std::string name,
                             bool may_change) {
-    const auto offset = static_cast<const std::byte*>(begin) - object_;
     // A port may be outside the object, if the component holds it by pointer.
-    if (offset < 0 || static_cast<std::size_t>(offset) >= before_.size()) return;
+    const auto offset = static_cast<const std::byte*>(begin) - object_;
+    if (begin == nullptr || offset < 0 || static_cast<std::size_t>(offset) >= before_.size()) return;
     const auto at = static_cast<std::size_t>(offset);
     fields_.push_back({at, at + size, std::move(name), may_change});
 }

@@ -114,7 +114,8 @@ struct AbiProbe {
              offsetof(TypeInfo, copies),
              sizeof(ByteCopy)});
         using Declaration = ParameterDeclaration;
-        add({sizeof(ParameterBase), sizeof(ParameterValue), sizeof(Declaration),
+        add({sizeof(ParameterBase), sizeof(Parameter<double>),
+             offsetof(Parameter<double>, value_), sizeof(ParameterValue), sizeof(Declaration),
              offsetof(Declaration, name), offsetof(Declaration, type),
              offsetof(Declaration, default_value), offsetof(Declaration, minimum),
              offsetof(Declaration, maximum), offsetof(Declaration, unit),

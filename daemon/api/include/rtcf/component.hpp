@@ -394,8 +394,9 @@ inline DerivedBase::DerivedBase(Component* owner) { owner->declare(this); }
 
 inline MailboxBase::MailboxBase(Component* owner) { owner->declare(this); }
 
-inline ParameterBase::ParameterBase(Component* owner, ParameterDeclaration declaration)
-    : declaration_(std::move(declaration)) {
+inline ParameterBase::ParameterBase(Component* owner, ParameterDeclaration declaration,
+                                    const void* place)
+    : declaration_(std::move(declaration)), place_(place) {
     ParameterValue initial = declaration_.default_value;
     if (const std::string why = check(initial); !why.empty())
         throw std::logic_error("default value: " + why);

@@ -6,8 +6,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <type_traits>
@@ -107,34 +110,29 @@ class ParameterBase : public StagedValue {
     /// Stages a value that has passed check(). Not real-time safe.
     virtual void stage(const ParameterValue& checked) = 0;
 
+    /// Address of the value in the component; null if it is elsewhere. Real-time safe.
+    const void* place() const noexcept { return place_; }
+
    protected:
-    ParameterBase(Component* owner, ParameterDeclaration declaration);
+    ParameterBase(Component* owner, ParameterDeclaration declaration, const void* place = nullptr);
     virtual ~ParameterBase() = default;
 
     ParameterDeclaration declaration_;
+
+   private:
+    const void* place_;
 };
 
-/// A parameter of type bool, integer, floating point, std::string or enum.
+namespace detail {
+
+/// Declaration and staged value of a parameter, or of an element of an array. Kept outside the
+/// component, so that the values that each cycle touches lie close together.
 template <typename T>
-class Parameter final : public ParameterBase {
+class ParameterSetting final : public ParameterBase {
    public:
-    /// @param owner the component, `this`
-    /// @param name  ROS base name, unique among the component's parameters
-    /// @param initial default value
-    /// @param options any of Min, Max, Unit, Doc, Choice
-    template <typename... Options>
-    Parameter(Component* owner, std::string name, T initial, Options... options)
-        : ParameterBase(owner, declare(std::move(name), initial, std::move(options)...)),
-          value_(initial),
-          staged_(std::move(initial)) {}
+    ParameterSetting(Component* owner, ParameterDeclaration declaration, T& value)
+        : ParameterBase(owner, std::move(declaration), &value), value_(value), staged_(value) {}
 
-    /// The value; constant during a cycle. Real-time safe.
-    const T& value() const noexcept RTCF_NONBLOCKING { return value_; }
-    operator const T&() const noexcept RTCF_NONBLOCKING {
-        return value_;
-    }  // NOLINT(google-explicit-constructor)
-
-    /// The staged value, or the present one if none is staged. In prepare(); not real-time safe.
     const T& proposed() const noexcept { return is_staged_ ? staged_ : value_; }
 
     void stage(const ParameterValue& checked) override {
@@ -159,12 +157,20 @@ class Parameter final : public ParameterBase {
     void release() noexcept override { is_staged_ = false; }
 
    private:
-    static_assert(
-        std::is_arithmetic_v<T> || std::is_enum_v<T> || std::is_same_v<T, std::string>,
-        "a parameter is a bool, an integer, a floating-point number, a std::string or an enum");
+    T& value_;
+    T staged_;
+};
 
+/// Makes the declaration of a parameter of type T.
+template <typename T>
+class DeclarationOf {
+    static_assert(std::is_arithmetic_v<T> || std::is_enum_v<T> || std::is_same_v<T, std::string>,
+                  "a parameter is a bool, an integer, a floating-point number, a std::string, an "
+                  "enum, or a std::array of one of these");
+
+   public:
     template <typename... Options>
-    static ParameterDeclaration declare(std::string name, const T& initial, Options... options) {
+    static ParameterDeclaration make(std::string name, const T& initial, Options... options) {
         ParameterDeclaration declaration;
         declaration.name = std::move(name);
         (apply(declaration, std::move(options)), ...);
@@ -195,6 +201,8 @@ class Parameter final : public ParameterBase {
         }
         return declaration;
     }
+
+   private:
     // Adds the bounds of T if T is narrower than the type in ParameterValue.
     static void narrow(ParameterDeclaration& declaration, double lowest, double highest) {
         constexpr bool kSmaller = sizeof(T) < sizeof(std::int64_t);
@@ -220,9 +228,91 @@ class Parameter final : public ParameterBase {
     static void apply(ParameterDeclaration& declaration, Choice choice) {
         declaration.choices.push_back(std::move(choice));
     }
+};
 
+}  // namespace detail
+
+/// A parameter of type bool, integer, floating point, std::string or enum.
+template <typename T>
+class Parameter final {
+   public:
+    /// @param owner the component, `this`
+    /// @param name  ROS base name, unique among the component's parameters
+    /// @param initial default value
+    /// @param options any of Min, Max, Unit, Doc, Choice
+    template <typename... Options>
+    Parameter(Component* owner, std::string name, T initial, Options... options)
+        : value_(initial),
+          setting_(std::make_unique<detail::ParameterSetting<T>>(
+              owner,
+              detail::DeclarationOf<T>::make(std::move(name), initial, std::move(options)...),
+              value_)) {}
+    Parameter(const Parameter&) = delete;
+    Parameter& operator=(const Parameter&) = delete;
+
+    /// The value; constant during a cycle. Real-time safe.
+    const T& value() const noexcept RTCF_NONBLOCKING { return value_; }
+    operator const T&() const noexcept RTCF_NONBLOCKING {
+        return value_;
+    }  // NOLINT(google-explicit-constructor)
+
+    /// The staged value, or the present one if none is staged. In prepare(); not real-time safe.
+    const T& proposed() const noexcept { return setting_->proposed(); }
+    /// Name, type, default and bounds. Real-time safe.
+    const ParameterDeclaration& declaration() const noexcept { return setting_->declaration(); }
+
+   private:
+    friend struct AbiProbe;
     T value_;
-    T staged_;
+    const std::unique_ptr<detail::ParameterSetting<T>> setting_;
+};
+
+/// An array parameter. Outside the component, each element is a parameter: `gain_0`, `gain_1`, as
+/// those of components in Python. Elements that are set together change in the same cycle.
+template <typename T, std::size_t N>
+class Parameter<std::array<T, N>> final {
+   public:
+    using Array = std::array<T, N>;
+
+    /// @param owner the component, `this`
+    /// @param name  ROS base name; `<name>_<index>` are unique among the component's parameters
+    /// @param initial default values
+    /// @param options any of Min, Max, Unit, Doc, Choice; they hold for each element
+    template <typename... Options>
+    Parameter(Component* owner, const std::string& name, const Array& initial,
+              const Options&... options)
+        : value_(initial), settings_(std::make_unique<Settings>()) {
+        for (std::size_t i = 0; i < N; ++i) {
+            std::string element = name + '_' + std::to_string(i);
+            settings_->emplace_back(
+                owner, detail::DeclarationOf<T>::make(std::move(element), initial[i], options...),
+                value_[i]);
+        }
+    }
+    Parameter(const Parameter&) = delete;
+    Parameter& operator=(const Parameter&) = delete;
+
+    /// The values; constant during a cycle. Real-time safe.
+    const Array& value() const noexcept RTCF_NONBLOCKING { return value_; }
+    operator const Array&() const noexcept RTCF_NONBLOCKING {
+        return value_;
+    }  // NOLINT(google-explicit-constructor)
+    /// One of the values. Real-time safe.
+    const T& operator[](std::size_t index) const noexcept RTCF_NONBLOCKING { return value_[index]; }
+
+    /// The staged values, and the present ones where none is staged. In prepare(); not real-time
+    /// safe.
+    Array proposed() const {
+        Array result;
+        std::transform(settings_->begin(), settings_->end(), result.begin(),
+                       [](const auto& setting) { return setting.proposed(); });
+        return result;
+    }
+
+   private:
+    using Settings = std::deque<detail::ParameterSetting<T>>;
+    Array value_;
+    const std::unique_ptr<Settings> settings_;
 };
 
 /// The values that a component's parameters will have if a batch is applied: `proposed[kp]`. A
@@ -230,7 +320,7 @@ class Parameter final : public ParameterBase {
 class Values {
    public:
     template <typename T>
-    const T& operator[](const Parameter<T>& parameter) const noexcept {
+    decltype(auto) operator[](const Parameter<T>& parameter) const {
         return parameter.proposed();
     }
 };

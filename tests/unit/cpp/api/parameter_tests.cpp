@@ -1,10 +1,13 @@
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "support/bare_component.hpp"
 
@@ -13,18 +16,28 @@ namespace {
 
 using Int = std::int64_t;
 
-// Checks and, if valid, sets. @return the error
-std::string set(ParameterBase& parameter, ParameterValue value) {
-    std::string why = parameter.check(value);
-    if (why.empty()) {
-        parameter.stage(value);
-        parameter.commit();
-    }
-    return why;
-}
-
 class ParameterTest : public ::testing::Test {
    protected:
+    ParameterBase& named(const std::string& name) {
+        for (ParameterBase* parameter : component.parameters())
+            if (parameter->declaration().name == name) return *parameter;
+        throw std::out_of_range(name);
+    }
+    // Checks and, if valid, sets. @return the error
+    std::string set(const std::string& name, ParameterValue value) {
+        ParameterBase& parameter = named(name);
+        std::string why = parameter.check(value);
+        if (why.empty()) {
+            parameter.stage(value);
+            parameter.commit();
+        }
+        return why;
+    }
+    template <typename T>
+    std::string set(const Parameter<T>& parameter, ParameterValue value) {
+        return set(parameter.declaration().name, std::move(value));
+    }
+
     BareComponent component;
 };
 
@@ -42,11 +55,19 @@ TEST_F(ParameterTest, StartsWithItsDefault) {
 }
 
 TEST_F(ParameterTest, ChangesAtCommitOnly) {
-    Parameter<double> gain{&component, "gain", 1.0};
-    gain.stage(2.0);
+    const Parameter<double> gain{&component, "gain", 1.0};
+    named("gain").stage(2.0);
     EXPECT_EQ(gain.value(), 1.0);
-    gain.commit();
+    EXPECT_EQ(Values{}[gain], 2.0);
+    named("gain").commit();
     EXPECT_EQ(gain.value(), 2.0);
+}
+
+TEST_F(ParameterTest, IsItsValueAndAPointer) {
+    EXPECT_EQ(sizeof(Parameter<double>), sizeof(double) + sizeof(void*));
+    EXPECT_EQ(sizeof(Parameter<std::array<double, 6>>), 6 * sizeof(double) + sizeof(void*));
+    const Parameter<double> gain{&component, "gain", 1.0};
+    EXPECT_EQ(named("gain").place(), &gain.value());
 }
 
 TEST_F(ParameterTest, BoundsAreInclusive) {
@@ -152,6 +173,39 @@ TEST_F(ParameterTest, DuplicateDeclarationIsRejected) {
     const Parameter<double> gain{&component, "gain", 1.0};
     const auto again = [this] { const Parameter<bool> other{&component, "gain", true}; };
     EXPECT_THROW(again(), std::logic_error);
+}
+
+TEST_F(ParameterTest, ElementsOfAnArrayAreParameters) {
+    const Parameter<std::array<double, 3>> gains{
+        &component, "gains", {1.0, 2.0, 3.0}, Min(0.0), Unit("N/m"), Doc("stiffness")};
+    ASSERT_EQ(component.parameters().size(), 3U);
+    for (std::size_t i = 0; i < 3; ++i) {
+        const ParameterDeclaration& element = component.parameters()[i]->declaration();
+        EXPECT_EQ(element.name, "gains_" + std::to_string(i));
+        EXPECT_EQ(element.type, "double");
+        EXPECT_EQ(std::get<double>(element.default_value), static_cast<double>(i + 1));
+        EXPECT_EQ(element.minimum, 0.0);
+        EXPECT_EQ(element.unit, "N/m");
+        EXPECT_EQ(element.doc, "stiffness");
+    }
+    EXPECT_EQ(set("gains_1", -0.5), "parameter gains_1 = -0.5 is below its minimum 0 N/m");
+    EXPECT_EQ(set("gains_1", Int{7}), "");
+    const std::array<double, 3>& values = gains;
+    EXPECT_EQ(values, (std::array<double, 3>{1.0, 7.0, 3.0}));
+    EXPECT_EQ(gains[1], 7.0);
+}
+
+TEST_F(ParameterTest, ElementsOfAnArrayChangeTogether) {
+    const Parameter<std::array<int, 2>> limits{&component, "limits", {-1, 1}, Max(10)};
+    named("limits_0").stage(Int{-5});
+    named("limits_1").stage(Int{5});
+    EXPECT_EQ(limits.value(), (std::array<int, 2>{-1, 1}));
+    EXPECT_EQ(Values{}[limits], (std::array<int, 2>{-5, 5}));
+    for (ParameterBase* parameter : component.parameters()) parameter->commit();
+    EXPECT_EQ(limits.value(), (std::array<int, 2>{-5, 5}));
+    named("limits_0").stage(Int{-7});
+    named("limits_0").release();
+    EXPECT_EQ(limits.proposed(), (std::array<int, 2>{-5, 5}));
 }
 
 }  // namespace
