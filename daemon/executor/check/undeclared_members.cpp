@@ -35,7 +35,8 @@ void UndeclaredMembers::add(const void* begin, std::size_t size, std::string nam
                             bool may_change) {
     // A port may be outside the object, if the component holds it by pointer.
     const auto offset = static_cast<const std::byte*>(begin) - object_;
-    if (begin == nullptr || offset < 0 || static_cast<std::size_t>(offset) >= before_.size()) return;
+    if (begin == nullptr || offset < 0 || static_cast<std::size_t>(offset) >= before_.size())
+        return;
     const auto at = static_cast<std::size_t>(offset);
     fields_.push_back({at, at + size, std::move(name), may_change});
 }

@@ -56,10 +56,11 @@ void Cycle::begin(std::int64_t period_ns, std::uint64_t warmup_cycles, std::int6
     total_elapsed_ns_ = 0;
     warmup_cycles_ = warmup_cycles;
     for (const Step& step : schedule_->steps) {
-        step.context->period_ns = period_ns * step.every;
-        step.context->updated_ns = -1;
-        step.context->disabled = false;
-        step.statistics->faults.clear();
+        ComponentContext& context = step.component->context();
+        context.period_ns = period_ns * step.every;
+        context.updated_ns = -1;
+        context.disabled = false;
+        schedule_->turnOf(step).statistics->faults.clear();
     }
     noteWork();
     // Hooks may have written outputs since the last cycle.
@@ -121,9 +122,9 @@ template <bool Plain>
                 if (Plain) {
                     next->update(&component);
                 } else {
-                    const DeviceLoan loan(*next->context, counted_ ? nullptr : &uncounted_);
+                    const DeviceLoan loan(component.context(), counted_ ? nullptr : &uncounted_);
                     component.update();
-                    commit(component, *next->statistics, OnBadOutput::End);
+                    commit(component, *schedule_->turnOf(*next).statistics, OnBadOutput::End);
                 }
                 noteCycleCounter(*ended);
             }
@@ -253,10 +254,10 @@ bool Cycle::exchange(std::int64_t time_ns) noexcept {
 
 // True if a component runs in this cycle; also sets its elapsed time.
 bool Cycle::due(const Step& step) const noexcept RTCF_NONBLOCKING {
-    ComponentContext& context = *step.context;
+    ComponentContext& context = step.component->context();
     if (context.disabled) return false;
     if (step.every == 1) return true;
-    if (clock_.iteration % step.every != step.phase) return false;
+    if (clock_.iteration % step.every != schedule_->turnOf(step).phase) return false;
     context.elapsed_ns = context.updated_ns >= 0
                              ? total_elapsed_ns_ - context.updated_ns
                              : std::max<std::int64_t>(clock_.elapsed_ns, context.period_ns);
@@ -294,18 +295,19 @@ void Cycle::commit(Component& component, ComponentStatistics& statistics, OnBadO
 
 // @return true if the cycle goes on with the next component
 bool Cycle::threw(const Step& step, const char* text) noexcept {
-    step.context->disabled = true;
+    const Turn& turn = schedule_->turnOf(step);
+    step.component->context().disabled = true;
     putBack(step);
-    if (!step.optional) {
+    if (!turn.optional) {
         endLoop(LoopFault::Kind::Exception, step.component, text);
         return false;
     }
-    step.statistics->faults.taken_out.note(clock_.iteration, text);
-    step.statistics->faults.count.add(1);
+    turn.statistics->faults.taken_out.note(clock_.iteration, text);
+    turn.statistics->faults.count.add(1);
     statistics_.faults.add(1);
     // If a commit threw, outputs committed before it already have the stamp of this cycle.
     step.component->setTime(clock_.time_ns + 1);
-    makeSafe(*step.component, *step.statistics, OnBadOutput::End);
+    makeSafe(*step.component, *turn.statistics, OnBadOutput::End);
     return true;
 }
 
@@ -387,8 +389,9 @@ void Cycle::makeSafe(std::int64_t time_ns) noexcept {
         connectWaiting(step);
         step.component->setTime(time_ns);
         // safe() of a component that was taken out has already run.
-        if (step.optional && step.context->disabled) continue;
-        makeSafe(*step.component, *step.statistics, OnBadOutput::GoOn);
+        const Turn& turn = schedule_->turnOf(step);
+        if (turn.optional && step.component->context().disabled) continue;
+        makeSafe(*step.component, *turn.statistics, OnBadOutput::GoOn);
     }
     dropConnected();
     for (SerializedTap* tap : schedule_->serialized_taps) tap->push(clock_.stamp_ns);
@@ -432,7 +435,7 @@ void Cycle::blame(std::int64_t limit_ticks) noexcept RTCF_NONBLOCKING {
     for (const Step& step : schedule_->steps) {
         if (static_cast<std::int64_t>((ended++)->load(std::memory_order_relaxed)) <= limit_ticks)
             continue;  // did not run, or ended in time
-        step.statistics->overruns.add(1);
+        schedule_->turnOf(step).statistics->overruns.add(1);
         return;
     }
     // All components ended in time: frames or exchange caused the overrun.

@@ -31,7 +31,7 @@ void Cycle::apply(Adoption& adoption) noexcept {
         clock_.period_ns = adoption.period_ns;
         clock_.elapsed_ns = adoption.period_ns;
         for (const Step& step : schedule_->steps)
-            step.context->period_ns = adoption.period_ns * step.every;
+            step.component->context().period_ns = adoption.period_ns * step.every;
     }
     statistics_.adoption.add(readCycleCounter() - begin);
 }

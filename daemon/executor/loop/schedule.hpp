@@ -36,16 +36,19 @@ struct ComponentStatistics {
     }
 };
 
-/// One component's turn.
+/// One component's turn: what each cycle uses of it.
 struct Step {
     Component* component;
     void (*update)(Component*);  ///< updateOf() the component
-    ComponentContext* context;
+    std::uint32_t slot;          ///< in the flight recorder
+    std::uint32_t every;         ///< runs in every n-th cycle
+};
+
+/// The rest of a turn.
+struct Turn {
     ComponentStatistics* statistics;
-    std::uint32_t slot;       ///< in the flight recorder
-    std::uint32_t every = 1;  ///< runs in every n-th cycle,
-    std::uint32_t phase = 0;  ///< when the iteration modulo n equals this
-    bool optional = false;    ///< a fault takes the component out, and the loop goes on
+    std::uint32_t phase;  ///< runs when the iteration modulo `every` equals this
+    bool optional;        ///< a fault takes the component out, and the loop goes on
 };
 
 /// The function that a call of a component's update() runs, so that a cycle need not look it up.
@@ -99,6 +102,7 @@ struct Schedule {
     std::vector<Latch> latches;
     std::vector<QueueBase*> queues;  ///< queues fed by components of this loop
     std::vector<Step> steps;
+    std::vector<Turn> turns;  ///< of the steps
     std::vector<SerializedTap*> serialized_taps;
     std::vector<FrameTap*> frame_taps;
     Source* source = nullptr;  ///< component that paces the loop; null = the clock does
@@ -106,11 +110,15 @@ struct Schedule {
     bool selective = false;              ///< true = some steps are not plain
     std::vector<const void*> footprint;  ///< cache lines to fetch before a cycle
 
-    /// Groups the steps. After all steps are added.
+    const Turn& turnOf(const Step& step) const noexcept {
+        return turns[static_cast<std::size_t>(&step - steps.data())];
+    }
+
+    /// Groups the steps. After all steps and turns are added.
     void findStretches() {
         for (const Step& step : steps) {
-            const bool plain =
-                step.every == 1 && !step.optional && step.component->stagedOutputs().empty();
+            const bool plain = step.every == 1 && !turnOf(step).optional &&
+                               step.component->stagedOutputs().empty();
             selective = selective || !plain;
             if (stretches.empty() || stretches.back().plain != plain)
                 stretches.push_back({&step, &step, plain});

@@ -245,9 +245,9 @@ class Builder {
             Instance& instance = *plan_.graph.nodes()[index].instance;
             const ComponentDefinition& definition = instance.definition();
             plan_.schedule.steps.push_back({&instance.component(), updateOf(instance.component()),
-                                            &instance.context(), instance.statistics().get(),
-                                            instance.slot(), definition.every, instance.phase(),
-                                            definition.optional});
+                                            instance.slot(), definition.every});
+            plan_.schedule.turns.push_back(
+                {instance.statistics().get(), instance.phase(), definition.optional});
             if (Source* source = instance.source(); source != nullptr)
                 plan_.schedule.source = source;
         }

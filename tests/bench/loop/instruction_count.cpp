@@ -77,8 +77,9 @@ int runCounted(const std::string& library, const std::string& which, std::uint64
         which, cycle.count, cycle.mean, cycle.max,
         static_cast<double>(whole) / static_cast<double>(cycles));
     const char* separator = "";
-    for (const executor::Step& step : graph.plan().schedule.steps) {
-        const auto update = summarize(step.statistics->duration.snapshot(), 1.0);
+    const executor::Schedule& schedule = graph.plan().schedule;
+    for (const executor::Step& step : schedule.steps) {
+        const auto update = summarize(schedule.turnOf(step).statistics->duration.snapshot(), 1.0);
         fmt::print("{}\"{}\": {}", separator, step.component->name(), update.p50);
         separator = ", ";
     }

@@ -69,8 +69,10 @@ int run(char** argv, const std::vector<rtcf::bench::Node>& nodes) {
 int main(int argc, char** argv) try {
     if (argc == 8) return run(argv, rtcf::bench::paperGraph());
     if (argc == 9) return run(argv, rtcf::bench::chain(std::stoul(argv[8])));
-    std::fputs("usage: paper_run LIBRARY FREQUENCY_HZ SECONDS PRIORITY CPU SPIN_US FILE "
-               "[LENGTH]\n", stderr);
+    std::fputs(
+        "usage: paper_run LIBRARY FREQUENCY_HZ SECONDS PRIORITY CPU SPIN_US FILE "
+        "[LENGTH]\n",
+        stderr);
     return 2;
 } catch (const std::exception& error) {
     std::fprintf(stderr, "paper_run: %s\n", error.what());

@@ -114,13 +114,13 @@ struct AbiProbe {
              offsetof(TypeInfo, copies),
              sizeof(ByteCopy)});
         using Declaration = ParameterDeclaration;
-        add({sizeof(ParameterBase), sizeof(Parameter<double>),
-             offsetof(Parameter<double>, value_), sizeof(ParameterValue), sizeof(Declaration),
-             offsetof(Declaration, name), offsetof(Declaration, type),
-             offsetof(Declaration, default_value), offsetof(Declaration, minimum),
-             offsetof(Declaration, maximum), offsetof(Declaration, unit),
-             offsetof(Declaration, doc), offsetof(Declaration, choices), sizeof(Choice),
-             sizeof(DerivedBase), sizeof(StagedValue)});
+        add({sizeof(ParameterBase), sizeof(Parameter<double>), offsetof(Parameter<double>, value_),
+             sizeof(ParameterValue), sizeof(Declaration), offsetof(Declaration, name),
+             offsetof(Declaration, type), offsetof(Declaration, default_value),
+             offsetof(Declaration, minimum), offsetof(Declaration, maximum),
+             offsetof(Declaration, unit), offsetof(Declaration, doc),
+             offsetof(Declaration, choices), sizeof(Choice), sizeof(DerivedBase),
+             sizeof(StagedValue)});
         add({sizeof(StateDeclaration), offsetof(StateDeclaration, name),
              offsetof(StateDeclaration, type), offsetof(StateDeclaration, identity),
              offsetof(StateDeclaration, size), offsetof(StateDeclaration, value),

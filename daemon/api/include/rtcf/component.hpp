@@ -62,7 +62,7 @@ struct ComponentContext {
     NodeGate* gate = nullptr;            ///< access to the ROS node; null without one
     std::vector<std::pair<std::string, std::string>> remaps;  ///< resolved names (from, to)
     std::atomic<LogLevel> log_level{LogLevel::Info};          ///< least severe level that is logged
-    LogMemory said;  ///< state of the _ONCE and _THROTTLE macros
+    LogMemory said;                     ///< state of the _ONCE and _THROTTLE macros
     ComponentMemory* memory = nullptr;  ///< of the component and its values; null = the heap
 };
 

@@ -176,8 +176,8 @@ TEST_F(ParameterTest, DuplicateDeclarationIsRejected) {
 }
 
 TEST_F(ParameterTest, ElementsOfAnArrayAreParameters) {
-    const Parameter<std::array<double, 3>> gains{
-        &component, "gains", {1.0, 2.0, 3.0}, Min(0.0), Unit("N/m"), Doc("stiffness")};
+    const Parameter<std::array<double, 3>> gains{&component, "gains",     {1.0, 2.0, 3.0},
+                                                 Min(0.0),   Unit("N/m"), Doc("stiffness")};
     ASSERT_EQ(component.parameters().size(), 3U);
     for (std::size_t i = 0; i < 3; ++i) {
         const ParameterDeclaration& element = component.parameters()[i]->declaration();

@@ -44,8 +44,8 @@ class LoopAlone : public ::testing::Test {
         context_.clock = &loop_.clock();
         context_.recorder_slot = recorder_.addSlot("/worker");
         worker_->attach(context_);
-        schedule_.steps.push_back(
-            {worker_.get(), updateOf(*worker_), &context_, &component_, context_.recorder_slot});
+        schedule_.steps.push_back({worker_.get(), updateOf(*worker_), context_.recorder_slot, 1});
+        schedule_.turns.push_back({&component_, 0, false});
         schedule_.findStretches();
         if (frames_ == nullptr) {
             frames_ = std::make_unique<FrameRing>(std::vector<FrameRing::Source>{}, 1, 16,
