@@ -193,7 +193,7 @@ StateDeclaration stateOf(const TypeTable& type) {
 std::shared_ptr<SlotHeader> rtcf_python_make_slot(const TypeTable* type, const SlotHeader* sample) {
     const std::size_t alignment = std::max(alignmentOf(*type), alignof(SlotHeader));
     const std::size_t size = valueOffset(*type) + sizeOf(*type);
-    ComponentMemory* const memory = detail::construction_memory;
+    ComponentMemory* const memory = detail::constructionMemory();
     void* const block = detail::allocateFrom(memory, size, alignment);
     std::memset(block, 0, size);
     std::shared_ptr<SlotHeader> slot(new (block) SlotHeader, FreeSlot{memory, size, alignment});

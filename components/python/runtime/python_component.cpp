@@ -35,7 +35,7 @@ bool isMessageOutput(const OutputTable& output) { return output.message != nullp
 }  // namespace
 
 PythonComponent::Record::Record(const ComponentTable& table)
-    : Record(table, static_cast<std::size_t>(table.record_size), detail::construction_memory) {}
+    : Record(table, static_cast<std::size_t>(table.record_size), detail::constructionMemory()) {}
 
 PythonComponent::Record::Record(const ComponentTable& table, std::size_t size,
                                 ComponentMemory* memory)

@@ -118,6 +118,7 @@ class QueuePort final : public QueueBase {
           capacity_(table.queue->size) {}
 
     static std::unique_ptr<Slots> slotsOf(const InputTable& table) {
+        const detail::ConstructionScope on_heap(nullptr);  // the component's values lie together
         auto slots = std::make_unique<Slots>();
         for (std::int64_t i = 0; i < table.queue->size; ++i)
             slots->push_back(typeInfoOf(*table.type).make_slot(nullptr));

@@ -15,7 +15,7 @@ constexpr std::size_t kWord = 8;  // granularity, as a number rarely changes in 
 UndeclaredMembers::UndeclaredMembers(const Component& component) {
     const void* complete = dynamic_cast<const void*>(&component);  // the complete object
     object_ = static_cast<const std::byte*>(complete);
-    const std::size_t size = detail::ObjectHead::of(complete).size;
+    const std::size_t size = component.context().object_size;
     before_.assign(object_, object_ + size);
     changed_.resize(size);
     add(&component, sizeof component, "the base class", true);
@@ -33,10 +33,10 @@ UndeclaredMembers::UndeclaredMembers(const Component& component) {
 
 void UndeclaredMembers::add(const void* begin, std::size_t size, std::string name,
                             bool may_change) {
-    // A port may be outside the object, if the component holds it by pointer.
+    if (begin == nullptr) return;
     const auto offset = static_cast<const std::byte*>(begin) - object_;
-    if (begin == nullptr || offset < 0 || static_cast<std::size_t>(offset) >= before_.size())
-        return;
+    // A port may be outside the object, if the component holds it by pointer.
+    if (offset < 0 || static_cast<std::size_t>(offset) >= before_.size()) return;
     const auto at = static_cast<std::size_t>(offset);
     fields_.push_back({at, at + size, std::move(name), may_change});
 }

@@ -14,7 +14,7 @@ namespace rtcf::executor {
 
 class UndeclaredMembers {
    public:
-    /// @param component allocated by `new`; outlives this object
+    /// @param component made by an executor; outlives this object
     explicit UndeclaredMembers(const Component& component);
 
     /// Records the bytes that have changed since the last call. Between cycles.

@@ -1,7 +1,5 @@
 #include "realtime/component_arena.hpp"
 
-#include <sys/mman.h>
-
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
@@ -18,48 +16,57 @@ ComponentArena* ComponentArena::ofProcess() {
 #endif
 }
 
-void* ComponentArena::allocate(std::size_t size, std::size_t alignment) {
+// Sizes of large blocks are rounded, so that edited components find blocks of their predecessors.
+ComponentArena::Kind ComponentArena::kindOf(std::size_t size, std::size_t alignment) noexcept {
+    constexpr std::size_t kExact = 256;
+    constexpr std::size_t kStep = 64;
     size = std::max(size, sizeof(Free));
-    alignment = std::max(alignment, alignof(Free));
-    if (size > kLargest || alignment > kLargest)
-        return ::operator new(size, static_cast<std::align_val_t>(alignment));
+    if (size > kExact) size = (size + kStep - 1) / kStep * kStep;
+    return {size, std::max(alignment, alignof(Free))};
+}
+
+bool ComponentArena::isLarge(const Kind& kind) noexcept {
+    return kind.first > kLargest || kind.second > kLargest;
+}
+
+void* ComponentArena::allocate(std::size_t size, std::size_t alignment) {
+    const Kind kind = kindOf(size, alignment);
+    if (isLarge(kind)) return ::operator new(size, static_cast<std::align_val_t>(alignment));
     const std::lock_guard<std::mutex> lock(mutex_);
-    Free*& free = free_[{size, alignment}];  // so that release() allocates nothing
+    Free*& free = free_[kind];  // so that release() allocates nothing
     if (free != nullptr) {
         Free* const block = free;
         free = block->next;
         return block;
     }
     const auto aligned = [&] {
-        return next_ + (-reinterpret_cast<std::uintptr_t>(next_) & (alignment - 1));
+        return next_ + (-reinterpret_cast<std::uintptr_t>(next_) & (kind.second - 1));
     };
-    if (next_ == nullptr || aligned() > end_ || size > static_cast<std::size_t>(end_ - aligned()))
+    if (next_ == nullptr || aligned() > end_ ||
+        kind.first > static_cast<std::size_t>(end_ - aligned()))
         addChunk();
     std::byte* const block = aligned();
-    next_ = block + size;
+    next_ = block + kind.first;
     return block;
 }
 
 void ComponentArena::release(void* block, std::size_t size, std::size_t alignment) noexcept {
-    size = std::max(size, sizeof(Free));
-    alignment = std::max(alignment, alignof(Free));
-    if (size > kLargest || alignment > kLargest) {
+    const Kind kind = kindOf(size, alignment);
+    if (isLarge(kind)) {
         ::operator delete(block, static_cast<std::align_val_t>(alignment));
         return;
     }
     const std::lock_guard<std::mutex> lock(mutex_);
-    Free*& free = free_.find({size, alignment})->second;
-    free = new (block) Free{free};
+    Free*& free = free_.find(kind)->second;
+    free = ::new (block) Free{free};
 }
 
 // The rest of the present chunk is lost.
 void ComponentArena::addChunk() {
-    const std::size_t size = next_ == nullptr ? kFirstChunk : kChunk;
-    void* const chunk = std::aligned_alloc(size, size);
+    void* const chunk = std::aligned_alloc(kLargest, kChunk);
     if (chunk == nullptr) throw std::bad_alloc();
-    if (size == kChunk) madvise(chunk, size, MADV_HUGEPAGE);
     next_ = static_cast<std::byte*>(chunk);
-    end_ = next_ + size;
+    end_ = next_ + kChunk;
 }
 
 }  // namespace rtcf::executor

@@ -14,13 +14,12 @@ namespace rtcf::executor {
 
 /// Takes blocks one after another from large chunks. A free block is used again for a block of the
 /// same size, and is never returned to the system: components of the same types come and go.
+/// Without huge pages, because the kernel may stop the loop while it makes one of locked memory.
 class ComponentArena final : public ComponentMemory {
    public:
     /// Larger blocks are on the heap.
-    static constexpr std::size_t kLargest = 16384;  // bytes
-    static constexpr std::size_t kFirstChunk = std::size_t{64} * 1024;
-    /// A huge page of x86-64: many components then need one entry of the address cache (TLB).
-    static constexpr std::size_t kChunk = std::size_t{2} * 1024 * 1024;
+    static constexpr std::size_t kLargest = 16384;                  // bytes
+    static constexpr std::size_t kChunk = std::size_t{128} * 1024;  // bytes
 
     /// The arena of the process; null if a sanitizer has to see each block.
     static ComponentArena* ofProcess();
@@ -33,6 +32,8 @@ class ComponentArena final : public ComponentMemory {
         Free* next;
     };
     using Kind = std::pair<std::size_t, std::size_t>;  // size and alignment
+    static Kind kindOf(std::size_t size, std::size_t alignment) noexcept;
+    static bool isLarge(const Kind& kind) noexcept;
     void addChunk();
 
     std::mutex mutex_;  // protects all members below

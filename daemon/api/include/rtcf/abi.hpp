@@ -50,13 +50,27 @@ struct AbiProbe {
              offsetof(Rest, mailboxes), sizeof(MailboxBase), offsetof(MailboxBase, open_),
              offsetof(Rest, states), offsetof(Rest, staged_outputs), offsetof(Rest, failure)});
         using Context = ComponentContext;
-        add({sizeof(Context), offsetof(Context, full_name), offsetof(Context, name),
-             offsetof(Context, ns), offsetof(Context, runner), offsetof(Context, clock),
-             offsetof(Context, period_ns), offsetof(Context, elapsed_ns),
-             offsetof(Context, updated_ns), offsetof(Context, disabled),
-             offsetof(Context, recorder_slot), offsetof(Context, device), offsetof(Context, log),
-             offsetof(Context, gate), offsetof(Context, remaps), offsetof(Context, log_level),
-             offsetof(Context, said), sizeof(LogMemory), offsetof(Context, memory)});
+        add({sizeof(Context),
+             offsetof(Context, full_name),
+             offsetof(Context, name),
+             offsetof(Context, ns),
+             offsetof(Context, runner),
+             offsetof(Context, clock),
+             offsetof(Context, period_ns),
+             offsetof(Context, elapsed_ns),
+             offsetof(Context, updated_ns),
+             offsetof(Context, disabled),
+             offsetof(Context, recorder_slot),
+             offsetof(Context, device),
+             offsetof(Context, log),
+             offsetof(Context, gate),
+             offsetof(Context, remaps),
+             offsetof(Context, log_level),
+             offsetof(Context, said),
+             sizeof(LogMemory),
+             offsetof(Context, memory),
+             offsetof(Context, object_size),
+             sizeof(ComponentRecord)});
         add({sizeof(detail::ObjectHead), offsetof(detail::ObjectHead, memory),
              offsetof(detail::ObjectHead, size), offsetof(detail::ObjectHead, alignment)});
         add({sizeof(LoopClock), offsetof(LoopClock, iteration), offsetof(LoopClock, time_ns),
@@ -114,13 +128,13 @@ struct AbiProbe {
              offsetof(TypeInfo, copies),
              sizeof(ByteCopy)});
         using Declaration = ParameterDeclaration;
-        add({sizeof(ParameterBase), sizeof(Parameter<double>), offsetof(Parameter<double>, value_),
-             sizeof(ParameterValue), sizeof(Declaration), offsetof(Declaration, name),
-             offsetof(Declaration, type), offsetof(Declaration, default_value),
-             offsetof(Declaration, minimum), offsetof(Declaration, maximum),
-             offsetof(Declaration, unit), offsetof(Declaration, doc),
-             offsetof(Declaration, choices), sizeof(Choice), sizeof(DerivedBase),
-             sizeof(StagedValue)});
+        add({sizeof(ParameterBase), offsetof(ParameterBase, place_), sizeof(Parameter<double>),
+             offsetof(Parameter<double>, value_), sizeof(ParameterValue), sizeof(Declaration),
+             offsetof(Declaration, name), offsetof(Declaration, type),
+             offsetof(Declaration, default_value), offsetof(Declaration, minimum),
+             offsetof(Declaration, maximum), offsetof(Declaration, unit),
+             offsetof(Declaration, doc), offsetof(Declaration, choices), sizeof(Choice),
+             sizeof(DerivedBase), sizeof(StagedValue)});
         add({sizeof(StateDeclaration), offsetof(StateDeclaration, name),
              offsetof(StateDeclaration, type), offsetof(StateDeclaration, identity),
              offsetof(StateDeclaration, size), offsetof(StateDeclaration, value),
@@ -133,7 +147,8 @@ struct AbiProbe {
              placeOf(&Component::start), placeOf(&Component::update), placeOf(&Component::safe),
              placeOf(&Component::stop), placeOf(&Component::cleanup), placeOf(&Component::takeOver),
              placeOf(&Source::wait), placeOf(&StagedValue::commit), placeOf(&StagedValue::release),
-             placeOf(&ParameterBase::stage), placeOf(&LogSink::claim), placeOf(&LogSink::commit)});
+             placeOf(&ParameterBase::stage), placeOf(&LogSink::claim), placeOf(&LogSink::commit),
+             placeOf(&ComponentMemory::allocate), placeOf(&ComponentMemory::release)});
         return static_cast<std::uint32_t>(hash ^ (hash >> 32));
     }
 

@@ -64,10 +64,13 @@ struct ComponentContext {
     std::atomic<LogLevel> log_level{LogLevel::Info};          ///< least severe level that is logged
     LogMemory said;                     ///< state of the _ONCE and _THROTTLE macros
     ComponentMemory* memory = nullptr;  ///< of the component and its values; null = the heap
+    std::size_t object_size = 0;        ///< of the component, bytes; set before its constructor
 };
 
-inline ComponentMemory* detail::memoryOf(const ComponentContext* context) noexcept {
-    return context != nullptr ? context->memory : nullptr;
+inline ComponentMemory* detail::memoryFor(ComponentContext* context, std::size_t size) noexcept {
+    if (context == nullptr) return nullptr;
+    context->object_size = size;
+    return context->memory;
 }
 
 /// Base class of all components.
@@ -79,7 +82,9 @@ class Component {
     Component& operator=(const Component&) = delete;
 
     /// @name Memory
-    /// The executor's, see component_memory.hpp. Not real-time.
+    /// The executor's, see component_memory.hpp. A component with another base class that has
+    /// operators new and delete declares `using Component::operator new;` and
+    /// `using Component::operator delete;`. Not real-time.
     /// @{
     static void* operator new(std::size_t size) {
         return detail::newObject(size, alignof(std::max_align_t));
@@ -87,7 +92,19 @@ class Component {
     static void* operator new(std::size_t size, std::align_val_t alignment) {
         return detail::newObject(size, static_cast<std::size_t>(alignment));
     }
+    static void* operator new(std::size_t size, const std::nothrow_t& /*nothrow*/) noexcept {
+        try {
+            return operator new(size);
+        } catch (...) {
+            return nullptr;
+        }
+    }
+    static void* operator new(std::size_t /*size*/, void* place) noexcept { return place; }
     static void operator delete(void* object) noexcept { detail::deleteObject(object); }
+    static void operator delete(void* object, const std::nothrow_t& /*nothrow*/) noexcept {
+        detail::deleteObject(object);
+    }
+    static void operator delete(void* /*object*/, void* /*place*/) noexcept {}
     static void operator delete(void* object, std::align_val_t /*alignment*/) noexcept {
         detail::deleteObject(object);
     }
@@ -217,6 +234,10 @@ class Component {
     void declareFinite(OutputBase* output) { rest_->staged_outputs.push_back(output); }
     void declare(ParameterBase* parameter) {
         declareIn(rest_->parameters, parameter, parameter->declaration().name, "parameter");
+    }
+    /// Undoes the last declarations of parameters.
+    void undeclareParameters(std::size_t count) noexcept {
+        rest_->parameters.resize(rest_->parameters.size() - count);
     }
     /// @}
 
@@ -401,6 +422,10 @@ inline ParameterBase::ParameterBase(Component* owner, ParameterDeclaration decla
     if (const std::string why = check(initial); !why.empty())
         throw std::logic_error("default value: " + why);
     owner->declare(this);
+}
+
+inline void detail::undeclareParameters(Component& owner, std::size_t count) noexcept {
+    owner.undeclareParameters(count);
 }
 
 inline std::string ParameterBase::check(ParameterValue& value) const {

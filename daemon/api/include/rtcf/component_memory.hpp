@@ -4,7 +4,10 @@
 /// pages.
 #pragma once
 
+#include <pthread.h>
+
 #include <algorithm>
+#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -31,8 +34,40 @@ class ComponentMemory {
 
 namespace detail {
 
-/// Memory for the component that is being constructed in this library; null = the heap.
-__attribute__((visibility("hidden"))) inline ComponentMemory* construction_memory = nullptr;
+/// The memory of the component that this library is constructing, for the thread that does it.
+struct Construction {
+    std::atomic<ComponentMemory*> memory{nullptr};
+    std::atomic<pthread_t> thread{};
+};
+__attribute__((visibility("hidden"))) inline Construction construction;
+
+/// Memory for the parts of the component that the calling thread is constructing; null = the heap.
+inline ComponentMemory* constructionMemory() noexcept {
+    // Other threads may be making slots of this library's types.
+    ComponentMemory* const memory = construction.memory.load(std::memory_order_acquire);
+    const bool ours = construction.thread.load(std::memory_order_relaxed) == pthread_self();
+    return ours ? memory : nullptr;
+}
+
+/// Sets constructionMemory() of the calling thread until the end of the block.
+class ConstructionScope {
+   public:
+    explicit ConstructionScope(ComponentMemory* memory) noexcept
+        : memory_(construction.memory), thread_(construction.thread) {
+        set(memory, pthread_self());
+    }
+    ~ConstructionScope() { set(memory_, thread_); }
+    ConstructionScope(const ConstructionScope&) = delete;
+    ConstructionScope& operator=(const ConstructionScope&) = delete;
+
+   private:
+    static void set(ComponentMemory* memory, pthread_t thread) noexcept {
+        construction.thread.store(thread, std::memory_order_relaxed);
+        construction.memory.store(memory, std::memory_order_release);
+    }
+    ComponentMemory* memory_;
+    pthread_t thread_;
+};
 
 inline void* allocateFrom(ComponentMemory* memory, std::size_t size, std::size_t alignment) {
     return memory != nullptr ? memory->allocate(size, alignment)
@@ -74,8 +109,8 @@ std::unique_ptr<T, Release<T>> makeBeside() {
         ComponentMemory* memory;
         void* place;
     };
-    Block block(construction_memory);
-    std::unique_ptr<T, Release<T>> object(new (block.place) T(), Release<T>{block.memory});
+    Block block(constructionMemory());
+    std::unique_ptr<T, Release<T>> object(::new (block.place) T(), Release<T>{block.memory});
     block.place = nullptr;
     return object;
 }
@@ -98,11 +133,11 @@ struct ObjectHead {
 
 inline void* newObject(std::size_t size, std::size_t alignment) {
     if (size > std::numeric_limits<std::uint32_t>::max()) throw std::bad_alloc();
-    const ObjectHead head{construction_memory, static_cast<std::uint32_t>(size),
+    const ObjectHead head{constructionMemory(), static_cast<std::uint32_t>(size),
                           static_cast<std::uint32_t>(std::max(alignment, alignof(ObjectHead)))};
     void* const block = allocateFrom(head.memory, head.offset() + size, head.alignment);
     auto* const object = static_cast<std::byte*>(block) + head.offset();
-    new (object - sizeof head) ObjectHead(head);
+    ::new (object - sizeof head) ObjectHead(head);
     return object;
 }
 

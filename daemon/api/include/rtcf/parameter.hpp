@@ -120,10 +120,14 @@ class ParameterBase : public StagedValue {
     ParameterDeclaration declaration_;
 
    private:
+    friend struct AbiProbe;
     const void* place_;
 };
 
 namespace detail {
+
+/// Undoes the last declarations of parameters.
+void undeclareParameters(Component& owner, std::size_t count) noexcept;
 
 /// Declaration and staged value of a parameter, or of an element of an array. Kept outside the
 /// component, so that the values that each cycle touches lie close together.
@@ -282,11 +286,18 @@ class Parameter<std::array<T, N>> final {
     Parameter(Component* owner, const std::string& name, const Array& initial,
               const Options&... options)
         : value_(initial), settings_(std::make_unique<Settings>()) {
-        for (std::size_t i = 0; i < N; ++i) {
-            std::string element = name + '_' + std::to_string(i);
-            settings_->emplace_back(
-                owner, detail::DeclarationOf<T>::make(std::move(element), initial[i], options...),
-                value_[i]);
+        auto& elements = settings_->elements;
+        try {
+            for (std::size_t i = 0; i < N; ++i) {
+                std::string element = name + '_' + std::to_string(i);
+                elements.emplace_back(
+                    owner,
+                    detail::DeclarationOf<T>::make(std::move(element), initial[i], options...),
+                    value_[i]);
+            }
+        } catch (...) {
+            detail::undeclareParameters(*owner, elements.size());
+            throw;
         }
     }
     Parameter(const Parameter&) = delete;
@@ -300,17 +311,24 @@ class Parameter<std::array<T, N>> final {
     /// One of the values. Real-time safe.
     const T& operator[](std::size_t index) const noexcept RTCF_NONBLOCKING { return value_[index]; }
 
+    auto begin() const noexcept RTCF_NONBLOCKING { return value_.begin(); }
+    auto end() const noexcept RTCF_NONBLOCKING { return value_.end(); }
+    static constexpr std::size_t size() noexcept RTCF_NONBLOCKING { return N; }
+
     /// The staged values, and the present ones where none is staged. In prepare(); not real-time
     /// safe.
-    Array proposed() const {
-        Array result;
-        std::transform(settings_->begin(), settings_->end(), result.begin(),
-                       [](const auto& setting) { return setting.proposed(); });
-        return result;
+    const Array& proposed() const {
+        std::transform(settings_->elements.begin(), settings_->elements.end(),
+                       settings_->proposed.begin(),
+                       [](const auto& element) { return element.proposed(); });
+        return settings_->proposed;
     }
 
    private:
-    using Settings = std::deque<detail::ParameterSetting<T>>;
+    struct Settings {
+        std::deque<detail::ParameterSetting<T>> elements;
+        Array proposed{};  // result of the last proposed()
+    };
     Array value_;
     const std::unique_ptr<Settings> settings_;
 };
@@ -320,7 +338,7 @@ class Parameter<std::array<T, N>> final {
 class Values {
    public:
     template <typename T>
-    decltype(auto) operator[](const Parameter<T>& parameter) const {
+    const T& operator[](const Parameter<T>& parameter) const {
         return parameter.proposed();
     }
 };

@@ -3,7 +3,9 @@
 /// source file, is all that a component needs.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <utility>
 
 #include "rtcf/component_memory.hpp"
 #include "rtcf/version.hpp"
@@ -52,25 +54,22 @@ struct __attribute__((visibility("hidden"))) Registration {
 /// Context of the component that is being constructed in this library.
 __attribute__((visibility("hidden"))) inline ComponentContext* under_construction = nullptr;
 
-/// The context's memory for components; null = the heap.
-ComponentMemory* memoryOf(const ComponentContext* context) noexcept;
+/// Notes the size of the component. @return the context's memory for components; null = the heap
+ComponentMemory* memoryFor(ComponentContext* context, std::size_t size) noexcept;
 
 /// Constructs a component whose constructor may log.
 template <typename T, typename... Arguments>
 T* construct(ComponentContext* context, const Arguments&... arguments) {
     struct Guard {
-        explicit Guard(ComponentContext* present) {
-            under_construction = present;
-            construction_memory = memoryOf(present);
-        }
-        ~Guard() {
-            under_construction = nullptr;
-            construction_memory = nullptr;
-        }
+        explicit Guard(ComponentContext* present)
+            : before(std::exchange(under_construction, present)) {}
+        ~Guard() { under_construction = before; }
         Guard(const Guard&) = delete;
         Guard& operator=(const Guard&) = delete;
+        ComponentContext* before;
     };
     const Guard guard(context);
+    const ConstructionScope scope(memoryFor(context, sizeof(T)));
     return new T(arguments...);
 }
 

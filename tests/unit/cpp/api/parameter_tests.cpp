@@ -195,6 +195,29 @@ TEST_F(ParameterTest, ElementsOfAnArrayAreParameters) {
     EXPECT_EQ(gains[1], 7.0);
 }
 
+TEST_F(ParameterTest, AnArrayIsDeclaredWholeOrNotAtAll) {
+    const Parameter<double> taken{&component, "gains_2", 1.0};
+    const auto declare = [this] {
+        const Parameter<std::array<double, 3>> gains{&component, "gains", {1.0, 2.0, 3.0}};
+    };
+    EXPECT_THROW(declare(), std::logic_error);
+    ASSERT_EQ(component.parameters().size(), 1U);
+    EXPECT_EQ(component.parameters()[0]->declaration().name, "gains_2");
+}
+
+TEST_F(ParameterTest, AnArrayIsARange) {
+    const Parameter<std::array<double, 3>> gains{&component, "gains", {1.0, 2.0, 3.0}};
+    double sum = 0.0;
+    for (const double gain : gains) sum += gain;
+    EXPECT_EQ(sum, 6.0);
+    EXPECT_EQ(gains.size(), 3U);
+    // The proposed values outlive the expression.
+    const double& last = Values{}[gains][2];
+    named("gains_2").stage(5.0);
+    (void)gains.proposed();
+    EXPECT_EQ(last, 5.0);
+}
+
 TEST_F(ParameterTest, ElementsOfAnArrayChangeTogether) {
     const Parameter<std::array<int, 2>> limits{&component, "limits", {-1, 1}, Max(10)};
     named("limits_0").stage(Int{-5});

@@ -27,8 +27,13 @@ class Forgetful final : public Component {
     }
 };
 
-TEST(UndeclaredMembers, AreNotPortsAndStates) {
-    const auto component = std::make_unique<Forgetful>();
+class UndeclaredMembers : public ::testing::Test {
+   protected:
+    ComponentContext context_;
+    const std::unique_ptr<Forgetful> component{detail::construct<Forgetful>(&context_)};
+};
+
+TEST_F(UndeclaredMembers, AreNotPortsAndStates) {
     executor::UndeclaredMembers members(*component);
     for (int i = 0; i < 5; ++i) {
         component->in.read();
@@ -38,8 +43,7 @@ TEST(UndeclaredMembers, AreNotPortsAndStates) {
     EXPECT_TRUE(members.found().empty());
 }
 
-TEST(UndeclaredMembers, AreNamedByTheirNeighbours) {
-    const auto component = std::make_unique<Forgetful>();
+TEST_F(UndeclaredMembers, AreNamedByTheirNeighbours) {
     executor::UndeclaredMembers members(*component);
     ++component->count;
     members.look();

@@ -4,13 +4,17 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <map>
 #include <memory>
+#include <new>
 #include <random>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "rtcf/component.hpp"
@@ -112,10 +116,49 @@ TEST(ComponentArena, HoldsComponentsAndTheirValues) {
         const std::uintptr_t value = placeOf(made->outputs()[0]->slot().get());
         EXPECT_LE(value - placeOf(made.get()), sizeof(WideComponent) + 128);
     }
+    EXPECT_EQ(context.object_size, sizeof(WideComponent));
+    // In another thread, values are on the heap meanwhile.
+    {
+        const detail::ConstructionScope scope(&arena);
+        EXPECT_EQ(detail::constructionMemory(), &arena);
+        std::thread([] { EXPECT_EQ(detail::constructionMemory(), nullptr); }).join();
+    }
+    EXPECT_EQ(detail::constructionMemory(), nullptr);
     // Without an executor, on the heap.
     const std::unique_ptr<Component> alone = std::make_unique<WideComponent>();
     EXPECT_EQ(placeOf(alone.get()) % 128, 0U);
     EXPECT_EQ(detail::ObjectHead::of(alone.get()).memory, nullptr);
+    const std::unique_ptr<Component> careful(new (std::nothrow) WideComponent);
+    EXPECT_NE(careful, nullptr);
+    alignas(WideComponent) std::array<std::byte, sizeof(WideComponent)> place{};
+    auto* const placed = new (place.data()) WideComponent;
+    EXPECT_EQ(static_cast<void*>(placed), place.data());
+    placed->~WideComponent();
+}
+
+class Assembly final : public Component {
+   public:
+    explicit Assembly(ComponentContext* inner)
+        : part(detail::construct<WideComponent>(inner)), last(this, "last") {}
+    void update() override {}
+    std::unique_ptr<Component> part;
+    Output<double> last;
+};
+
+TEST(ComponentArena, HoldsComponentsThatConstructOthers) {
+    auto& arena = *new ComponentArena;  // NOLINT(cppcoreguidelines-owning-memory)
+    ComponentContext outer;
+    outer.full_name = "/outer";
+    outer.memory = &arena;
+    ComponentContext inner;
+    const std::unique_ptr<Assembly> made(detail::construct<Assembly>(&outer, &inner));
+    EXPECT_EQ(&made->context(), &outer);
+    EXPECT_EQ(&made->part->context(), &inner);
+    EXPECT_EQ(detail::ObjectHead::of(made.get()).memory, &arena);
+    EXPECT_EQ(detail::ObjectHead::of(made->part.get()).memory, nullptr);
+    const auto begin = reinterpret_cast<std::uintptr_t>(made.get());
+    const auto last = reinterpret_cast<std::uintptr_t>(made->last.slot().get());
+    EXPECT_LE(last - begin, sizeof(Assembly) + 64);
 }
 
 TEST(ComponentArena, KeepsAValueThatOutlivesItsComponent) {
