@@ -130,7 +130,9 @@ def test_instructions_and_cache_lines_of_a_cycle_match_the_docs(tmp_path: Path) 
     assert documented.keys() == {each["text"] for each in found}
     for each in found:
         count, verdict = documented[each["text"]]
-        assert each["measured"] == pytest.approx(count, rel=TOLERANCE), each["text"]
+        # The stack and the heap begin at other places within a line in each run.
+        moves = 2.0 if each["unit"] == "lines" else 0.0
+        assert each["measured"] == pytest.approx(count, rel=TOLERANCE, abs=moves), each["text"]
         word = "kept" if each["kept"] else "over"
         assert verdict == f"{each['limit']:.0f}: {word}", each["text"]
 
