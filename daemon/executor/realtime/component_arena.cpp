@@ -7,6 +7,10 @@
 
 namespace rtcf::executor {
 
+ComponentArena::~ComponentArena() {
+    for (void* chunk : chunks_) std::free(chunk);
+}
+
 ComponentArena* ComponentArena::ofProcess() {
 #if defined(__SANITIZE_ADDRESS__)
     return nullptr;
@@ -61,10 +65,12 @@ void ComponentArena::release(void* block, std::size_t size, std::size_t alignmen
     free = ::new (block) Free{free};
 }
 
-// The rest of the present chunk is lost.
+// The rest of the last chunk is lost.
 void ComponentArena::addChunk() {
+    chunks_.reserve(chunks_.size() + 1);
     void* const chunk = std::aligned_alloc(kLargest, kChunk);
     if (chunk == nullptr) throw std::bad_alloc();
+    chunks_.push_back(chunk);
     next_ = static_cast<std::byte*>(chunk);
     end_ = next_ + kChunk;
 }

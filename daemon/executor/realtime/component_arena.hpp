@@ -7,6 +7,7 @@
 #include <map>
 #include <mutex>
 #include <utility>
+#include <vector>
 
 #include "rtcf/component_memory.hpp"
 
@@ -20,6 +21,10 @@ class ComponentArena final : public ComponentMemory {
     /// Larger blocks are on the heap.
     static constexpr std::size_t kLargest = 16384;                  // bytes
     static constexpr std::size_t kChunk = std::size_t{128} * 1024;  // bytes
+
+    ComponentArena() = default;
+    /// Frees all chunks. After all their blocks.
+    ~ComponentArena();
 
     /// The arena of the process; null if a sanitizer has to see each block.
     static ComponentArena* ofProcess();
@@ -38,7 +43,8 @@ class ComponentArena final : public ComponentMemory {
 
     std::mutex mutex_;  // protects all members below
     std::map<Kind, Free*> free_;
-    std::byte* next_ = nullptr;  // of the present chunk
+    std::vector<void*> chunks_;
+    std::byte* next_ = nullptr;  // of the last chunk
     std::byte* end_ = nullptr;
 };
 

@@ -38,8 +38,7 @@ TEST(ComponentArena, KeepsAllBlocksApartInRandomHistories) {
         const auto upTo = [&draw](std::size_t most) {
             return std::uniform_int_distribution<std::size_t>(0, most)(draw);
         };
-        // Lives as long as the process, like that of the executor.
-        auto& arena = *new ComponentArena;  // NOLINT(cppcoreguidelines-owning-memory)
+        ComponentArena arena;
         std::map<unsigned char*, ArenaBlock> blocks;
         for (int step = 0; step < 2000; ++step) {
             if (!blocks.empty() && upTo(2) == 0) {
@@ -73,7 +72,7 @@ TEST(ComponentArena, KeepsAllBlocksApartInRandomHistories) {
 }
 
 TEST(ComponentArena, LaysBlocksSideBySideAndUsesFreeOnesAgain) {
-    auto& arena = *new ComponentArena;  // NOLINT(cppcoreguidelines-owning-memory)
+    ComponentArena arena;
     auto* const first = static_cast<std::byte*>(arena.allocate(160, 16));
     auto* const second = static_cast<std::byte*>(arena.allocate(16, 8));
     auto* const third = static_cast<std::byte*>(arena.allocate(160, 16));
@@ -101,7 +100,7 @@ class alignas(128) WideComponent final : public Component {
 };
 
 TEST(ComponentArena, HoldsComponentsAndTheirValues) {
-    auto& arena = *new ComponentArena;  // NOLINT(cppcoreguidelines-owning-memory)
+    ComponentArena arena;
     const auto placeOf = [](const void* object) {
         return reinterpret_cast<std::uintptr_t>(object);
     };
@@ -146,7 +145,7 @@ class Assembly final : public Component {
 };
 
 TEST(ComponentArena, HoldsComponentsThatConstructOthers) {
-    auto& arena = *new ComponentArena;  // NOLINT(cppcoreguidelines-owning-memory)
+    ComponentArena arena;
     ComponentContext outer;
     outer.full_name = "/outer";
     outer.memory = &arena;
@@ -162,7 +161,7 @@ TEST(ComponentArena, HoldsComponentsThatConstructOthers) {
 }
 
 TEST(ComponentArena, KeepsAValueThatOutlivesItsComponent) {
-    auto& arena = *new ComponentArena;  // NOLINT(cppcoreguidelines-owning-memory)
+    ComponentArena arena;
     ComponentContext context;
     context.memory = &arena;
     std::unique_ptr<WideComponent> first(detail::construct<WideComponent>(&context));
