@@ -99,6 +99,14 @@ class Component {
             return nullptr;
         }
     }
+    static void* operator new(std::size_t size, std::align_val_t alignment,
+                              const std::nothrow_t& /*nothrow*/) noexcept {
+        try {
+            return operator new(size, alignment);
+        } catch (...) {
+            return nullptr;
+        }
+    }
     static void* operator new(std::size_t /*size*/, void* place) noexcept { return place; }
     static void operator delete(void* object) noexcept { detail::deleteObject(object); }
     static void operator delete(void* object, const std::nothrow_t& /*nothrow*/) noexcept {
@@ -106,6 +114,10 @@ class Component {
     }
     static void operator delete(void* /*object*/, void* /*place*/) noexcept {}
     static void operator delete(void* object, std::align_val_t /*alignment*/) noexcept {
+        detail::deleteObject(object);
+    }
+    static void operator delete(void* object, std::align_val_t /*alignment*/,
+                                const std::nothrow_t& /*nothrow*/) noexcept {
         detail::deleteObject(object);
     }
     /// @}

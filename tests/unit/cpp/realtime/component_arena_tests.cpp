@@ -35,15 +35,15 @@ TEST(ComponentArena, KeepsAllBlocksApartInRandomHistories) {
     for (unsigned seed = 0; seed < 20; ++seed) {
         SCOPED_TRACE(seed);
         std::mt19937 draw(seed);
-        const auto upTo = [&draw](std::size_t most) {
+        const auto drawn = [&draw](std::size_t most) {
             return std::uniform_int_distribution<std::size_t>(0, most)(draw);
         };
         ComponentArena arena;
         std::map<unsigned char*, ArenaBlock> blocks;
         for (int step = 0; step < 2000; ++step) {
-            if (!blocks.empty() && upTo(2) == 0) {
-                const auto gone =
-                    std::next(blocks.begin(), static_cast<std::ptrdiff_t>(upTo(blocks.size() - 1)));
+            if (!blocks.empty() && drawn(2) == 0) {
+                const auto gone = std::next(blocks.begin(),
+                                            static_cast<std::ptrdiff_t>(drawn(blocks.size() - 1)));
                 const auto [size, alignment, content] = gone->second;
                 ASSERT_EQ(std::count(gone->first, gone->first + size, content),
                           static_cast<std::ptrdiff_t>(size));
@@ -51,9 +51,10 @@ TEST(ComponentArena, KeepsAllBlocksApartInRandomHistories) {
                 blocks.erase(gone);
                 continue;
             }
-            const std::size_t size = upTo(9) == 0 ? upTo(3 * ComponentArena::kLargest) : upTo(600);
-            const std::size_t alignment = std::size_t{1} << upTo(7);
-            const auto content = static_cast<unsigned char>(upTo(255));
+            const std::size_t size =
+                drawn(9) == 0 ? drawn(3 * ComponentArena::kLargest) : drawn(600);
+            const std::size_t alignment = std::size_t{1} << drawn(7);
+            const auto content = static_cast<unsigned char>(drawn(255));
             auto* const block = static_cast<unsigned char*>(arena.allocate(size, alignment));
             ASSERT_EQ(reinterpret_cast<std::uintptr_t>(block) % alignment, 0U);
             const auto next = blocks.lower_bound(block);
@@ -129,6 +130,7 @@ TEST(ComponentArena, HoldsComponentsAndTheirValues) {
     EXPECT_EQ(detail::ObjectHead::of(alone.get()).memory, nullptr);
     const std::unique_ptr<Component> careful(new (std::nothrow) WideComponent);
     EXPECT_NE(careful, nullptr);
+    EXPECT_EQ(placeOf(careful.get()) % 128, 0U);
     alignas(WideComponent) std::array<std::byte, sizeof(WideComponent)> place{};
     auto* const placed = new (place.data()) WideComponent;
     EXPECT_EQ(static_cast<void*>(placed), place.data());
