@@ -49,27 +49,21 @@ def load(kind: str) -> Iterator[None]:
     if kind != "stress-ng":
         yield
         return
-    process = subprocess.Popen(
-        ["stress-ng", "--quiet", "--cpu", "48", "--io", "48", "--timeout", "4h"],
-        start_new_session=True,
-    )
-    try:
+    with _stress_ng("--cpu", "48", "--io", "48", "--timeout", "4h"):
         yield
-    finally:
-        os.killpg(process.pid, signal.SIGTERM)
-        process.wait()
 
 
 @contextlib.contextmanager
 def swept_caches(cpu: int) -> Iterator[None]:
     """Stream through more memory than the caches hold, on one CPU whenever it is idle."""
-    process = subprocess.Popen(
-        [
-            *("stress-ng", "--quiet", "--stream", "1", "--stream-l3-size", "256M"),
-            *("--taskset", str(cpu), "--timeout", "1h"),
-        ],
-        start_new_session=True,
-    )
+    stream = ("--stream", "1", "--stream-l3-size", "256M")
+    with _stress_ng(*stream, "--taskset", str(cpu), "--timeout", "1h"):
+        yield
+
+
+@contextlib.contextmanager
+def _stress_ng(*arguments: str) -> Iterator[None]:
+    process = subprocess.Popen(["stress-ng", "--quiet", *arguments], start_new_session=True)
     try:
         yield
     finally:
