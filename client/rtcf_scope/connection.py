@@ -83,6 +83,11 @@ class Connection(web.RequestHandler):
                 self.transport.write(_UNREADABLE)
             self.force_close()
 
+    def log_exception(self, *args: Any, **given: Any) -> None:
+        """Log an error of the server; not of a body that nobody reads after the response."""
+        if not isinstance(given.get("exc_info"), web.RequestPayloadError):
+            super().log_exception(*args, **given)
+
     def handle_error(
         self,
         request: web.BaseRequest,
@@ -96,6 +101,11 @@ class Connection(web.RequestHandler):
         """
         if isinstance(exc, HttpProcessingError):
             text = f"not an HTTP request: {exc.message}"
+        elif (
+            isinstance(exc, UnicodeEncodeError) and not request.headers.get("Expect", "").isascii()
+        ):
+            # aiohttp puts the header into its response as it came.
+            status, text = 417, "unknown Expect header"
         else:
             text = message or "internal error of the scope: see its log"
             if not isinstance(exc, ConnectionError):  # the client has disconnected

@@ -322,6 +322,8 @@ DEEP = b"[" * 60_000
         (lambda _: [b"GET / HTTP/1.1", b"Host: [::1"], 403),
         (lambda _: [b"GET / HTTP/1.1", b"Host: 127.0.0.1", b"Origin: \xff\xfe"], 403),
         (lambda _: [b"GET / HTTP/1.0"], 403),
+        (lambda _: [b"GET / HTTP/1.1", b"Host: 127.0.0.1", b"Expect: \xff"], 417),
+        (lambda _: [b"GET /nowhere HTTP/1.1", b"Host: 127.0.0.1", b"Expect: more"], 417),
         (lambda scope: _good(scope, b"/api/graph?runner=%ff"), 400),
         (lambda scope: _good(scope, b"/api/graph?runner=\xff"), 400),
         (lambda scope: _good(scope, b"/api/component?name=%00&runner=%zz%"), 400),
@@ -358,6 +360,21 @@ def test_invalid_requests_are_rejected_in_one_line(
     status = _is_in_order(scope, _request(*make(scope)))
     if expected is not None:
         assert status in (expected if isinstance(expected, tuple) else (expected,))
+
+
+@pytest.mark.parametrize("encoding", [b"br", b"gzip", b"deflate"])
+def test_an_invalid_body_that_nobody_reads_is_not_logged(
+    scope: ScopeProcess, encoding: bytes
+) -> None:
+    headers = [b"Host: 127.0.0.1", b"Content-Encoding: " + encoding, b"Content-Length: 9"]
+    head = _request(b"GET / HTTP/1.1", *headers)
+    with socket.create_connection(("127.0.0.1", scope.port), DEADLINE_S) as client:
+        client.sendall(head)
+        assert client.recv(4096).startswith(b"HTTP/1.1")
+        client.sendall(b"no stream")  # after the response
+        while client.recv(65536):
+            pass
+    _is_calm(scope, head)
 
 
 @pytest.mark.parametrize(
