@@ -284,7 +284,14 @@ def _compressor() -> Any:
         import zstandard
     except ImportError:
         return lambda data: ("", data)
-    compressor = zstandard.ZstdCompressor(level=1)
+    # Heads and smooth values match those of the column before, at a large distance: a lazy search
+    # finds longer matches there than levels 1 to 6, which skip or forget it.
+    compressor = zstandard.ZstdCompressor(
+        compression_params=zstandard.ZstdCompressionParameters(
+            strategy=zstandard.STRATEGY_LAZY, window_log=22, hash_log=17, chain_log=16,
+            search_log=1, min_match=6, target_length=8,
+        )
+    )  # fmt: skip
     return lambda data: ("zstd", compressor.compress(data))
 
 

@@ -12,7 +12,7 @@ from rtcf_shared.ports import PortBatch, PortSchema, Signal
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-_CHUNK = 4 * 1024 * 1024  # bytes of messages, about
+_CHUNK = 8 * 1024 * 1024  # bytes of messages, about
 _LAYOUT = """MultiArrayLayout layout
 {kind}[] data
 ================================================================================
