@@ -102,14 +102,32 @@ class _Reader:
                     to = self._text(target, f"remaps.{port}")
                     spec.remaps.append(graph_pb2.Remap(source=port, target=to))
             elif key == "parameters":
+                found: dict[str, graph_pb2.ParameterValue] = {}
                 for name, (_, content) in self._mapping(value, key).items():
-                    parsed = self._value(content, f"parameters.{name}")
-                    spec.parameters.append(graph_pb2.ParameterSetting(name=name, value=parsed))
+                    self._parameters(name, content, found)
+                for name, each in found.items():
+                    spec.parameters.add(name=name, value=each)
             elif key == "breaks":
                 spec.breaks.extend(self._text(each, key) for each in self._list(value, key))
             else:
                 self._field(value, key, spec, key)
         return spec
+
+    def _parameters(self, name: str, node: Any, found: dict[str, graph_pb2.ParameterValue]) -> None:
+        """Add the parameters that a value sets, as flat() of spec.py."""
+        if node.id == "scalar":
+            if name in found:
+                raise self._error(node, f"parameters.{name} is set twice")
+            found[name] = self._value(node, f"parameters.{name}")
+            return
+        if not node.value:
+            raise self._error(node, f"parameters.{name} is empty")
+        if node.id == "mapping":
+            for key, (_, member) in self._mapping(node, f"parameters.{name}").items():
+                self._parameters(f"{name}/{key}", member, found)
+        else:
+            for index, element in enumerate(node.value):
+                self._parameters(f"{name}_{index}", element, found)
 
     def _message(self, node: Any, where: str, message: Any) -> None:
         """Set the fields of a settings message by the keys of a mapping."""

@@ -6,7 +6,7 @@ always a string.
 """
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TypeVar
 
 from rtcf.v1 import control_pb2, graph_pb2
@@ -103,6 +103,21 @@ def parse_value(text: str) -> graph_pb2.ParameterValue:
             double_value=float("nan") if special[3] else float(f"{special[1]}inf")
         )
     return graph_pb2.ParameterValue(string_value=_unquoted(text))
+
+
+def flat(name: str, value: object) -> Iterator[tuple[str, object]]:
+    """Yield the parameters that a value sets: those of a group for a mapping, `gains/p`, and the
+    elements of an array for a list or a NumPy array, `gains_0`.
+    """
+    value = value.tolist() if hasattr(value, "tolist") else value
+    if isinstance(value, Mapping):
+        for key, member in value.items():
+            yield from flat(f"{name}/{key}", member)
+    elif isinstance(value, list | tuple):
+        for index, element in enumerate(value):
+            yield from flat(f"{name}_{index}", element)
+    else:
+        yield name, value
 
 
 def parse_port(text: str) -> control_pb2.PortName:

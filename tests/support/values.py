@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterable
+from typing import Any
 
 import rtcf
 from daemon_process import wait_for
@@ -12,6 +13,14 @@ def port_value(client: rtcf.Client, component: str, port: str, runner: str = "")
     """Return the newest value of a port with one number; NaN if it has none yet."""
     (found,) = (each for each in client.get_component(component, runner).ports if each.name == port)
     return number(found.value) if found.HasField("value") else float("nan")
+
+
+def parameter_values(client: rtcf.Client, component: str, runner: str = "") -> dict[str, Any]:
+    """Return the values of a component's parameters."""
+    return {
+        each.name: getattr(each.value, str(each.value.WhichOneof("kind")))
+        for each in client.get_component(component, runner).parameters
+    }
 
 
 def number(text: str) -> float:

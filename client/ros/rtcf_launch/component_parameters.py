@@ -6,6 +6,7 @@ from typing import Any
 
 from rtcf.v1 import control_pb2, graph_pb2
 from rtcf_shared.enums import choices
+from rtcf_shared.spec import flat
 
 from rtcf_launch.codes import Code, Ending
 from rtcf_launch.parameters import Parameters, as_boolean, as_integer, close_to
@@ -94,19 +95,26 @@ def settings(
     """Return load-time values of declared parameters, the names of the other private ones, and a
     warning for each other one that may be misspelt.
 
-    The component's node handle can read the others, which may have any name.
+    A mapping sets the members of a group, a list the elements of an array. The component's node
+    handle can read the others, which may have any name.
     """
     result = []
     rest = []
     slips = []
-    for name, value in sorted(others.items()):
+    given: dict[str, Any] = {}
+    for name, value in others.items():
+        parts = dict(flat(name, value))
+        in_use = not declared.keys().isdisjoint(parts)
+        given |= parts if in_use else {name: value}
+    for name, value in sorted(given.items()):
         info = declared.get(name)
         if info is not None:
             result.append(graph_pb2.ParameterSetting(name=name, value=_value(info, value)))
             continue
         rest.append(name)
-        missing = [each for each in declared if each not in others]
-        if hint := close_to(name, missing):
+        missing = [each for each in declared if each not in given]
+        hint = close_to(name, missing)
+        if hint or name not in others:
             slips.append(f"the component declares no parameter ~{name}{hint}")
     return result, rest, slips
 

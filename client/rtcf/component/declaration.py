@@ -103,9 +103,13 @@ class Output(Declarable):
 
 
 class Parameter(Declarable):
-    """A parameter: `self.kp`. Users set it within its bounds; it is constant during a cycle."""
+    """A parameter: `self.kp`. Users set it within its bounds; it is constant during a cycle.
 
-    allowed = ("unit", "doc", "min", "max")
+    `name` is its name outside the component, and may contain groups: `Parameter(1.0,
+    name="gains/p")`.
+    """
+
+    allowed = ("unit", "doc", "min", "max", "name")
 
 
 class State(Declarable):
@@ -142,10 +146,11 @@ class Member:
     @property
     def elements(self) -> list[str]:
         """Return the names by which a parameter is set; `gain_0`, `gain_1` … for an array."""
+        name = str(self.options.get("name") or self.name)
         if not self.type.shape:
-            return [self.name]
+            return [name]
         places = np.ndindex(self.type.shape)
-        return ["_".join([self.name, *map(str, place)]) for place in places]
+        return ["_".join([name, *map(str, place)]) for place in places]
 
     @property
     def known(self) -> str:
@@ -242,6 +247,13 @@ def describe(cls: type) -> Description:
             if (other := taken.setdefault(name, member.name)) != member.name:
                 both = DeclarationError(f"and {other} both have a parameter {name}: rename one")
                 raise _at(both, cls, member.line, member.name)
+    for member in result.of(Parameter):
+        groups = _groups(member.elements[0]) if member.elements else []
+        if group := next((each for each in groups if each in taken), None):
+            both = DeclarationError(
+                f"is in a group {group}, and {taken[group]} is a parameter {group}: rename one"
+            )
+            raise _at(both, cls, member.line, member.name)
     return result
 
 
@@ -295,6 +307,7 @@ def _member(owner: type, name: str, annotation: object, line: int) -> Member:
     value = _initial(declared, initial)
     if kind is Parameter:
         _check_bounds(value, options)
+        _check_path(options.get("name", name))
     for option in ("unit", "doc"):
         if not isinstance(options.get(option, ""), str):
             raise DeclarationError(f"has {option}={options[option]!r}: use a string")
@@ -340,6 +353,19 @@ def _check_texts(message: MessageType | None, texts: Any) -> None:
         raise DeclarationError(
             "texts do not match the strings of the message: write {name: string} for names of: "
             f"{', '.join(known) or 'a message'}"
+        )
+
+
+def _groups(path: str) -> list[str]:
+    """Return the groups of a parameter: a and a/b for a/b/c."""
+    parts = path.split("/")[:-1]
+    return ["/".join(parts[: i + 1]) for i in range(len(parts))]
+
+
+def _check_path(path: Any) -> None:
+    if not isinstance(path, str) or not all(map(is_member_name, path.split("/"))):
+        raise DeclarationError(
+            f"has name={path!r}: use names of letters, digits and _, with / between groups"
         )
 
 

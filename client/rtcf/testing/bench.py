@@ -112,9 +112,11 @@ class Bench(Closing):
         return self._response(steps, outputs, {each.topic: each for each in begun.written})
 
     def set(self, component: str = "", **values: Any) -> None:
-        """Set parameters of `component` (default: the only one) for the next runs."""
-        settings = [_setting(name, value) for name, value in values.items()]
-        self._client.set_parameters(component or self._only().full_name, settings)
+        """Set parameters of `component` (default: the only one) for the next runs.
+
+        A mapping sets the members of a group, a list or NumPy array the elements of an array.
+        """
+        self._client.set_parameters(component or self._only().full_name, _settings(values))
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -262,13 +264,16 @@ def _graph_of(what: str, parameters: Mapping[str, Any]) -> Graph:
     if not (package and slash and kind):
         raise ValueError(f'"{what}" is neither PACKAGE/TYPE nor a graph file (.yaml)')
     spec = rtcf_shared.spec.component(package, kind)
-    spec.parameters.extend(_setting(name, value) for name, value in parameters.items())
+    spec.parameters.extend(_settings(parameters))
     return Graph(components=[spec])
 
 
+def _settings(values: Mapping[str, Any]) -> list[graph_pb2.ParameterSetting]:
+    given = (rtcf_shared.spec.flat(*each) for each in values.items())
+    return [_setting(name, value) for each in given for name, value in each]
+
+
 def _setting(name: str, value: object) -> graph_pb2.ParameterSetting:
-    if isinstance(value, np.generic):
-        value = value.item()
     kinds: dict[type, str] = {bool: "bool", int: "int", float: "double", str: "string"}
     kind = kinds.get(type(value))
     if kind is None:

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string_view>
@@ -23,6 +24,21 @@ XmlRpc::XmlRpcValue toXmlRpc(const ParameterValue& value) {
     }
     if (const auto* real = std::get_if<double>(&value)) return {*real};
     return {std::get<std::string>(value)};
+}
+
+// Returns the value of a parameter in the struct of its component; null if there is none. The
+// values of a group are a struct in it.
+XmlRpc::XmlRpcValue* find(XmlRpc::XmlRpcValue& values, const std::string& name) {
+    XmlRpc::XmlRpcValue* found = &values;
+    for (std::size_t begin = 0; begin != std::string::npos;) {
+        const std::size_t end = name.find('/', begin);
+        const std::string part = name.substr(begin, end - begin);
+        if (found->getType() != XmlRpc::XmlRpcValue::TypeStruct || !found->hasMember(part))
+            return nullptr;
+        found = &(*found)[part];
+        begin = end == std::string::npos ? end : end + 1;
+    }
+    return found;
 }
 
 // Converts a value; unset if a parameter cannot have this type. The loop checks the declared type.
@@ -186,12 +202,12 @@ bool ParameterMirror::read(ParallelCalls& master, const Caller& caller,
 bool ParameterMirror::take(XmlRpc::XmlRpcValue& values, const Component& component, bool first) {
     const executor::ParameterSet& set = *component.set;
     Known& known = known_[set.full_name];
-    const bool any = values.getType() == XmlRpc::XmlRpcValue::TypeStruct;
     executor::ParameterBatch batch;
     for (const auto& [declaration, value] : set.parameters) {
         const std::string& name = declaration.name;
+        XmlRpc::XmlRpcValue* const theirs = find(values, name);
         std::optional<ParameterValue> found;
-        if (any && values.hasMember(name)) found = fromXmlRpc(values[name], declaration.type);
+        if (theirs != nullptr) found = fromXmlRpc(*theirs, declaration.type);
         if (!found) {
             known.values.erase(name);
             known.others.erase(name);
@@ -199,7 +215,7 @@ bool ParameterMirror::take(XmlRpc::XmlRpcValue& values, const Component& compone
         }
         const auto before = known.values.find(name);
         if (before == known.values.end() || !sameValue(before->second, *found)) {
-            known.others[name] = values[name];
+            known.others[name] = *theirs;
             known.ours.erase(name);
         }
         known.values[name] = *found;

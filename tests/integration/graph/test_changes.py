@@ -8,7 +8,7 @@ import pytest
 import rtcf
 from daemon_process import Daemon, wait_for
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
-from values import iteration, port_value, wait_until_after
+from values import iteration, parameter_values, port_value, wait_until_after
 
 ROUNDS = 20
 
@@ -114,11 +114,6 @@ def test_parameters_change_while_the_loop_runs(daemon: Daemon, client: rtcf.Clie
     assert iteration(client) > before
 
 
-def _values(client: rtcf.Client, component: str) -> dict[str, object]:
-    found = client.get_component(component).parameters
-    return {each.name: getattr(each.value, each.value.WhichOneof("kind")) for each in found}
-
-
 def test_a_replacement_keeps_parameters_that_it_does_not_set(
     daemon: Daemon, client: rtcf.Client
 ) -> None:
@@ -127,14 +122,14 @@ def test_a_replacement_keeps_parameters_that_it_does_not_set(
     assert daemon.ctl("set", "knobs", "count:=4", "label:=mine").returncode == 0
     done = daemon.ctl("replace", "knobs", "rtcf_test", "Knobs", "--param", "label:=theirs")
     assert done.stdout == "replaced knobs by /knobs; kept count 4, rate 2.5\n"
-    assert _values(client, "knobs") == {
+    assert parameter_values(client, "knobs") == {
         "enabled": True, "count": 4, "rate": 2.5, "label": "theirs", "mode": "run",
     }  # fmt: skip
     # They are in the saved graph, too.
     saved = daemon.ctl("save").stdout
     assert "count: 4" in saved and "rate: 2.5" in saved and "label: theirs" in saved
     assert daemon.ctl("runner", "restart", "rt_runner").returncode == 0
-    assert _values(client, "knobs")["count"] == 4
+    assert parameter_values(client, "knobs")["count"] == 4
 
 
 def test_a_replacement_reports_parameters_that_do_not_fit(
@@ -154,7 +149,7 @@ def test_a_replacement_starts_with_defaults_if_requested(
     client.load(rtcf.component("rtcf_test", "Knobs", name="knobs", parameters=["rate:=2.5"]))
     done = daemon.ctl("replace", "knobs", "rtcf_test", "Knobs", "--reset-parameters")
     assert (done.stdout, done.stderr) == ("replaced knobs by /knobs\n", "")
-    assert _values(client, "knobs")["rate"] == 1.5
+    assert parameter_values(client, "knobs")["rate"] == 1.5
 
 
 def test_derived_values_change_in_the_same_cycle_as_the_frequency(client: rtcf.Client) -> None:

@@ -15,7 +15,7 @@ from daemon_process import wait_for, wait_until_it_is
 from launch_processes import Launching, Process, left_over
 from ros_processes import Master
 from rtcf.v1 import runner_pb2
-from values import is_among, iteration
+from values import is_among, iteration, parameter_values
 
 RUNNER_SERVICES = (
     "activate_rt_loop", "deactivate_rt_loop", "get_introspection_information", "get_loop",
@@ -170,16 +170,10 @@ def test_private_parameters_set_declared_parameters(launching: Launching, master
     with launching.client() as (client, runner):
         wait_until_running(client, runner)
 
-        def values(name: str) -> dict[str, object]:
-            found = client.get_component(name, runner).parameters
-            return {
-                each.name: getattr(each.value, str(each.value.WhichOneof("kind"))) for each in found
-            }
-
         left = {"amplitude": 2.5, "rate": 0.5, "shape": "sine", "silent": False}
         right = {"amplitude": 1.0, "rate": 2.0, "shape": "square", "silent": False}
-        assert values("/left/generator") == left
-        assert values("/right/generator") == right
+        assert parameter_values(client, "/left/generator", runner) == left
+        assert parameter_values(client, "/right/generator", runner) == right
     wait_until_it_is({"/left/wave", "/right/wave"}, lambda: set(topics(master)), "the topics")
     press_ctrl_c(launch)
 

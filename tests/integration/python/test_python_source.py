@@ -15,6 +15,7 @@ import rtcf
 import yaml
 from daemon_process import BUILD_TREE, DEADLINE_S, Daemon, wait_for
 from rtcfctl.graph import python_source
+from values import parameter_values
 
 COMPILE_DEADLINE_S = 900.0
 
@@ -99,11 +100,6 @@ class Watching:
         wait_for(lambda: self.said.count(text) >= times, text, COMPILE_DEADLINE_S)
 
 
-def _parameters(client: rtcf.Client, component: str = "Tuned") -> dict[str, object]:
-    found = client.get_component(component).parameters
-    return {each.name: getattr(each.value, each.value.WhichOneof("kind")) for each in found}
-
-
 def _history(client: rtcf.Client) -> list[tuple[str, str, object]]:
     return [
         (each.how, each.parameter, getattr(each.value, each.value.WhichOneof("kind")))
@@ -125,30 +121,30 @@ def test_tuned_values_stay_when_a_source_is_saved(
     _save(source, TUNED.format(kp=1.0, most=100.0, ki=0.25))
     with Watching(daemon, str(source), "Tuned", "--param", "ki:=0.5") as watching:
         watching.wait_for("loaded /Tuned")
-        assert _parameters(client) == {"kp": 1.0, "ki": 0.5}
+        assert parameter_values(client, "Tuned") == {"kp": 1.0, "ki": 0.5}
         assert daemon.ctl("set", "Tuned", "kp:=50").returncode == 0
         # A new default of a tuned or given parameter changes nothing.
         _save(source, TUNED.format(kp=2.0, most=90.0, ki=0.75))
         watching.wait_for("reloaded /Tuned")
         assert f"reloaded /Tuned from {source}; kept kp 50\n" in watching.said
-        assert _parameters(client) == {"kp": 50.0, "ki": 0.5}
+        assert parameter_values(client, "Tuned") == {"kp": 50.0, "ki": 0.5}
         history = [("load", "ki", 0.5), ("set", "kp", 50.0)]
         assert _history(client) == history, "a save sets nothing"
         assert daemon.ctl("undo", "Tuned").returncode == 0
-        assert _parameters(client)["kp"] == 1.0
+        assert parameter_values(client, "Tuned")["kp"] == 1.0
         assert daemon.ctl("set", "Tuned", "kp:=50", "ki:=3").returncode == 0
         history += [("undo", "kp", 1.0), ("set", "kp", 50.0), ("set", "ki", 3.0)]
         _save(source, TUNED.format(kp=3.0, most=9.0, ki=0.75))
         watching.wait_for("reloaded /Tuned", 2)
         note = "rtcfctl: note: /Tuned: kp = 50.0 does not fit: 0 to 9; it is 3.0 now\n"
         assert watching.said.count(note) == 1
-        assert _parameters(client) == {"kp": 3.0, "ki": 3.0}
+        assert parameter_values(client, "Tuned") == {"kp": 3.0, "ki": 3.0}
         history += [("replace", "kp", 3.0)]
         assert _history(client) == history
         # The parameter was not tuned, so its default applies.
         _save(source, TUNED.format(kp=4.0, most=9.0, ki=1.0))
         watching.wait_for("reloaded /Tuned", 3)
-        assert _parameters(client)["kp"] == 4.0
+        assert parameter_values(client, "Tuned")["kp"] == 4.0
         assert _history(client)[: len(history)] == history
 
 
@@ -407,7 +403,7 @@ def test_an_enum_parameter_is_set_by_name_as_in_cpp(daemon: Daemon, client: rtcf
     assert written() == "data: 7"
     assert daemon.ctl("set", "Modes", "mode:=RUN").returncode == 0
     assert written() == f"data: {2**41}"
-    assert _parameters(client, "Modes") == {"mode": "RUN"}
+    assert parameter_values(client, "Modes") == {"mode": "RUN"}
     assert daemon.ctl("set", "Modes", "mode:=LÄUFT").returncode == 0
     assert written() == f"data: {2**41}"
     for given, said in (
@@ -420,7 +416,7 @@ def test_an_enum_parameter_is_set_by_name_as_in_cpp(daemon: Daemon, client: rtcf
     assert written() == f"data: {2**41}"
     done = daemon.ctl("load", str(source), "Modes", "--name", "other", "--param", "mode:=RUN")
     assert done.returncode == 0, done.stderr
-    assert _parameters(client, "other") == {"mode": "RUN"}
+    assert parameter_values(client, "other") == {"mode": "RUN"}
     graph = daemon.folder / "graph.yaml"
     assert daemon.ctl("save", str(graph)).returncode == 0
     saved = yaml.safe_load(graph.read_text())["components"]
@@ -428,7 +424,7 @@ def test_an_enum_parameter_is_set_by_name_as_in_cpp(daemon: Daemon, client: rtcf
     graph.write_text(graph.read_text().replace("RUN", "HÄLT"))
     done = daemon.ctl("apply", str(graph))
     assert done.returncode == 0, done.stderr
-    assert _parameters(client, "other") == {"mode": "HÄLT"}
+    assert parameter_values(client, "other") == {"mode": "HÄLT"}
 
 
 def test_a_wrong_source_is_rejected_in_one_line(own_cache: Path, daemon: Daemon) -> None:

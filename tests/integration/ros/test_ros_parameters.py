@@ -14,7 +14,7 @@ from holding_master import HoldingMaster
 from launch_processes import Launching
 from ros_processes import Master
 from rtcf.v1 import runner_pb2
-from values import port_value
+from values import parameter_values, port_value
 
 _NAME = "/arm/knobs"
 
@@ -40,12 +40,7 @@ def dynparam(master: Master, *arguments: str) -> str:
 
 def values(client: rtcf.Client) -> dict[str, Any]:
     """Return the values in rtcf."""
-    result = {}
-    for each in client.get_component(_NAME).parameters:
-        kind = each.value.WhichOneof("kind")
-        assert kind is not None
-        result[each.name] = getattr(each.value, kind)
-    return result
+    return parameter_values(client, _NAME)
 
 
 def test_dynparam_sets_parameters_of_all_types_in_a_running_loop(

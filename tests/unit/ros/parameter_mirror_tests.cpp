@@ -26,11 +26,11 @@ class ParameterMirrorTest : public RosFixture {
         master_calls_ = std::make_unique<ParallelCalls>(address_, never_);
     }
     ParallelCalls& calls() { return *master_calls_; }
-    static ParameterMirror::Component component(double value) {
+    static ParameterMirror::Component component(double value, const char* name = "kp") {
         auto set = std::make_shared<ParameterSet>();
         set->full_name = "/C";
         rtcf::ParameterDeclaration declaration;
-        declaration.name = "kp";
+        declaration.name = name;
         declaration.type = "double";
         declaration.default_value = 1.0;
         set->parameters.push_back({declaration, value});
@@ -74,6 +74,44 @@ TEST_F(ParameterMirrorTest, DeletesNothingOfAReloadedComponent) {
         mirror.reconcile(calls(), caller_, {component(3.0)});
     }
     EXPECT_TRUE(ask("getParam", texts({"/test", "/C/kp"}))[0]) << "it was deleted";
+}
+
+TEST_F(ParameterMirrorTest, FindsAParameterInItsGroup) {
+    std::vector<std::pair<std::string, double>> taken;
+    ParameterMirror mirror;
+    mirror.serve([&](const std::string&, const rtcf::executor::ParameterBatch& batch, BatchPolicy,
+                     const std::function<void(const std::string&)>& done) {
+        for (const auto& [name, value] : batch) taken.emplace_back(name, std::get<double>(value));
+        done({});
+    });
+    const auto reconcile = [&](double value) {
+        mirror.reconcile(calls(), caller_, {component(value, "gains/filter/p")});
+    };
+    XmlRpc::XmlRpcValue given = texts({"/test", "/C/gains/filter/p"});
+    given[2] = 2.5;
+    ASSERT_TRUE(ask("setParam", given)[0]);
+    reconcile(1.0);
+    using Taken = std::vector<std::pair<std::string, double>>;
+    ASSERT_EQ(taken, (Taken{{"gains/filter/p", 2.5}}));
+    reconcile(2.5);
+    // A group that is written as a whole, without the parameter, and one that is no group.
+    for (const bool is_group : {true, false}) {
+        XmlRpc::XmlRpcValue whole = texts({"/test", "/C/gains"});
+        if (is_group) {
+            whole[2]["filter"]["q"] = 7.0;
+        } else {
+            whole[2] = 7.0;
+        }
+        ASSERT_TRUE(ask("setParam", whole)[0]);
+        mirror.noteWritten("/C/gains/");
+        reconcile(2.5);
+        EXPECT_EQ(taken.size(), 1U) << "the loop keeps its value";
+        auto answers = ask("getParam", texts({"/test", "/C/gains/filter/p"}));
+        ASSERT_TRUE(answers[0]) << "and writes it again";
+        EXPECT_EQ(static_cast<double>(answers[0].value), 2.5);
+    }
+    mirror.leave(calls(), caller_, {"/C"}, std::chrono::steady_clock::now() + 1s);
+    EXPECT_FALSE(ask("getParam", texts({"/test", "/C/gains/filter/p"}))[0]) << "it was the loop's";
 }
 
 // The loop may answer during a turn, which still has the old values.

@@ -233,20 +233,18 @@ class Component {
 
     /// @name Called by the members' constructors
     /// Not real-time.
-    /// @throws std::logic_error if the name is taken or not a ROS base name, and after freeze()
+    /// @throws std::logic_error if the name is taken or not legal, and after freeze()
     /// @{
     void declare(std::unique_ptr<InputPort> input) {
-        declareIn(rest_->inputs, input.get(), input->name(), "port");
+        declarePort(rest_->inputs, input.get());
         rest_->input_ports.push_back(std::move(input));
     }
-    void declare(OutputBase* output) { declareIn(rest_->outputs, output, output->name(), "port"); }
+    void declare(OutputBase* output) { declarePort(rest_->outputs, output); }
     void declare(StateDeclaration state);
     void declare(DerivedBase* derived) { rest_->derived.push_back(derived); }
     void declare(MailboxBase* mailbox) { rest_->mailboxes.push_back(mailbox); }
     void declareFinite(OutputBase* output) { rest_->staged_outputs.push_back(output); }
-    void declare(ParameterBase* parameter) {
-        declareIn(rest_->parameters, parameter, parameter->declaration().name, "parameter");
-    }
+    void declare(ParameterBase* parameter);
     /// Undoes the last declarations of parameters.
     void undeclareParameters(std::size_t count) noexcept {
         rest_->parameters.resize(rest_->parameters.size() - count);
@@ -275,8 +273,8 @@ class Component {
    private:
     friend struct AbiProbe;
     template <typename T>
-    void declareIn(std::vector<T*>& members, T* member, const std::string& name, const char* what);
-    void requireDeclarable(const std::string& name, const char* what) const;
+    void declarePort(std::vector<T*>& members, T* port);
+    void requireDeclarable(const std::string& name, const char* what, bool in_group = false) const;
     static ComponentContext& detached() {
         static const LoopClock clock{};
         static ComponentContext context;
@@ -305,17 +303,49 @@ class Component {
     Shared<std::int64_t> now_ = 1;  // loop time; stamps of outputs must not be 0
 };
 
-inline void Component::requireDeclarable(const std::string& name, const char* what) const {
-    const auto legal = [](char c) {
-        return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_';
-    };
-    if (name.empty() || std::isalpha(static_cast<unsigned char>(name[0])) == 0 ||
-        !std::all_of(name.begin(), name.end(), legal)) {
-        throw std::logic_error(fmt::format(
-            "{} '{}': not a legal name (a letter, then letters, digits and _)", what, name));
+// @param in_group true = the name may be a path of groups, as gains/p
+inline void Component::requireDeclarable(const std::string& name, const char* what,
+                                         bool in_group) const {
+    bool legal = true;
+    bool begins = true;  // a base name
+    for (const char c : name) {
+        const auto byte = static_cast<unsigned char>(c);
+        if (in_group && c == '/' && !begins) {
+            begins = true;
+            continue;
+        }
+        legal = legal &&
+                (std::isalpha(byte) != 0 || (!begins && (std::isdigit(byte) != 0 || c == '_')));
+        begins = false;
+    }
+    if (!legal || begins) {
+        throw std::logic_error(
+            fmt::format("{} '{}': not a legal name (a letter, then letters, digits and _{})", what,
+                        name, in_group ? "; / between groups" : ""));
     }
     if (rest_->frozen)
         throw std::logic_error(fmt::format("{} '{}' declared after configure()", what, name));
+}
+
+inline void Component::declare(ParameterBase* parameter) {
+    const std::string& name = parameter->declaration().name;
+    requireDeclarable(name, "parameter", true);
+    const auto contains = [](const std::string& group, const std::string& member) {
+        return member.size() > group.size() && member[group.size()] == '/' &&
+               member.compare(0, group.size(), group) == 0;
+    };
+    for (const ParameterBase* other : rest_->parameters) {
+        const std::string& taken = other->declaration().name;
+        if (taken == name)
+            throw std::logic_error(fmt::format("parameter '{}' is declared twice", name));
+        if (contains(taken, name) || contains(name, taken)) {
+            const std::string& both = taken.size() < name.size() ? taken : name;
+            throw std::logic_error(
+                fmt::format("'{}' is a parameter and the group of '{}': rename one", both,
+                            taken.size() < name.size() ? name : taken));
+        }
+    }
+    rest_->parameters.push_back(parameter);
 }
 
 inline void Component::declare(StateDeclaration state) {
@@ -358,26 +388,16 @@ const T* Predecessor::output(std::string_view name) const noexcept {
 }
 
 template <typename T>
-void Component::declareIn(std::vector<T*>& members, T* member, const std::string& name,
-                          const char* what) {
-    requireDeclarable(name, what);
+void Component::declarePort(std::vector<T*>& members, T* port) {
+    const std::string& name = port->name();
+    requireDeclarable(name, "port");
     const auto taken = [&](const auto& list) {
-        return std::any_of(list.begin(), list.end(), [&](const auto* other) {
-            if constexpr (std::is_same_v<T, ParameterBase>) {
-                return other->declaration().name == name;
-            } else {
-                return other->name() == name;
-            }
-        });
+        return std::any_of(list.begin(), list.end(),
+                           [&](const auto* other) { return other->name() == name; });
     };
-    bool duplicate = false;
-    if constexpr (std::is_same_v<T, ParameterBase>) {
-        duplicate = taken(rest_->parameters);
-    } else {
-        duplicate = taken(rest_->inputs) || taken(rest_->outputs);
-    }
-    if (duplicate) throw std::logic_error(fmt::format("{} '{}' is declared twice", what, name));
-    members.push_back(member);
+    if (taken(rest_->inputs) || taken(rest_->outputs))
+        throw std::logic_error(fmt::format("port '{}' is declared twice", name));
+    members.push_back(port);
 }
 
 inline InputBase::InputBase(Component* owner, std::string name, const TypeInfo& type,

@@ -241,7 +241,8 @@ template <typename T>
 class Parameter final {
    public:
     /// @param owner the component, `this`
-    /// @param name  ROS base name, unique among the component's parameters
+    /// @param name  unique among the component's parameters; a ROS base name, or a path of groups
+    ///     that ends in one: `gains/p`
     /// @param initial default value
     /// @param options any of Min, Max, Unit, Doc, Choice
     template <typename... Options>
@@ -279,7 +280,7 @@ class Parameter<std::array<T, N>> final {
     using Array = std::array<T, N>;
 
     /// @param owner the component, `this`
-    /// @param name  ROS base name; `<name>_<index>` are unique among the component's parameters
+    /// @param name  as of other parameters; `<name>_<index>` are unique
     /// @param initial default values
     /// @param options any of Min, Max, Unit, Doc, Choice; they hold for each element
     template <typename... Options>

@@ -54,6 +54,47 @@ TEST_F(ParameterTest, StartsWithItsDefault) {
     EXPECT_EQ(declaration.doc, "stiffness");
 }
 
+TEST_F(ParameterTest, HasAPathOfGroupsAsItsName) {
+    const Parameter<double> p{&component, "gains/p", 1.0};
+    const Parameter<int> order{&component, "gains/filter/order", 2};
+    const Parameter<std::array<double, 2>> k{&component, "gains/k", {1.0, 2.0}};
+    const Parameter<double> alike{&component, "gains_p", 3.0};
+    EXPECT_EQ(set("gains/p", 4.0), "");
+    EXPECT_EQ(set("gains/k_1", 5.0), "");
+    EXPECT_EQ(p.value(), 4.0);
+    EXPECT_EQ(k[1], 5.0);
+    EXPECT_EQ(order.value(), 2);
+    EXPECT_EQ(alike.value(), 3.0);
+}
+
+TEST_F(ParameterTest, RejectsNamesThatRosHasNot) {
+    for (const char* name :
+         {"", "/", "/p", "gains/", "gains//p", "gains/2", "gains/_p", "a.b", "ä"}) {
+        EXPECT_THROW((Parameter<double>{&component, name, 1.0}), std::logic_error) << name;
+    }
+    EXPECT_THROW((Output<double>{&component, "gains/p"}), std::logic_error) << "a port";
+    EXPECT_TRUE(component.parameters().empty());
+}
+
+TEST_F(ParameterTest, IsNotAGroupToo) {
+    const auto error = [&](const char* name) -> std::string {
+        try {
+            const Parameter<double> other{&component, name, 1.0};
+        } catch (const std::logic_error& found) {
+            return found.what();
+        }
+        return {};
+    };
+    const Parameter<double> p{&component, "gains/p", 1.0};
+    EXPECT_EQ(error("gains"), "'gains' is a parameter and the group of 'gains/p': rename one");
+    EXPECT_EQ(error("gains/p/low"),
+              "'gains/p' is a parameter and the group of 'gains/p/low': rename one");
+    EXPECT_EQ(error("gains/p"), "parameter 'gains/p' is declared twice");
+    const Parameter<std::array<double, 2>> k{&component, "k", {}};
+    EXPECT_EQ(error("k_1/low"), "'k_1' is a parameter and the group of 'k_1/low': rename one");
+    EXPECT_EQ(component.parameters().size(), 3U);
+}
+
 TEST_F(ParameterTest, ChangesAtCommitOnly) {
     const Parameter<double> gain{&component, "gain", 1.0};
     named("gain").stage(2.0);

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from daemon_process import BUILD_TREE
-from rtcf.component import DeclarationError
+from rtcf.component import DeclarationError, Parameter
 from rtcf_compile.comparison import verify
 from rtcf_compile.machine_code import object_file
 from rtcf_compile.source import modules
@@ -145,6 +145,50 @@ def test_names_invisible_to_ros_can_have_any_letters(tmp_path: Path) -> None:
     data = (tmp_path / "ü" / "größe.so").read_bytes()
     for text in ("größe {} läuft LÄUFT", "µm", "°/s", "Verstärkung", "Summe Σ", "θ-регулятор.py"):
         assert text.encode() in data, text
+
+
+GROUPS = """\
+import numpy as np
+from rtcf.component import Component, Parameter, State
+
+
+class Grouped(Component):
+    p: Parameter[float] = Parameter(1.0, name="gains/p")
+    k: Parameter[np.float64, 2] = Parameter([2.0, 3.0], name="gains/k")
+    {declared}
+
+    def update(self):
+        self.info("{{}}", self.p + self.k[1])
+"""
+
+
+def test_parameters_have_names_in_groups(tmp_path: Path) -> None:
+    file = written(tmp_path, GROUPS.format(declared="gains_p: Parameter[int] = 4"))
+    (machine_code,) = compiled(file)
+    names = [each.elements for each in machine_code.description.of(Parameter)]
+    assert names == [["gains/p"], ["gains/k_0", "gains/k_1"], ["gains_p"]]
+
+
+@pytest.mark.parametrize(
+    ("declared", "mistake"),
+    [
+        ('d: Parameter[float] = Parameter(1.0, name="gains/")', "has name='gains/': use names"),
+        ('d: Parameter[float] = Parameter(1.0, name="µ/p")', "has name='µ/p': use names"),
+        ("d: Parameter[float] = Parameter(1.0, name=3)", "has name=3: use names"),
+        ('d: Parameter[float] = Parameter(1.0, name="gains/p")', "and p both have a parameter"),
+        ("gains: Parameter[float] = 1.0", "is in a group gains, and gains is a parameter gains"),
+        (
+            'd: Parameter[float] = Parameter(1.0, name="gains/k_1/low")',
+            "is in a group gains/k_1, and k is a parameter gains/k_1: rename one",
+        ),
+        ('d: State[float] = State(1.0, name="gains/d")', "has no option 'name'"),
+    ],
+)
+def test_an_invalid_group_is_rejected(tmp_path: Path, declared: str, mistake: str) -> None:
+    file = written(tmp_path, GROUPS.format(declared=declared))
+    with pytest.raises((DeclarationError, Mistake)) as refused:
+        compiled(file)
+    assert mistake in str(refused.value)
 
 
 @pytest.mark.parametrize(

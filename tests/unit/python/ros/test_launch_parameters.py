@@ -290,6 +290,28 @@ def test_declared_parameters_get_values_of_their_type() -> None:
         component_parameters.settings({"kp": [1, 2]}, declared)
 
 
+def test_mappings_are_groups_and_lists_are_arrays_where_these_are_declared() -> None:
+    names = ("gains/p", "gains/filter/q", "k_0", "k_1", "text")
+    declared = {name: graph_pb2.ParameterInfo(name=name, type="double") for name in names}
+    settings, rest, slips = component_parameters.settings(
+        {
+            "gains": {"p": 2, "filter": {"q": 3}, "d": 4},
+            "k": [5, 6, 7],
+            "limits": {"low": 1, "high": [2]},
+            "joints": ["a", "b"],
+        },
+        declared,
+    )
+    assert {each.name: each.value.int_value for each in settings} == {
+        "gains/p": 2, "gains/filter/q": 3, "k_0": 5, "k_1": 6,
+    }  # fmt: skip
+    assert rest == ["gains/d", "joints", "k_2", "limits"]
+    assert slips == [
+        "the component declares no parameter ~gains/d",
+        "the component declares no parameter ~k_2",
+    ]
+
+
 def test_arguments_are_parsed_as_by_a_ros_node() -> None:
     given = arguments.parse(
         ["pkg", "Type", "in:=/a", "_kp:=2.5", "_label:='7'", "__name:=H1", "__log:=/l/H1-2.log"],

@@ -57,6 +57,17 @@ def test_every_key_is_read() -> None:
     ]  # fmt: skip
 
 
+def test_mappings_are_groups_of_parameters_and_lists_are_arrays() -> None:
+    written = "{gains: {p: 2, filter: {order: 4}, k: [1.5, 2]}, a: [[1, 2], [3, 4]], gains/i: 5}"
+    text = f"components: [{{package: p, type: T, parameters: {written}}}]"
+    (graph,) = rtcf.read_graphs(text, "x")
+    names = ["gains/p:=2", "gains/filter/order:=4", "gains/k_0:=1.5", "gains/k_1:=2"]
+    names += ["a_0_0:=1", "a_0_1:=2", "a_1_0:=3", "a_1_1:=4", "gains/i:=5"]
+    assert graph.components == [rtcf.component("p", "T", parameters=names)]
+    (again,) = rtcf.read_graphs(rtcf.write_graphs([graph]), "y")
+    assert again.components[0].parameters == graph.components[0].parameters
+
+
 def test_several_runners_are_read() -> None:
     text = "runners:\n  a: {components: []}\n  b:\n    components: [{package: p, type: T}]\n"
     a, b = rtcf.read_graphs(text, "x")
@@ -84,7 +95,11 @@ def test_several_runners_are_read() -> None:
         ("components:\n- package: p\n  type: T\n  name: 12\n", 4, "text, not 12; quote it"),
         ("components:\n- package: p\n  type: T\n  remaps: [a]\n", 4, "remaps must be a mapping"),
         ("components:\n- package: p\n  type: T\n  parameters: {k: }\n", 4, "k has no value"),
-        ("components:\n- package: p\n  type: T\n  parameters: {k: [1]}\n", 4, "a single value"),
+        ("components:\n- package: p\n  type: T\n  parameters: {k: []}\n", 4, "k is empty"),
+        ("components:\n- package: p\n  type: T\n  parameters: {g: {a: {}}}\n", 4, "g/a is empty"),
+        ("components:\n- package: p\n  type: T\n  parameters: {g: {a: }}\n", 4, "g/a has no value"),
+        ("components:\n- package: p\n  type: T\n  parameters:\n    g/a: 1\n    g: {a: 2}\n", 6,
+         "parameters.g/a is set twice"),
         ("components:\n- package: p\n  type: T\n  parameters: {k: 9e}\n  breaks: in1", 5, "a list"),
         ("components:\n- {package: p, type: T}\n- {package: p, type: T, ns: /}\n", 3,
          "component /T is already in line 2"),

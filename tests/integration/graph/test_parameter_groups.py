@@ -1,0 +1,185 @@
+"""Parameters in groups: `gains/p`, on all ways in."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rtcf
+import yaml
+from block_bench import PATH
+from daemon_process import Daemon, wait_for, with_ros
+from launch_processes import Launching
+from ros_processes import Master
+from rtcf.testing import Bench
+from rtcf.v1 import runner_pb2
+from values import parameter_values, port_value
+
+DEFAULTS = {
+    "gains/p": 1.0,
+    "gains/filter/order": 2,
+    "gains/k_0": 0.25,
+    "gains/k_1": 0.5,
+    "gains/k_2": 0.125,
+    "offset": 10.0,
+}
+GRAPH = """\
+components:
+  - package: rtcf_test
+    type: Grouped
+    parameters:
+      gains: {p: 5, filter: {order: 3}, k: [1.0, 2.0, 3.0]}
+"""
+IN_PYTHON = """\
+import numpy as np
+from rtcf.component import Component, Output, Parameter
+
+
+class Written(Component):
+    sum: Output[float]
+    kp: Parameter[float] = Parameter(1.0, name="gains/p", max=100.0)
+    k: Parameter[np.float64, 2] = Parameter(0.5, name="gains/k")
+
+    def update(self):
+        self.sum.write(self.kp + np.sum(self.k))
+"""
+LAUNCH = """
+<launch>
+  <node name="rt_runner" pkg="rtcf" type="rt_runner" output="screen">
+    <rosparam>{mode: wait_for_components, num_components_expected: 1, frequency: 500.0}</rosparam>
+  </node>
+  <node name="grouped" pkg="rtcf" type="rt_launcher" args="rtcf_test Grouped" output="screen">
+    <rosparam>
+      gains: {p: 5, filter: {order: 3}, k: [1.0, 2.0, 3.0], d: 7}
+      joints: [left, right]
+    </rosparam>
+    <param name="offset" value="1"/>
+  </node>
+</launch>
+"""
+
+
+def test_a_group_is_set_at_the_load_and_while_the_loop_runs(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    loaded = daemon.ctl(
+        "load", "rtcf_test", "Grouped", "--param", "gains/p:=2", "--param", "gains/k_1:=1.5"
+    )
+    assert loaded.returncode == 0, loaded.stderr
+    client.start()
+    wait_for(lambda: port_value(client, "Grouped", "sum") == 15.875, "the values of the load")
+    assert daemon.ctl("set", "Grouped", "gains/filter/order:=4").returncode == 0
+    wait_for(lambda: port_value(client, "Grouped", "sum") == 17.875, "the new value")
+    assert daemon.ctl("get", "Grouped.gains/filter/order").stdout == "4\n"
+    assert "gains/filter/order" in daemon.ctl("history", "Grouped").stdout
+    assert daemon.ctl("undo", "Grouped").returncode == 0
+    assert parameter_values(client, "Grouped")["gains/filter/order"] == 2
+    for change, words in (
+        ("gains/p:=-1", "gains/p = -1 is below its minimum 0"),
+        ("gains:=1", "has no parameter gains; it has gains/p, gains/filter/order"),
+        ("gains/q:=1", "has no parameter gains/q"),
+    ):
+        rejected = daemon.ctl("set", "Grouped", "offset:=0", change)
+        assert rejected.returncode != 0
+        assert words in rejected.stderr
+    assert parameter_values(client, "Grouped")["offset"] == 10.0
+
+
+def test_a_graph_file_has_groups_as_mappings(
+    daemon: Daemon, client: rtcf.Client, tmp_path: Path
+) -> None:
+    file = tmp_path / "graph.yaml"
+    file.write_text(GRAPH)
+    applied = daemon.ctl("apply", str(file))
+    assert applied.returncode == 0, applied.stderr
+    given = {"gains/p": 5.0, "gains/filter/order": 3}
+    given |= {f"gains/k_{i}": i + 1.0 for i in range(3)}
+    assert parameter_values(client, "Grouped") == {**DEFAULTS, **given}
+    saved = daemon.ctl("save").stdout
+    assert yaml.safe_load(saved)["components"][0]["parameters"] == given
+    file.write_text(GRAPH.replace("order", "ordr"))
+    rejected = daemon.ctl("apply", str(file))
+    assert rejected.returncode != 0
+    assert "gains/filter/ordr" in rejected.stderr
+    assert "gains/filter/order" in rejected.stderr
+
+
+def test_a_bench_takes_groups_and_arrays() -> None:
+    with Bench(
+        "rtcf_test/Grouped", path=PATH, gains={"p": 2, "k": np.array([1.0, 2.0, 3.0])}
+    ) as bench:
+        assert bench.run(steps=1)["sum"].tolist() == [20.0]
+        bench.set(gains={"filter": {"order": 9}}, offset=0)
+        assert bench.run(steps=1)["sum"].tolist() == [17.0]
+        with pytest.raises(ValueError, match="gains/p: None is not a bool"):
+            bench.set(gains={"p": None})
+
+
+def test_a_component_in_python_has_groups(
+    daemon: Daemon, client: rtcf.Client, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    file = tmp_path / "written.py"
+    file.write_text(IN_PYTHON)
+    loaded = daemon.ctl("load", str(file), "--param", "gains/k_1:=2")
+    assert loaded.returncode == 0, loaded.stderr
+    assert daemon.ctl("set", "Written", "gains/p:=3").returncode == 0
+    client.step(1)
+    assert port_value(client, "Written", "sum") == 5.5
+    assert "gains/p = 101" in daemon.ctl("set", "Written", "gains/p:=101").stderr
+
+
+@pytest.fixture
+def grouped(tmp_path: Path, master: Master) -> Iterator[tuple[Daemon, rtcf.Client]]:
+    """Yield a daemon with a running loop of Grouped on ROS."""
+    daemon = Daemon(tmp_path, with_ros(master.uri, ""))
+    daemon.start()
+    with rtcf.Client(daemon.socket) as client:
+        client.set_runner(runner_pb2.RunnerSettings(frequency_hz=200.0))
+        client.load(rtcf.component("rtcf_test", "Grouped", name="c", ns="/arm"))
+        client.start()
+        wait_for(lambda: "/arm/c/set_parameters" in master.services(), "the service")
+        yield daemon, client
+    daemon.end()
+
+
+def test_a_group_is_a_namespace_on_the_parameter_server(
+    grouped: tuple[Daemon, rtcf.Client], master: Master
+) -> None:
+    _, client = grouped
+    wait_for(lambda: master.parameter("/arm/c/gains/k_2") == 0.125, "the parameter server")
+    assert master.parameter("/arm/c/gains/filter") == {"order": 2}
+    master.run("rosparam", "set", "/arm/c/gains", "{p: 3, filter: {order: 5}}")
+    wait_for(lambda: parameter_values(client, "/arm/c")["gains/filter/order"] == 5, "the loop")
+    assert parameter_values(client, "/arm/c") == {
+        **DEFAULTS,
+        "gains/p": 3.0,
+        "gains/filter/order": 5,
+    }
+    wait_for(lambda: master.parameter("/arm/c/gains/k_2") == 0.125, "the rest of the group")
+    change = {"gains/p": 4.0, "gains/k_0": 2.0}
+    master.run("rosrun", "dynamic_reconfigure", "dynparam", "set", "/arm/c", json.dumps(change))
+    assert parameter_values(client, "/arm/c") == {**DEFAULTS, **change, "gains/filter/order": 5}
+    wait_for(lambda: master.parameter("/arm/c/gains/p") == 4.0, "the parameter server")
+    client.unload(["/arm/c"])
+    others = {"p": 3, "filter": {"order": 5}}  # values of another node
+    wait_for(lambda: master.parameter("/arm/c/gains") == others, "the end of its parameters")
+
+
+def test_a_launch_file_has_groups_and_arrays(tmp_path: Path, master: Master) -> None:
+    file = tmp_path / "grouped.launch"
+    file.write_text(LAUNCH)
+    launching = Launching(master, tmp_path)
+    try:
+        launch = launching.roslaunch(str(file))
+        with launching.client() as (client, runner):
+            wait_for(lambda: client.get_order(runner) == ["/grouped"], "the component")
+            found = parameter_values(client, "/grouped", runner)
+        given = {"gains/p": 5.0, "gains/filter/order": 3, "offset": 1.0}
+        given |= {f"gains/k_{i}": i + 1.0 for i in range(3)}
+        assert found == given
+        launch.wait_for_output("no parameter ~gains/d")
+        assert "~gains/d, ~joints" in launch.output()
+    finally:
+        launching.end()
