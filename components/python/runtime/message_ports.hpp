@@ -92,20 +92,21 @@ class MessageOutput final : public OutputBase {
         : OutputBase(owner, table.name, table.unit, table.message->type(),
                      table.finite != 0 ? &finite : nullptr),
           fields_(*table.message, table.leaves, table.leaf_count),
-          offset_(valueOffset(type())),
+          offset_(valueOffset(port().type())),
           record_(record),
           written_(placeIn<bool>(record, table.written)) {}
 
     /// Sets the sizes of the message and its constant strings, as rtcf::Output::reserve() does.
     void reserve(const OutputTable& table) {
-        const std::shared_ptr<SlotHeader> sample = type().make_slot(nullptr);
+        const TypeInfo& type = port().type();
+        const std::shared_ptr<SlotHeader> sample = type.make_slot(nullptr);
         void* const message = reinterpret_cast<std::byte*>(sample.get()) + offset_;
         fields_.resize(message);
         for (std::int64_t i = 0; i < table.text_count; ++i)
             setText(message, *table.message, table.texts[i]);
-        type().copy(*raw_, *sample);
-        type().copy(*slot(), *sample);
-        if (!type().fixed_size) setSample(type().make_slot(sample.get()));
+        type.copy(*raw_, *sample);
+        type.copy(*port().slot(), *sample);
+        if (!type.fixed_size) port().setSample(type.make_slot(sample.get()));
     }
 
     MessageFields fields_;

@@ -207,7 +207,7 @@ class GravityCompensation final : public rtcf::Component {
 
     bool readParameter(std::string& text) {
         const std::string& name = setup_->description;
-        if (context().gate == nullptr)
+        if (!rtcf::hasNode(this))
             return fail("urdf is empty, and without ROS there is no parameter {}: set urdf", name);
         const ros::NodeHandle node = rtcf::nodeHandle(this);
         std::string found;

@@ -15,17 +15,17 @@ constexpr std::size_t kWord = 8;  // granularity, as a number rarely changes in 
 UndeclaredMembers::UndeclaredMembers(const Component& component) {
     const void* complete = dynamic_cast<const void*>(&component);  // the complete object
     object_ = static_cast<const std::byte*>(complete);
-    const std::size_t size = component.context().object_size;
+    const std::size_t size = access(component).context().object_size;
     before_.assign(object_, object_ + size);
     changed_.resize(size);
     add(&component, sizeof component, "the base class", true);
-    for (const InputPort* input : component.inputs())
+    for (const InputPort* input : access(component).inputs())
         add(&input->input(), sizeof(InputBase), "input " + input->name(), true);
-    for (const OutputBase* output : component.outputs())
-        add(output, sizeof *output, "output " + output->name(), true);
-    for (const ParameterBase* parameter : component.parameters())
+    for (const OutputPort* output : access(component).outputs())
+        add(&output->output(), sizeof(OutputBase), "output " + output->name(), true);
+    for (const ParameterBase* parameter : access(component).parameters())
         add(parameter->place(), 0, "parameter " + parameter->declaration().name, false);
-    for (const StateDeclaration& state : component.states())
+    for (const StateDeclaration& state : access(component).states())
         add(state.value, state.size, "state " + state.name, true);
     std::sort(fields_.begin(), fields_.end(),
               [](const Field& a, const Field& b) { return a.begin < b.begin; });

@@ -49,9 +49,9 @@ struct Waiting {
     InputPort* input;
 };
 
-/// A change of OutputBase::connected().
+/// A change of OutputPort::connected().
 struct Audience {
-    OutputBase* output;
+    OutputPort* output;
     bool present;
 };
 

@@ -56,7 +56,7 @@ void Cycle::begin(std::int64_t period_ns, std::uint64_t warmup_cycles, std::int6
     total_elapsed_ns_ = 0;
     warmup_cycles_ = warmup_cycles;
     for (const Step& step : schedule_->steps) {
-        ComponentContext& context = step.component->context();
+        ComponentContext& context = access(*step.component).context();
         context.period_ns = period_ns * step.every;
         context.updated_ns = -1;
         context.disabled = false;
@@ -79,12 +79,12 @@ void Cycle::moveTime(std::int64_t by_ns) {
         const_cast<SlotHeader*>(slot)->stamp = movedStamp(slot->stamp, by_ns);
     };
     for (const Step& step : schedule_->steps) {
-        step.component->setTime(std::max<std::int64_t>(1, step.component->time() + by_ns));
-        for (const OutputBase* output : step.component->outputs()) {
+        access(*step.component).setTime(std::max<std::int64_t>(1, step.component->time() + by_ns));
+        for (const OutputPort* output : access(*step.component).outputs()) {
             move(output->slot().get());
             move(output->written());
         }
-        for (InputPort* input : step.component->inputs()) {
+        for (InputPort* input : access(*step.component).inputs()) {
             move(&input->slot());
             input->moveTime(by_ns);
             if (QueueBase* const queue = input->queue()) queue->moveTime(by_ns);
@@ -118,11 +118,11 @@ template <bool Plain>
                 }
                 notes.enterComponent(next->slot);
                 Component& component = *next->component;
-                component.setTime(time);
+                access(component).setTime(time);
                 if (Plain) {
                     next->update(&component);
                 } else {
-                    const DeviceLoan loan(component.context(), counted_ ? nullptr : &uncounted_);
+                    const DeviceLoan loan(access(component).context(), counted_ ? nullptr : &uncounted_);
                     component.update();
                     commit(component, *schedule_->turnOf(*next).statistics, OnBadOutput::End);
                 }
@@ -254,7 +254,7 @@ bool Cycle::exchange(std::int64_t time_ns) noexcept {
 
 // True if a component runs in this cycle; also sets its elapsed time.
 bool Cycle::due(const Step& step) const noexcept RTCF_NONBLOCKING {
-    ComponentContext& context = step.component->context();
+    ComponentContext& context = access(*step.component).context();
     if (context.disabled) return false;
     if (step.every == 1) return true;
     if (clock_.iteration % step.every != schedule_->turnOf(step).phase) return false;
@@ -280,7 +280,7 @@ void Cycle::dropConnected() noexcept {
 
 // Publishes a component's staged outputs. @throws any exception of a copy
 void Cycle::commit(Component& component, ComponentStatistics& statistics, OnBadOutput may) {
-    for (OutputBase* output : component.stagedOutputs()) {
+    for (OutputPort* output : access(component).stagedOutputs()) {
         if (output->commit()) continue;
         if (output->nonFinitePolicy() == OnNonFinite::Stop && may == OnBadOutput::End &&
             !faulted()) {
@@ -296,7 +296,7 @@ void Cycle::commit(Component& component, ComponentStatistics& statistics, OnBadO
 // @return true if the cycle goes on with the next component
 bool Cycle::threw(const Step& step, const char* text) noexcept {
     const Turn& turn = schedule_->turnOf(step);
-    step.component->context().disabled = true;
+    access(*step.component).context().disabled = true;
     putBack(step);
     if (!turn.optional) {
         endLoop(LoopFault::Kind::Exception, step.component, text);
@@ -306,7 +306,7 @@ bool Cycle::threw(const Step& step, const char* text) noexcept {
     turn.statistics->faults.count.add(1);
     statistics_.faults.add(1);
     // If a commit threw, outputs committed before it already have the stamp of this cycle.
-    step.component->setTime(clock_.time_ns + 1);
+    access(*step.component).setTime(clock_.time_ns + 1);
     makeSafe(*step.component, *turn.statistics, OnBadOutput::End);
     return true;
 }
@@ -325,7 +325,7 @@ void Cycle::endLoop(LoopFault::Kind kind, const Component* component, const char
 void Cycle::makeSafe(Component& component, ComponentStatistics& statistics,
                      OnBadOutput may) noexcept {
     {
-        const RealtimeHookNote note(notes_, component.context().recorder_slot, Hook::Safe);
+        const RealtimeHookNote note(notes_, access(component).context().recorder_slot, Hook::Safe);
         component.safe();
     }
     const auto keepBefore = [&](const char* text) {
@@ -345,7 +345,7 @@ void Cycle::makeSafe(Component& component, ComponentStatistics& statistics,
 // Restores the outputs of a component that threw, so that neither readers nor its own safe() see
 // half-written values.
 void Cycle::putBack(const Step& step) noexcept {
-    for (OutputBase* output : step.component->outputs()) {
+    for (OutputPort* output : access(*step.component).outputs()) {
         if (!output->staged()) {
             frames_->putBack(output->slot().get());
             continue;
@@ -387,10 +387,10 @@ void Cycle::makeSafe(std::int64_t time_ns) noexcept {
     next_waiting_ = 0;
     for (const Step& step : schedule_->steps) {
         connectWaiting(step);
-        step.component->setTime(time_ns);
+        access(*step.component).setTime(time_ns);
         // safe() of a component that was taken out has already run.
         const Turn& turn = schedule_->turnOf(step);
-        if (turn.optional && step.component->context().disabled) continue;
+        if (turn.optional && access(*step.component).context().disabled) continue;
         makeSafe(*step.component, *turn.statistics, OnBadOutput::GoOn);
     }
     dropConnected();

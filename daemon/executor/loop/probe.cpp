@@ -12,7 +12,7 @@ std::size_t Probe::add(const InputPort& input) {
     return items_.size() - 1;
 }
 
-std::size_t Probe::add(const OutputBase& output) {
+std::size_t Probe::add(const OutputPort& output) {
     items_.push_back(
         {nullptr, &output, &output.type(), {}, 0, 0, false, std::vector<std::uint8_t>(kLargest)});
     return items_.size() - 1;

@@ -26,7 +26,7 @@ class Probe {
 
     /// Adds a port. @return its index for value()
     std::size_t add(const InputPort& input);
-    std::size_t add(const OutputBase& output);
+    std::size_t add(const OutputPort& output);
 
     /// Copies some more values: at least one, and as many bytes as a cycle of this period can
     /// spare. Real-time safe.
@@ -46,7 +46,7 @@ class Probe {
 
     struct Item {
         const InputPort* input;  // one of the two is set
-        const OutputBase* output;
+        const OutputPort* output;
         const TypeInfo* type;
         SlotHeader header;
         std::int64_t now_ns = 0;

@@ -39,12 +39,12 @@ std::vector<const void*> footprint(
         if (lines.full()) break;
         lines.add(&step, sizeof step);
         lines.add(step.component, sizeof *step.component);
-        for (const InputPort* input : step.component->inputs()) {
+        for (const InputPort* input : access(*step.component).inputs()) {
             lines.add(&input->input(), sizeof(InputBase));
             lines.addSlot(source(input));
         }
-        for (const OutputBase* output : step.component->outputs()) {
-            lines.add(output, sizeof *output);
+        for (const OutputPort* output : access(*step.component).outputs()) {
+            lines.add(&output->output(), sizeof(OutputBase));
             lines.addSlot(output->slot().get());
         }
     }

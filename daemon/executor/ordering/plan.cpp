@@ -79,7 +79,7 @@ class Builder {
         }
         if (connection.writer) {
             for (const Reader& reader : connection.readers) bindToWriter(connection, reader);
-            OutputBase& output = *connection.writer->output;
+            OutputPort& output = *connection.writer->output;
             const bool heard = connection.published || !connection.readers.empty();
             if (heard != output.connected()) adoption_.audiences.push_back({&output, heard});
             for (const Writer& writer : connection.others) {
@@ -114,7 +114,7 @@ class Builder {
     }
 
     std::shared_ptr<SerializedTap> serializedTap(const std::string& key, const std::string& name,
-                                                 const OutputBase& output) {
+                                                 const OutputPort& output) {
         const std::size_t largest = bridge_.largest_message;
         const std::size_t capacity = tapCapacity(output.type(), frequency_hz_, largest);
         std::shared_ptr<SerializedTap> tap;
@@ -258,7 +258,7 @@ class Builder {
         std::set<const InputPort*> rewired;
         for (const Rewire& rewire : adoption_.rewires) rewired.insert(rewire.input);
         for (const Step& step : plan_.schedule.steps) {
-            for (InputPort* input : step.component->inputs()) {
+            for (InputPort* input : access(*step.component).inputs()) {
                 if (adoption_.restoration != nullptr || input->waiting() ||
                     rewired.count(input) != 0)
                     adoption_.waiting.push_back({&step, input});
@@ -273,7 +273,7 @@ class Builder {
             const Instance& instance = *previous_.graph.nodes()[index].instance;
             if (staying.count(&instance) != 0) continue;
             Leaving leaving{&instance.component(), instance.statistics().get(), {}, {}, {}};
-            for (const OutputBase* output : instance.component().outputs()) {
+            for (const OutputPort* output : access(instance.component()).outputs()) {
                 const SlotHeader* const slot = output->slot().get();
                 if (const auto found = previous_.latches.find(slot);
                     found != previous_.latches.end())

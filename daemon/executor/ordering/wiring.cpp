@@ -50,10 +50,10 @@ class Collector {
     void addNode(std::size_t index) {
         const GraphNode& node = graph_.nodes()[index];
         const Instance& instance = *node.instance;
-        const auto& outputs = instance.component().outputs();
+        const auto& outputs = access(instance.component()).outputs();
         for (std::size_t i = 0; i < outputs.size(); ++i)
             addOutput(index, i, outputs[i], instance.outputNames()[i]);
-        const auto& inputs = instance.component().inputs();
+        const auto& inputs = access(instance.component()).inputs();
         for (std::size_t i = 0; i < inputs.size(); ++i)
             addInput(index, node, inputs[i], instance.inputNames()[i]);
     }
@@ -73,7 +73,7 @@ class Collector {
         return plan;
     }
 
-    void addOutput(std::size_t index, std::size_t port, OutputBase* output,
+    void addOutput(std::size_t index, std::size_t port, OutputPort* output,
                    const std::string& name) {
         ConnectionPlan& plan = planFor(name, index, output->name(), output->type());
         if (plan.writer) {

@@ -35,7 +35,7 @@ struct Reader {
 struct Writer {
     std::size_t node;
     std::size_t port;  ///< index into the component's outputs()
-    OutputBase* output;
+    OutputPort* output;
 };
 
 /// All ports of one mapped name.

@@ -69,7 +69,7 @@ class SnapshotRestorer {
     Restoration restoration_;
     std::vector<std::string> problems_;
     // Output and sample.
-    std::map<std::string, std::pair<const OutputBase*, const SlotHeader*>> outputs_;
+    std::map<std::string, std::pair<const OutputPort*, const SlotHeader*>> outputs_;
     std::map<const SlotHeader*, std::pair<std::string, const SlotHeader*>> reserved_;
     std::map<Instance*, Batch> parameters_;
     std::map<Instance*, std::uint32_t> phases_;

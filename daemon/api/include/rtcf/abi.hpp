@@ -80,12 +80,12 @@ struct AbiProbe {
              offsetof(DeviceStatistics, time_ns)});
         add({sizeof(InputBase), offsetof(InputBase, source_), offsetof(InputBase, seen_)});
         add({sizeof(OutputBase), offsetof(OutputBase, raw_), offsetof(OutputBase, now_),
-             offsetof(OutputBase, rest_), sizeof(OutputBase::Rest),
-             offsetof(OutputBase::Rest, identity), offsetof(OutputBase::Rest, slot),
-             offsetof(OutputBase::Rest, staged), offsetof(OutputBase::Rest, sample),
-             offsetof(OutputBase::Rest, checked), offsetof(OutputBase::Rest, policy)});
-        add({sizeof(OutputIdentity), offsetof(OutputIdentity, name), offsetof(OutputIdentity, unit),
-             offsetof(OutputIdentity, type), offsetof(OutputIdentity, connected)});
+             offsetof(OutputBase, port_), sizeof(OutputPort), offsetof(OutputPort, output_),
+             offsetof(OutputPort, name_), offsetof(OutputPort, unit_), offsetof(OutputPort, type_),
+             offsetof(OutputPort, slot_), offsetof(OutputPort, staged_),
+             offsetof(OutputPort, sample_), offsetof(OutputPort, written_),
+             offsetof(OutputPort, connected_), offsetof(OutputPort, checked_),
+             offsetof(OutputPort, policy_)});
         add({sizeof(InputPort),
              offsetof(InputPort, input_),
              offsetof(InputPort, owner_),

@@ -35,6 +35,9 @@
 
 namespace rtcf {
 
+template <typename C>
+class ComponentAccess;
+
 /// Device input and output of a component, see RTCF_DEVICE_IO. The cycle thread writes it; any
 /// thread may read it.
 struct DeviceStatistics {
@@ -200,57 +203,6 @@ class Component {
     LogMemory& logMemory() const noexcept RTCF_NONBLOCKING { return context_->said; }
     /// @}
 
-    /// @name For the executor; not for components
-    /// @{
-    /// Sets the context. Before configure(); not real-time.
-    void attach(ComponentContext& context) noexcept { context_ = &context; }
-    /// Sets the loop time of the next hook, > 0, the stamp of its writes. Real-time safe.
-    void setTime(std::int64_t time_ns) noexcept RTCF_NONBLOCKING { now_ = time_ns; }
-    /// Rejects further declarations. After configure(); not real-time.
-    void freeze() noexcept { rest_->frozen = true; }
-    const std::vector<InputPort*>& inputs() const noexcept { return rest_->inputs; }
-    const std::vector<OutputBase*>& outputs() const noexcept { return rest_->outputs; }
-    const std::vector<ParameterBase*>& parameters() const noexcept { return rest_->parameters; }
-    const std::vector<DerivedBase*>& derived() const noexcept { return rest_->derived; }
-    const std::vector<MailboxBase*>& mailboxes() const noexcept { return rest_->mailboxes; }
-    const std::vector<StateDeclaration>& states() const noexcept { return rest_->states; }
-    /// Outputs whose values become visible to readers only when the executor commits them.
-    const std::vector<OutputBase*>& stagedOutputs() const noexcept { return rest_->staged_outputs; }
-    /// Stages the outputs for which `which(const OutputBase&)` is true. Before they have readers;
-    /// not real-time.
-    template <typename Which>
-    void stageOutputs(const Which& which) {
-        rest_->staged_outputs.clear();
-        for (OutputBase* output : rest_->outputs) {
-            if (which(*output)) output->stage();
-            if (output->staged()) rest_->staged_outputs.push_back(output);
-        }
-    }
-    ComponentContext& context() const noexcept { return *context_; }
-    const std::string& failure() const noexcept { return rest_->failure; }
-    const LoopClock& clock() const noexcept RTCF_NONBLOCKING { return *context_->clock; }
-    /// @}
-
-    /// @name Called by the members' constructors
-    /// Not real-time.
-    /// @throws std::logic_error if the name is taken or not legal, and after freeze()
-    /// @{
-    void declare(std::unique_ptr<InputPort> input) {
-        declarePort(rest_->inputs, input.get());
-        rest_->input_ports.push_back(std::move(input));
-    }
-    void declare(OutputBase* output) { declarePort(rest_->outputs, output); }
-    void declare(StateDeclaration state);
-    void declare(DerivedBase* derived) { rest_->derived.push_back(derived); }
-    void declare(MailboxBase* mailbox) { rest_->mailboxes.push_back(mailbox); }
-    void declareFinite(OutputBase* output) { rest_->staged_outputs.push_back(output); }
-    void declare(ParameterBase* parameter);
-    /// Undoes the last declarations of parameters.
-    void undeclareParameters(std::size_t count) noexcept {
-        rest_->parameters.resize(rest_->parameters.size() - count);
-    }
-    /// @}
-
    protected:
     /// Sets the error text of a hook: `return fail("no reply from {}", device);`. Without
     /// arguments, the text is used verbatim. RTCF_FAIL(this, …) checks the format at compile time.
@@ -272,9 +224,8 @@ class Component {
 
    private:
     friend struct AbiProbe;
-    template <typename T>
-    void declarePort(std::vector<T*>& members, T* port);
-    void requireDeclarable(const std::string& name, const char* what, bool in_group = false) const;
+    template <typename C>
+    friend class ComponentAccess;
     static ComponentContext& detached() {
         static const LoopClock clock{};
         static ComponentContext context;
@@ -282,7 +233,6 @@ class Component {
         return context;
     }
 
-    friend class OutputBase;
     ComponentContext* context_ =
         detail::under_construction != nullptr ? detail::under_construction : &detached();
     // Kept outside the object, so that the derived class's ports, which each cycle touches, lie
@@ -291,87 +241,49 @@ class Component {
         bool frozen = false;
         std::vector<std::unique_ptr<InputPort>> input_ports;
         std::vector<InputPort*> inputs;
-        std::vector<OutputBase*> outputs;
+        std::vector<OutputPort*> outputs;
         std::vector<ParameterBase*> parameters;
         std::vector<DerivedBase*> derived;
         std::vector<MailboxBase*> mailboxes;
         std::vector<StateDeclaration> states;
-        std::vector<OutputBase*> staged_outputs;
+        std::vector<OutputPort*> staged_outputs;
         std::string failure;
     };
     std::unique_ptr<Rest> rest_ = std::make_unique<Rest>();
     Shared<std::int64_t> now_ = 1;  // loop time; stamps of outputs must not be 0
 };
 
-// @param in_group true = the name may be a path of groups, as gains/p
-inline void Component::requireDeclarable(const std::string& name, const char* what,
-                                         bool in_group) const {
-    bool legal = true;
-    bool begins = true;  // a base name
-    for (const char c : name) {
-        const auto byte = static_cast<unsigned char>(c);
-        if (in_group && c == '/' && !begins) {
-            begins = true;
-            continue;
-        }
-        legal = legal &&
-                (std::isalpha(byte) != 0 || (!begins && (std::isdigit(byte) != 0 || c == '_')));
-        begins = false;
-    }
-    if (!legal || begins) {
-        throw std::logic_error(
-            fmt::format("{} '{}': not a legal name (a letter, then letters, digits and _{})", what,
-                        name, in_group ? "; / between groups" : ""));
-    }
-    if (rest_->frozen)
-        throw std::logic_error(fmt::format("{} '{}' declared after configure()", what, name));
-}
+/// A component whose device paces the loop. A runner has at most one; its frequency is then
+/// nominal.
+class Source : public Component {
+   public:
+    /// Waits for the device. Called in the real-time thread instead of its sleep. Real-time; it may
+    /// block until the deadline, but no longer.
+    /// @param deadline_ns latest time to return, CLOCK_MONOTONIC, ns
+    /// @return true if the device is ready and a cycle begins
+    virtual bool wait(std::int64_t deadline_ns) noexcept = 0;
+};
 
-inline void Component::declare(ParameterBase* parameter) {
-    const std::string& name = parameter->declaration().name;
-    requireDeclarable(name, "parameter", true);
-    const auto contains = [](const std::string& group, const std::string& member) {
-        return member.size() > group.size() && member[group.size()] == '/' &&
-               member.compare(0, group.size(), group) == 0;
-    };
-    for (const ParameterBase* other : rest_->parameters) {
-        const std::string& taken = other->declaration().name;
-        if (taken == name)
-            throw std::logic_error(fmt::format("parameter '{}' is declared twice", name));
-        if (contains(taken, name) || contains(name, taken)) {
-            const std::string& both = taken.size() < name.size() ? taken : name;
-            throw std::logic_error(
-                fmt::format("'{}' is a parameter and the group of '{}': rename one", both,
-                            taken.size() < name.size() ? name : taken));
-        }
-    }
-    rest_->parameters.push_back(parameter);
-}
+}  // namespace rtcf
 
-inline void Component::declare(StateDeclaration state) {
-    requireDeclarable(state.name, "state");
-    std::size_t size = state.size;
-    for (const StateDeclaration& other : rest_->states) {
-        if (other.name == state.name)
-            throw std::logic_error(fmt::format("state '{}' is declared twice", state.name));
-        size += other.size;
-    }
-    if (size > kLargestState) {
-        throw std::logic_error(
-            fmt::format("state '{}': {} bytes of state are more than the {} "
-                        "that a component may have",
-                        state.name, size, kLargestState));
-    }
-    rest_->states.push_back(std::move(state));
-}
+/// Component::fail() with a format that is checked at compile time, for hooks: `return
+/// RTCF_FAIL(this, "no reply from {}", device);`. Not real-time.
+/// @return false
+#define RTCF_FAIL(self, text, ...)                                                   \
+    (false ? ::rtcf::detail::formatCheck(FMT_STRING(text), ##__VA_ARGS__) : (void)0, \
+     (self)->fail(text, ##__VA_ARGS__))
+
+#include "rtcf/component_access.hpp"
+
+namespace rtcf {
 
 template <typename T>
 void State<T>::declareIn(Component* owner, StateDeclaration declaration) {
-    owner->declare(std::move(declaration));
+    access(*owner).declare(std::move(declaration));
 }
 
 inline const StateDeclaration* Predecessor::findState(std::string_view name) const noexcept {
-    for (const StateDeclaration& state : component_.states()) {
+    for (const StateDeclaration& state : access(component_).states()) {
         if (state.name == name) return &state;
     }
     return nullptr;
@@ -379,7 +291,7 @@ inline const StateDeclaration* Predecessor::findState(std::string_view name) con
 
 template <typename T>
 const T* Predecessor::output(std::string_view name) const noexcept {
-    for (const OutputBase* output : component_.outputs()) {
+    for (const OutputPort* output : access(component_).outputs()) {
         if (output->name() != name) continue;
         const bool there = output->slot()->stamp != 0 && sameType(output->type(), typeInfo<T>());
         return there ? &static_cast<const Slot<T>*>(output->slot().get())->value : nullptr;
@@ -387,23 +299,10 @@ const T* Predecessor::output(std::string_view name) const noexcept {
     return nullptr;
 }
 
-template <typename T>
-void Component::declarePort(std::vector<T*>& members, T* port) {
-    const std::string& name = port->name();
-    requireDeclarable(name, "port");
-    const auto taken = [&](const auto& list) {
-        return std::any_of(list.begin(), list.end(),
-                           [&](const auto* other) { return other->name() == name; });
-    };
-    if (taken(rest_->inputs) || taken(rest_->outputs))
-        throw std::logic_error(fmt::format("port '{}' is declared twice", name));
-    members.push_back(port);
-}
-
 inline InputBase::InputBase(Component* owner, std::string name, const TypeInfo& type,
                             const SlotHeader& empty)
     : source_(&empty) {
-    owner->declare(std::make_unique<InputPort>(*this, *owner, std::move(name), type));
+    access(*owner).declare(std::make_unique<InputPort>(*this, *owner, std::move(name), type));
 }
 
 inline std::int64_t InputBase::age(const Component* owner) const noexcept RTCF_NONBLOCKING {
@@ -412,7 +311,7 @@ inline std::int64_t InputBase::age(const Component* owner) const noexcept RTCF_N
 }
 
 inline bool InputBase::connected(const Component* owner) const noexcept RTCF_NONBLOCKING {
-    for (const InputPort* port : owner->inputs())
+    for (const InputPort* port : access(*owner).inputs())
         if (&port->input() == this) return port->connected();
     return false;
 }
@@ -420,7 +319,7 @@ inline bool InputBase::connected(const Component* owner) const noexcept RTCF_NON
 inline QueueBase::QueueBase(Component* owner, std::string name, const TypeInfo& type,
                             const Ring& ring)
     : InputBase(owner, std::move(name), type, kNoValue), ring_(new Ring(ring)) {
-    ring_->port = owner->inputs().back();
+    ring_->port = access(*owner).inputs().back();
     ring_->port->setQueue(this);
 }
 
@@ -432,20 +331,15 @@ inline std::int64_t QueueBase::age() noexcept {
 
 inline OutputBase::OutputBase(Component* owner, std::string name, std::string unit,
                               const TypeInfo& type, const Finite* finite)
-    : now_(&owner->now_),
-      rest_(new Rest{{std::move(name), std::move(unit), type}, type.make_slot(nullptr), {}, {}}) {
-    raw_ = rest_->slot.get();
-    owner->declare(this);
-    if (finite == nullptr) return;
-    rest_->checked = true;
-    rest_->policy = finite->policy;
-    stage();
-    owner->declareFinite(this);
+    : now_(&access(*owner).now()),
+      port_(std::make_unique<OutputPort>(*this, std::move(name), std::move(unit), type, finite)) {
+    raw_ = port_->written();
+    access(*owner).declare(port_.get());
 }
 
-inline DerivedBase::DerivedBase(Component* owner) { owner->declare(this); }
+inline DerivedBase::DerivedBase(Component* owner) { access(*owner).declare(this); }
 
-inline MailboxBase::MailboxBase(Component* owner) { owner->declare(this); }
+inline MailboxBase::MailboxBase(Component* owner) { access(*owner).declare(this); }
 
 inline ParameterBase::ParameterBase(Component* owner, ParameterDeclaration declaration,
                                     const void* place)
@@ -453,11 +347,11 @@ inline ParameterBase::ParameterBase(Component* owner, ParameterDeclaration decla
     ParameterValue initial = declaration_.default_value;
     if (const std::string why = check(initial); !why.empty())
         throw std::logic_error("default value: " + why);
-    owner->declare(this);
+    access(*owner).declare(this);
 }
 
 inline void detail::undeclareParameters(Component& owner, std::size_t count) noexcept {
-    owner.undeclareParameters(count);
+    access(owner).undeclareParameters(count);
 }
 
 inline std::string ParameterBase::check(ParameterValue& value) const {
@@ -505,25 +399,7 @@ inline std::string ParameterBase::check(ParameterValue& value) const {
     return {};
 }
 
-/// A component whose device paces the loop. A runner has at most one; its frequency is then
-/// nominal.
-class Source : public Component {
-   public:
-    /// Waits for the device. Called in the real-time thread instead of its sleep. Real-time; it may
-    /// block until the deadline, but no longer.
-    /// @param deadline_ns latest time to return, CLOCK_MONOTONIC, ns
-    /// @return true if the device is ready and a cycle begins
-    virtual bool wait(std::int64_t deadline_ns) noexcept = 0;
-};
-
 }  // namespace rtcf
-
-/// Component::fail() with a format that is checked at compile time, for hooks: `return
-/// RTCF_FAIL(this, "no reply from {}", device);`. Not real-time.
-/// @return false
-#define RTCF_FAIL(self, text, ...)                                                   \
-    (false ? ::rtcf::detail::formatCheck(FMT_STRING(text), ##__VA_ARGS__) : (void)0, \
-     (self)->fail(text, ##__VA_ARGS__))
 
 #include "rtcf/abi.hpp"
 #include "rtcf/device_io.hpp"

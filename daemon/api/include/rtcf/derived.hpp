@@ -44,6 +44,7 @@ class Derived final : public DerivedBase {
         is_staged_ = true;
     }
 
+   private:
     void commit() noexcept RTCF_NONBLOCKING override {
         std::swap(value_, other_);
         is_staged_ = false;
@@ -53,7 +54,6 @@ class Derived final : public DerivedBase {
         is_staged_ = false;
     }
 
-   private:
     std::unique_ptr<T> value_;
     std::unique_ptr<T> other_;  // the staged value, or the replaced one before it is freed
 };

@@ -193,6 +193,10 @@ class Mailbox final : public MailboxBase {
     }
 
    private:
+    // The executor calls these by MailboxBase.
+    using MailboxBase::close;
+    using MailboxBase::open;
+
     Request request_{};
     Reply reply_{};
 };

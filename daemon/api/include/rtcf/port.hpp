@@ -210,60 +210,101 @@ class Input final : public InputBase {
     }
 };
 
-/// Name, type and connection of an output. Kept outside the port object.
-struct OutputIdentity {
-    std::string name;
-    std::string unit;
-    const TypeInfo& type;
-    bool connected = false;  ///< has a reader
-};
+class OutputPort;
 
-/// Base class of outputs of all types.
+/// Base class of outputs of all types. It has only the members that each cycle touches; an
+/// OutputPort has the others.
 class OutputBase {
    public:
+    /// Declares the output to its owner.
     OutputBase(Component* owner, std::string name, std::string unit, const TypeInfo& type,
                const Finite* finite);
     OutputBase(const OutputBase&) = delete;
     OutputBase& operator=(const OutputBase&) = delete;
 
     /// Name within the component. Real-time safe.
-    const std::string& name() const noexcept { return rest_->identity.name; }
+    const std::string& name() const noexcept;
     /// Unit of the value, e.g. "N m". Real-time safe.
-    const std::string& unit() const noexcept { return rest_->identity.unit; }
-    /// Description of the value's type. Real-time safe.
-    const TypeInfo& type() const noexcept { return rest_->identity.type; }
+    const std::string& unit() const noexcept;
     /// True if an input or a ROS topic reads this output. Real-time safe.
-    bool connected() const noexcept RTCF_NONBLOCKING { return rest_->identity.connected; }
-    /// Sets connected(). For the executor, at a cycle boundary. Real-time safe.
-    void setConnected(bool connected) noexcept RTCF_NONBLOCKING {
-        rest_->identity.connected = connected;
+    bool connected() const noexcept RTCF_NONBLOCKING;
+
+   protected:
+    ~OutputBase();
+
+    OutputPort& port() noexcept { return *port_; }
+    void stampWrite() noexcept RTCF_NONBLOCKING { raw_->stamp = *now_; }
+
+    friend struct AbiProbe;
+    SlotHeader* raw_;  // the slot that write() fills
+
+   private:
+    const Shared<std::int64_t>* now_;  // the component's time
+    std::unique_ptr<OutputPort> port_;
+};
+
+/// Name, unit, slots and readers of an output. Kept outside the component's object, like InputPort.
+/// For the executor.
+class OutputPort {
+   public:
+    /// @param finite policy of an output that is declared Finite; null = it is not
+    OutputPort(const OutputBase& output, std::string name, std::string unit, const TypeInfo& type,
+               const Finite* finite)
+        : output_(output),
+          name_(std::move(name)),
+          unit_(std::move(unit)),
+          type_(type),
+          slot_(type.make_slot(nullptr)),
+          written_(slot_.get()) {
+        if (finite == nullptr) return;
+        checked_ = true;
+        policy_ = finite->policy;
+        stage();
     }
+    OutputPort(const OutputPort&) = delete;
+    OutputPort& operator=(const OutputPort&) = delete;
+
+    const OutputBase& output() const noexcept RTCF_NONBLOCKING { return output_; }
+    /// Name within the component. Real-time safe.
+    const std::string& name() const noexcept { return name_; }
+    /// Unit of the value. Real-time safe.
+    const std::string& unit() const noexcept { return unit_; }
+    /// Description of the value's type. Real-time safe.
+    const TypeInfo& type() const noexcept { return type_; }
+    /// True if the output has a reader. Real-time safe.
+    bool connected() const noexcept RTCF_NONBLOCKING { return connected_; }
+    /// Sets connected(). At a cycle boundary. Real-time safe.
+    void setConnected(bool connected) noexcept RTCF_NONBLOCKING { connected_ = connected; }
+
     /// The slot that readers see. It may outlive the component while an input refers to it.
     /// Real-time safe.
-    const std::shared_ptr<SlotHeader>& slot() const noexcept { return rest_->slot; }
-    /// The slot that the component writes: slot(), or the staged one. For the executor. Real-time
-    /// safe.
-    SlotHeader* written() const noexcept RTCF_NONBLOCKING { return raw_; }
-    /// A slot with the capacity set by reserve(), as the argument of TypeInfo::make_slot(). For the
-    /// executor; not real-time.
+    const std::shared_ptr<SlotHeader>& slot() const noexcept { return slot_; }
+    /// The slot that the component writes: slot(), or the staged one. Real-time safe.
+    SlotHeader* written() const noexcept RTCF_NONBLOCKING { return written_; }
+    /// A slot with the capacity set by reserve(), as the argument of TypeInfo::make_slot(). Not
+    /// real-time.
     const SlotHeader* sample() const noexcept {
-        return rest_->sample != nullptr ? rest_->sample.get() : rest_->slot.get();
+        return sample_ != nullptr ? sample_.get() : slot_.get();
     }
-    /// @name Staged outputs; for the executor
+    void setSample(std::shared_ptr<SlotHeader> sample) noexcept { sample_ = std::move(sample); }
+
+    /// @name Staged outputs
     /// Readers of a staged output see a written value only after commit(). Outputs declared Finite
     /// are staged, and so are those that the executor stages.
     /// @{
-    bool staged() const noexcept RTCF_NONBLOCKING { return rest_->staged != nullptr; }
+    bool staged() const noexcept RTCF_NONBLOCKING { return staged_ != nullptr; }
     /// True if the output is declared Finite. Real-time safe.
-    bool checked() const noexcept RTCF_NONBLOCKING { return rest_->checked; }
+    bool checked() const noexcept RTCF_NONBLOCKING { return checked_; }
+    /// Policy for values that are not finite. Real-time safe.
+    OnNonFinite nonFinitePolicy() const noexcept RTCF_NONBLOCKING { return policy_; }
     /// Stages the output. Only before it has readers. Not real-time safe.
     void stage() {
-        if (rest_->staged != nullptr) return;
+        if (staged_ != nullptr) return;
         // The component may hold a reference to its value, so it keeps its slot; readers get a new
         // one.
-        std::shared_ptr<SlotHeader> seen = type().make_slot(sample());
-        type().copy(*seen, *rest_->slot);
-        rest_->staged = std::exchange(rest_->slot, std::move(seen));
+        std::shared_ptr<SlotHeader> seen = type_.make_slot(sample());
+        type_.copy(*seen, *slot_);
+        staged_ = std::exchange(slot_, std::move(seen));
     }
     /// Publishes the written value to readers. Called after update(). Real-time safe if
     /// TypeInfo::copy is.
@@ -271,68 +312,60 @@ class OutputBase {
     /// previous value
     /// @throws any exception of a copy; readers then have the previous value or the new one
     bool commit() {
-        Rest& rest = *rest_;
-        if (rest.staged->stamp == rest.slot->stamp) return true;
-        if (type().is_double) {
-            const double value = static_cast<const Slot<double>&>(*rest.staged).value;
-            if (rest.checked && !std::isfinite(value)) {
+        if (staged_->stamp == slot_->stamp) return true;
+        if (type_.is_double) {
+            const double value = static_cast<const Slot<double>&>(*staged_).value;
+            if (checked_ && !std::isfinite(value)) {
                 discard();
                 return false;
             }
-            static_cast<Slot<double>&>(*rest.slot).value = value;
-            rest.slot->stamp = rest.staged->stamp;
+            static_cast<Slot<double>&>(*slot_).value = value;
+            slot_->stamp = staged_->stamp;
             return true;
         }
-        if (rest.checked && !type().finite(*rest.staged)) {
+        if (checked_ && !type_.finite(*staged_)) {
             discard();
             return false;
         }
-        if (type().flat) {
-            type().copy(*rest.slot, *rest.staged);
+        if (type_.flat) {
+            type_.copy(*slot_, *staged_);
             return true;
         }
-        type().exchange(*rest.slot, *rest.staged);
-        *rest.slot = *rest.staged;
-        type().copy(*rest.staged, *rest.slot);  // the component keeps the value that it wrote
+        type_.exchange(*slot_, *staged_);
+        *slot_ = *staged_;
+        type_.copy(*staged_, *slot_);  // the component keeps the value that it wrote
         return true;
     }
     /// Hides the value written since the last commit() from readers. Real-time safe.
-    void discard() noexcept RTCF_NONBLOCKING { rest_->staged->stamp = rest_->slot->stamp; }
+    void discard() noexcept RTCF_NONBLOCKING { staged_->stamp = slot_->stamp; }
     /// Like discard(), and resets the component's value to the one that readers see. Real-time safe
     /// if TypeInfo::copy is.
     /// @throws any exception of a copy
     void takeBack() {
         discard();
-        type().copy(*rest_->staged, *rest_->slot);
+        type_.copy(*staged_, *slot_);
     }
-    /// Policy for values that are not finite. Real-time safe.
-    OnNonFinite nonFinitePolicy() const noexcept RTCF_NONBLOCKING { return rest_->policy; }
     /// @}
 
-   protected:
-    ~OutputBase() = default;
-
-    void setSample(std::shared_ptr<SlotHeader> sample) noexcept {
-        rest_->sample = std::move(sample);
-    }
-    void stampWrite() noexcept RTCF_NONBLOCKING { raw_->stamp = *now_; }
-
-    friend struct AbiProbe;
-    SlotHeader* raw_;  // the slot that write() fills: rest_->staged, or rest_->slot
-
    private:
-    struct Rest {
-        OutputIdentity identity;
-        std::shared_ptr<SlotHeader> slot;
-        std::shared_ptr<SlotHeader> staged;  // null = readers see written values at once
-        std::shared_ptr<SlotHeader> sample;  // null = reserve() was not called
-        bool checked = false;                // declared Finite
-        OnNonFinite policy = OnNonFinite::Hold;
-    };
-
-    const Shared<std::int64_t>* now_;  // the component's time
-    std::unique_ptr<Rest> rest_;
+    friend struct AbiProbe;
+    const OutputBase& output_;
+    std::string name_;
+    std::string unit_;
+    const TypeInfo& type_;
+    std::shared_ptr<SlotHeader> slot_;
+    std::shared_ptr<SlotHeader> staged_;  // null = readers see written values at once
+    std::shared_ptr<SlotHeader> sample_;  // null = reserve() was not called
+    SlotHeader* const written_;
+    bool connected_ = false;
+    bool checked_ = false;  // declared Finite
+    OnNonFinite policy_ = OnNonFinite::Hold;
 };
+
+inline OutputBase::~OutputBase() = default;
+inline const std::string& OutputBase::name() const noexcept { return port_->name(); }
+inline const std::string& OutputBase::unit() const noexcept { return port_->unit(); }
+inline bool OutputBase::connected() const noexcept RTCF_NONBLOCKING { return port_->connected(); }
 
 /// An output port carrying values of type T.
 template <typename T>
@@ -365,8 +398,9 @@ class Output final : public OutputBase {
     /// allocate. In the constructor or in configure(); not real-time safe.
     void reserve(const T& sample) {
         static_cast<Slot<T>*>(raw_)->value = sample;
-        static_cast<Slot<T>*>(slot().get())->value = sample;
-        if constexpr (!PortType<T>::kFixedSize) setSample(type().make_slot(slot().get()));
+        SlotHeader* const seen = port().slot().get();
+        static_cast<Slot<T>*>(seen)->value = sample;
+        if constexpr (!PortType<T>::kFixedSize) port().setSample(typeInfo<T>().make_slot(seen));
     }
 };
 

@@ -158,6 +158,16 @@ class Queue final : public QueueBase {
     }
 
    private:
+    // The executor calls these by QueueBase.
+    using QueueBase::clear;
+    using QueueBase::moveTime;
+    using QueueBase::noteDropped;
+    using QueueBase::receive;
+    using QueueBase::sample;
+    using QueueBase::skip;
+    using QueueBase::take;
+    using QueueBase::type;
+
     using Slots = std::array<Slot<T>, N>;
 
     Queue(Component* owner, std::string name, std::unique_ptr<Slots> slots)

@@ -105,12 +105,12 @@ TEST(FiniteCheck, KeepsAStructFromReaders) {
     Commands pair;
     pair.first.torque = 1.0;
     out.write(pair);
-    EXPECT_TRUE(out.commit());
+    EXPECT_TRUE(portOf(component, out).commit());
     pair.second.torque = kInfinity;
-    component.setTime(component.time() + 1);
+    access(component).setTime(component.time() + 1);
     out.write(pair);
-    EXPECT_FALSE(out.commit());
-    const auto& seen = static_cast<const Slot<Commands>&>(*out.slot()).value;
+    EXPECT_FALSE(portOf(component, out).commit());
+    const auto& seen = static_cast<const Slot<Commands>&>(*portOf(component, out).slot()).value;
     EXPECT_EQ(seen.first.torque, 1.0);
     EXPECT_EQ(seen.second.torque, 0.0);
 }

@@ -5,6 +5,7 @@
 
 #include <new>
 #include <stdexcept>
+#include <type_traits>
 #include <vector>
 
 #include "support/bare_component.hpp"
@@ -48,12 +49,47 @@ struct rtcf::PortType<rtcf::test::Halves>
 namespace rtcf::test {
 namespace {
 
+// True if a component's member, or the component, has a public function of that name.
+#define HAS(NAME)                                                          \
+    template <typename T, typename = void>                                 \
+    constexpr bool has_##NAME = false;                                     \
+    template <typename T>                                                  \
+    constexpr bool has_##NAME<T, std::void_t<decltype(&T::NAME)>> = true
+HAS(attach);
+HAS(close);
+HAS(commit);
+HAS(connect);
+HAS(context);
+HAS(fullName);
+HAS(inputs);
+HAS(receive);
+HAS(release);
+HAS(setConnected);
+HAS(setTime);
+HAS(slot);
+HAS(stage);
+HAS(stageOutputs);
+#undef HAS
+
+static_assert(has_fullName<Component>);
+static_assert(!has_attach<Component> && !has_context<Component> && !has_inputs<Component> &&
+              !has_setTime<Component> && !has_stageOutputs<Component>);
+static_assert(!has_connect<Input<double>> && !has_slot<Input<double>>);
+static_assert(!has_commit<Output<double>> && !has_setConnected<Output<double>> &&
+              !has_slot<Output<double>> && !has_stage<Output<double>>);
+static_assert(!has_commit<Parameter<double>> && !has_stage<Parameter<double>>);
+static_assert(has_stage<Derived<double>> && !has_commit<Derived<double>> &&
+              !has_release<Derived<double>>);
+static_assert(!has_receive<Queue<double, 2>> && !has_close<Mailbox<double, double>>);
+
 class InputOutput : public ::testing::Test {
    protected:
-    InputPort& port() { return *component.inputs().front(); }
-    void connect(const OutputBase& output) { port().connect(output.slot().get(), false); }
+    InputPort& port() { return *access(component).inputs().front(); }
+    void connect(const OutputBase& output) {
+        port().connect(portOf(component, output).slot().get(), false);
+    }
     void writeAt(Output<double>& output, double value, std::int64_t time_ns) {
-        component.setTime(time_ns);
+        access(component).setTime(time_ns);
         output.write(value);
     }
     // In the next cycle.
@@ -202,13 +238,13 @@ TEST_F(InputOutput, ContinuedConnectionKeepsReadAndUnreadValues) {
     connect(first);
     write(first, 1.0);
     in.read();
-    first.type().copy(*copy.slot(), *first.slot());
-    port().connect(copy.slot().get(), true);
+    portOf(component, first).type().copy(*portOf(component, copy).slot(), *portOf(component, first).slot());
+    port().connect(portOf(component, copy).slot().get(), true);
     EXPECT_EQ(read(), DataStatus::Old) << "the write was read before";
     EXPECT_EQ(in.value(), 1.0);
     write(first, 2.0);
-    first.type().copy(*copy.slot(), *first.slot());
-    port().connect(first.slot().get(), true);
+    portOf(component, first).type().copy(*portOf(component, copy).slot(), *portOf(component, first).slot());
+    port().connect(portOf(component, first).slot().get(), true);
     EXPECT_EQ(read(), DataStatus::New);
     EXPECT_EQ(in.value(), 2.0);
 }
@@ -220,12 +256,12 @@ TEST_F(InputOutput, ContinuedConnectionKeepsAnEarlierWritersValueToo) {
     write(first, 1.0);
     in.read();
     connect(second);
-    first.type().copy(*copy.slot(), *second.slot());
-    port().connect(copy.slot().get(), true);
+    portOf(component, first).type().copy(*portOf(component, copy).slot(), *portOf(component, second).slot());
+    port().connect(portOf(component, copy).slot().get(), true);
     EXPECT_EQ(read(), DataStatus::Old);
     EXPECT_EQ(in.value(), 1.0) << "the new writer has not written yet";
     write(second, 9.5);
-    first.type().copy(*copy.slot(), *second.slot());
+    portOf(component, first).type().copy(*portOf(component, copy).slot(), *portOf(component, second).slot());
     EXPECT_EQ(read(), DataStatus::New);
     EXPECT_EQ(in.value(), 9.5);
 }
@@ -243,12 +279,12 @@ TEST_F(InputOutput, DisconnectedInputKeepsItsValueAsOldData) {
 TEST_F(InputOutput, InjectedValueIsNewAndMayMoveToAnotherSlot) {
     Output<double> front{&component, "front"};
     Output<double> next{&component, "next"};
-    port().connectOutside(front.slot().get());
+    port().connectOutside(portOf(component, front).slot().get());
     write(front, 1.0);
-    port().inject(front.slot().get());
+    port().inject(portOf(component, front).slot().get());
     EXPECT_EQ(in.read(), DataStatus::New);
     next.write(2.0);  // also with the stamp of the first one
-    port().inject(next.slot().get());
+    port().inject(portOf(component, next).slot().get());
     EXPECT_EQ(in.value(), 2.0) << "the first slot may be overwritten from here on";
     EXPECT_EQ(in.read(), DataStatus::New);
     EXPECT_EQ(in.read(), DataStatus::Old);
@@ -260,10 +296,10 @@ TEST_F(InputOutput, ValueOfAWriterStaysUntilAMessageArrives) {
     connect(first);
     write(first, 1.0);
     in.read();
-    port().connectOutside(front.slot().get());
+    port().connectOutside(portOf(component, front).slot().get());
     EXPECT_EQ(read(), DataStatus::Old);
     EXPECT_EQ(in.value(), 1.0);
-    port().inject(front.slot().get());
+    port().inject(portOf(component, front).slot().get());
     EXPECT_EQ(read(), DataStatus::New);
     EXPECT_EQ(in.value(), 9.0);
 }
@@ -272,24 +308,24 @@ TEST_F(InputOutput, AgeIsLoopTimeSinceTheWrite) {
     connect(first);
     writeAt(first, 1.0, 1000);
     in.read();
-    component.setTime(3500);
+    access(component).setTime(3500);
     EXPECT_EQ(in.age(&component), 2500);
 }
 
 // A simulated clock restarts.
 TEST_F(InputOutput, MoveOfTheTimeKeepsAgesAndNews) {
     Input<double> other{&component, "other"};
-    InputPort& other_port = *component.inputs().back();
+    InputPort& other_port = *access(component).inputs().back();
     connect(first);
-    other_port.connect(first.slot().get(), false);
+    other_port.connect(portOf(component, first).slot().get(), false);
     writeAt(first, 1.0, 1'000'000);
     in.read();
-    component.setTime(1'000'500);
+    access(component).setTime(1'000'500);
     for (const std::int64_t by : {-1'000'000, -1'000'500, -999'999}) {
-        first.slot()->stamp = movedStamp(first.slot()->stamp, by);
+        portOf(component, first).slot()->stamp = movedStamp(portOf(component, first).slot()->stamp, by);
         port().moveTime(by);
         other_port.moveTime(by);
-        component.setTime(component.time() + by);
+        access(component).setTime(component.time() + by);
         EXPECT_EQ(in.read(), DataStatus::Old);
         EXPECT_TRUE(other.isNew());
         EXPECT_EQ(in.age(&component), 500);
@@ -300,7 +336,7 @@ TEST_F(InputOutput, MoveOfTheTimeKeepsAgesAndNews) {
 
 TEST_F(InputOutput, WriteIsStampedWithTheLoopsTime) {
     writeAt(first, 1.0, 42);
-    EXPECT_EQ(first.slot()->stamp, 42);
+    EXPECT_EQ(portOf(component, first).slot()->stamp, 42);
 }
 
 TEST_F(InputOutput, SlotOutlivesItsOutput) {
@@ -309,7 +345,7 @@ TEST_F(InputOutput, SlotOutlivesItsOutput) {
         BareComponent other;
         Output<double> output{&other, "output"};
         output.write(5.0);
-        slot = output.slot();
+        slot = portOf(other, output).slot();
         port().connect(slot.get(), false);
     }
     in.read();
@@ -320,18 +356,18 @@ TEST(StagedOutput, ReadersSeeWholeValuesEvenIfACopyFails) {
     BareComponent component;
     Output<Halves> out{&component, "out"};
     Input<Halves> in{&component, "in"};
-    out.stage();
-    component.inputs().front()->connect(out.slot().get(), false);
+    portOf(component, out).stage();
+    access(component).inputs().front()->connect(portOf(component, out).slot().get(), false);
     out.value().first = out.value().second = {1.0};
     out.publish();
     EXPECT_EQ(in.read(), DataStatus::None);
-    EXPECT_TRUE(out.commit());
+    EXPECT_TRUE(portOf(component, out).commit());
     EXPECT_EQ(in.read(), DataStatus::New);
-    component.setTime(component.time() + 1);
+    access(component).setTime(component.time() + 1);
     out.value().first = out.value().second = {2.0, 3.0};
     out.publish();
     Halves::copies_throw = true;
-    EXPECT_THROW(out.commit(), std::bad_alloc);
+    EXPECT_THROW(portOf(component, out).commit(), std::bad_alloc);
     Halves::copies_throw = false;
     in.read();
     EXPECT_EQ(in.value().first, in.value().second);
@@ -341,13 +377,13 @@ TEST(QueueWithoutMemory, DropsMessagesThatItCannotCopy) {
     BareComponent component;
     Output<Halves> out{&component, "out"};
     Queue<Halves, 2> queue{&component, "queue"};
-    component.inputs().front()->connect(out.slot().get(), false);
+    access(component).inputs().front()->connect(portOf(component, out).slot().get(), false);
     Halves::copies_throw = true;
     out.publish();
     EXPECT_EQ(queue.size(), 0U);
     EXPECT_EQ(queue.dropped(), 1U);
     Halves::copies_throw = false;
-    component.setTime(component.time() + 1);
+    access(component).setTime(component.time() + 1);
     out.publish();
     EXPECT_EQ(queue.size(), 1U);
 }
@@ -356,19 +392,19 @@ TEST(StagedOutput, ComponentContinuesFromTheValueThatItWrote) {
     BareComponent component;
     Output<std::vector<int>> out{&component, "out"};
     out.reserve(std::vector<int>(100));
-    out.stage();
-    const auto& seen = static_cast<const Slot<std::vector<int>>&>(*out.slot()).value;
+    portOf(component, out).stage();
+    const auto& seen = static_cast<const Slot<std::vector<int>>&>(*portOf(component, out).slot()).value;
     out.write({1});
-    EXPECT_TRUE(out.commit());
-    component.setTime(component.time() + 1);
+    EXPECT_TRUE(portOf(component, out).commit());
+    access(component).setTime(component.time() + 1);
     out.value().push_back(2);
     out.publish();
     EXPECT_EQ(seen, std::vector<int>({1}));
-    EXPECT_TRUE(out.commit());
+    EXPECT_TRUE(portOf(component, out).commit());
     EXPECT_EQ(seen, std::vector<int>({1, 2}));
     EXPECT_EQ(out.value(), seen);
     out.value().push_back(3);
-    out.takeBack();
+    portOf(component, out).takeBack();
     EXPECT_EQ(out.value(), std::vector<int>({1, 2}));
     EXPECT_GE(out.value().capacity(), 100U);
     EXPECT_GE(seen.capacity(), 100U);
@@ -391,7 +427,7 @@ TEST(Declaration, OfAnIllegalNameIsRefused) {
 
 TEST(Declaration, AfterFreezeIsRefused) {
     BareComponent component;
-    component.freeze();
+    access(component).freeze();
     const auto declare = [&] { const Input<double> in{&component, "in"}; };
     EXPECT_THROW(declare(), std::logic_error);
 }

@@ -27,6 +27,10 @@ class Idle : public Component {
 
 using Box = Mailbox<int, int>;
 
+// As the executor does.
+void open(MailboxBase& box) { box.open(); }
+void close(MailboxBase& box) { box.close(); }
+
 struct Asked {
     MailStatus status;
     int reply;
@@ -48,7 +52,7 @@ bool finds(Box& box) {
 TEST(Mailbox, PassesRequestAndReply) {
     Idle idle;
     Box box(&idle);
-    box.open();
+    open(box);
     EXPECT_EQ(box.request(), nullptr);
     auto asked = ask(box, 7);
     ASSERT_TRUE(finds(box));
@@ -67,15 +71,15 @@ TEST(Mailbox, WithoutALoopTheAnswerIsImmediate) {
     Idle idle;
     Box box(&idle);
     EXPECT_EQ(ask(box, 1).get().status, MailStatus::Ended);
-    box.open();
-    box.close();
+    open(box);
+    close(box);
     EXPECT_EQ(ask(box, 1).get().status, MailStatus::Ended);
 }
 
 TEST(Mailbox, ACallWithoutAnswerTimesOut) {
     Idle idle;
     Box box(&idle);
-    box.open();
+    open(box);
     EXPECT_EQ(ask(box, 1, milliseconds(1)).get().status, MailStatus::TimedOut);
     EXPECT_EQ(ask(box, 1, nanoseconds(-1)).get().status, MailStatus::TimedOut);
     EXPECT_EQ(box.request(), nullptr) << "the call has timed out";
@@ -90,7 +94,7 @@ TEST(Mailbox, ACallWithoutAnswerTimesOut) {
 TEST(Mailbox, AReplyWithoutCallerIsIgnored) {
     Idle idle;
     Box box(&idle);
-    box.open();
+    open(box);
     box.reply(5);
     auto asked = ask(box, 1);
     ASSERT_TRUE(finds(box));
@@ -102,11 +106,11 @@ TEST(Mailbox, TheEndOfTheLoopAnswersAllCallers) {
     Idle idle;
     Box box(&idle);
     for (int run = 0; run < 3; ++run) {
-        box.open();
+        open(box);
         std::vector<std::future<Asked>> waiting;
         for (int i = 0; i < 4; ++i) waiting.push_back(ask(box, i));
         ASSERT_TRUE(finds(box));
-        box.close();
+        close(box);
         for (auto& each : waiting) EXPECT_EQ(each.get().status, MailStatus::Ended);
     }
 }
@@ -114,11 +118,11 @@ TEST(Mailbox, TheEndOfTheLoopAnswersAllCallers) {
 TEST(Mailbox, ANewLoopStartsWithoutRequests) {
     Idle idle;
     Box box(&idle);
-    box.open();
+    open(box);
     auto before = ask(box, 1);
     ASSERT_TRUE(finds(box));
-    box.close();
-    box.open();
+    close(box);
+    open(box);
     auto after = ask(box, 2);
     EXPECT_EQ(before.get().status, MailStatus::Ended);
     ASSERT_TRUE(finds(box));
@@ -130,7 +134,7 @@ TEST(Mailbox, ANewLoopStartsWithoutRequests) {
 TEST(Mailbox, ItsDestructionReleasesCallers) {
     Idle idle;
     auto box = std::make_unique<Box>(&idle);
-    box->open();
+    open(*box);
     auto asked = ask(*box, 1);
     ASSERT_TRUE(finds(*box));
     box.reset();
@@ -143,7 +147,7 @@ TEST(Mailbox, AReplyOutlivesTheMailbox) {
     for (int i = 0; i < 200; ++i) {
         Idle idle;
         auto box = std::make_unique<Mailbox<int, std::string>>(&idle);
-        box->open();
+        open(*box);
         auto asked = std::async(std::launch::async, [&to = *box] {
             std::string reply;
             const MailStatus status = to.call(1, reply, hours(1));
@@ -151,7 +155,7 @@ TEST(Mailbox, AReplyOutlivesTheMailbox) {
         });
         ASSERT_TRUE(eventually([&] { return box->request() != nullptr; }));
         box->reply(text);
-        box->close();
+        close(*box);
         box.reset();
         const auto [status, reply] = asked.get();
         EXPECT_EQ(reply, status == MailStatus::Answered ? text : std::string());
@@ -163,7 +167,7 @@ TEST(Mailbox, AReplyOutlivesTheMailbox) {
 TEST(Mailbox, AnswersBelongToTheirRequests) {
     Idle idle;
     Mailbox<std::vector<int>, std::vector<int>> box(&idle);
-    box.open();
+    open(box);
     std::atomic<int> answered{0};
     std::atomic<int> left{4};
     std::vector<std::thread> callers;
@@ -189,8 +193,8 @@ TEST(Mailbox, AnswersBelongToTheirRequests) {
         if (const auto* request = box.request(); request != nullptr && random() % 3 != 0)
             box.reply(std::vector<int>(*request));
         if (random() % 500 == 0) {
-            box.close();
-            box.open();
+            close(box);
+            open(box);
         }
         std::this_thread::yield();
     }

@@ -18,15 +18,15 @@ class QueueAlone : public ::testing::Test {
    protected:
     // As at a boundary, like Rewire::apply().
     void connect(OutputBase& output) {
-        queue.receive();
-        component.inputs().front()->connect(output.slot().get(), false);
-        queue.skip();
+        as_executor.receive();
+        access(component).inputs().front()->connect(portOf(component, output).slot().get(), false);
+        as_executor.skip();
     }
     void write(Output<int>& output, int value) { write(output, value, component.time() + 1); }
     void write(Output<int>& output, int value, std::int64_t time_ns) {
-        component.setTime(time_ns);
+        access(component).setTime(time_ns);
         output.write(value);
-        queue.receive();
+        as_executor.receive();
     }
     std::vector<int> taken() {
         std::vector<int> values;
@@ -39,6 +39,7 @@ class QueueAlone : public ::testing::Test {
 
     BareComponent component;
     Queue<int, 3> queue{&component, "queue"};
+    QueueBase& as_executor = queue;
     Output<int> first{&component, "first"};
     Output<int> second{&component, "second"};
 };
@@ -98,7 +99,7 @@ TEST_F(QueueAlone, AgeIsThatOfTheOldestMessage) {
     connect(first);
     write(first, 1, 100);
     write(first, 2, 300);
-    component.setTime(450);
+    access(component).setTime(450);
     EXPECT_EQ(queue.age(), 350);
     queue.pop();
     EXPECT_EQ(queue.age(), 150);
@@ -111,13 +112,13 @@ TEST_F(QueueAlone, MessagesKeepTheirAgesIfTheTimeMoves) {
     queue.pop();
     write(first, 2, 1000);
     write(first, 3, 1200);
-    queue.moveTime(-1500);
-    component.setTime(10);
+    as_executor.moveTime(-1500);
+    access(component).setTime(10);
     EXPECT_EQ(queue.age(), 510);
     queue.pop();
     EXPECT_EQ(queue.age(), 310);
     queue.pop();
-    queue.moveTime(-1500);
+    as_executor.moveTime(-1500);
     EXPECT_EQ(queue.age(), -1);
 }
 
@@ -127,9 +128,9 @@ TEST_F(QueueAlone, MessagesOfVariableSizeKeepTheirCapacity) {
     std_msgs::String longest;
     longest.data = std::string(100, 'x');
     texts.reserve(longest);
-    component.inputs().back()->connect(output.slot().get(), false);
+    access(component).inputs().back()->connect(portOf(component, output).slot().get(), false);
     for (int round = 0; round < 4; ++round) {
-        component.setTime(component.time() + 1);
+        access(component).setTime(component.time() + 1);
         output.value().data = "a text that is longer than what a string has at hand";
         output.publish();
         const char* const place = texts.front()->data.data();

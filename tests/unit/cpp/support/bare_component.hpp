@@ -3,6 +3,8 @@
 /// API alone.
 #pragma once
 
+#include <stdexcept>
+
 #include "rtcf/component.hpp"
 
 namespace rtcf::test {
@@ -14,12 +16,19 @@ class BareComponent final : public Component {
         context.name = "bare";
         context.clock = &loop_clock;
         context.period_ns = loop_clock.period_ns;
-        attach(context);
+        access(*this).attach(context);
     }
     void update() override {}
 
     LoopClock loop_clock;
     ComponentContext context;
 };
+
+/// The executor's side of an output.
+inline OutputPort& portOf(const Component& owner, const OutputBase& output) {
+    for (OutputPort* port : access(owner).outputs())
+        if (&port->output() == &output) return *port;
+    throw std::out_of_range(output.name());
+}
 
 }  // namespace rtcf::test
