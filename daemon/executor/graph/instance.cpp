@@ -159,7 +159,7 @@ void Instance::callHook(Hook hook, const std::function<bool()>& call) {
             return;
         } else {
             why = access(*component_).failure().empty() ? "it returned false without an error text"
-                                                : access(*component_).failure();
+                                                        : access(*component_).failure();
         }
     } catch (const Error&) {
         throw;
@@ -194,8 +194,8 @@ void Instance::callLastHook(Hook hook, const std::function<void()>& call) noexce
 // Stamps of a hook's writes: later than those of the last cycle and of earlier hooks, and earlier
 // than those of the next cycle. A constructor's writes have the stamp 1.
 void Instance::setHookTime() noexcept {
-    access(*component_).setTime(
-        std::max<std::int64_t>(context_.clock->time_ns + 2, component_->time() + 1));
+    access(*component_)
+        .setTime(std::max<std::int64_t>(context_.clock->time_ns + 2, component_->time() + 1));
 }
 
 void Instance::configure() {

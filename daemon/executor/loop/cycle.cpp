@@ -122,7 +122,8 @@ template <bool Plain>
                 if (Plain) {
                     next->update(&component);
                 } else {
-                    const DeviceLoan loan(access(component).context(), counted_ ? nullptr : &uncounted_);
+                    const DeviceLoan loan(access(component).context(),
+                                          counted_ ? nullptr : &uncounted_);
                     component.update();
                     commit(component, *schedule_->turnOf(*next).statistics, OnBadOutput::End);
                 }

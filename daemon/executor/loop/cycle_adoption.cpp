@@ -53,7 +53,8 @@ void Cycle::changeComponents(Adoption& adoption) noexcept {
         // Its writes here are later than those of its hooks, and earlier than the first cycle's.
         Component& successor = *hand_over.successor;
         access(successor).setTime(active_ ? boundary_time_ns_ - 1 : successor.time() + 1);
-        const RealtimeHookNote note(notes_, access(successor).context().recorder_slot, Hook::TakeOver);
+        const RealtimeHookNote note(notes_, access(successor).context().recorder_slot,
+                                    Hook::TakeOver);
         successor.takeOver(Predecessor(*hand_over.previous));
     }
     if (active_) {

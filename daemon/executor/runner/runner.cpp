@@ -208,8 +208,10 @@ std::vector<Probe::Value> Runner::probe(const std::string& name) {
     loop_.adoptInjections();
     Probe probe;
     std::size_t count = 0;
-    for (const InputPort* input : access(instance.component()).inputs()) count = probe.add(*input) + 1;
-    for (const OutputPort* output : access(instance.component()).outputs()) count = probe.add(*output) + 1;
+    for (const InputPort* input : access(instance.component()).inputs())
+        count = probe.add(*input) + 1;
+    for (const OutputPort* output : access(instance.component()).outputs())
+        count = probe.add(*output) + 1;
     std::vector<Probe::Value> values;
     if (!loop_.probe(probe, kProbeTimeout + 2 * settings_.loop.period_ns)) return values;
     for (std::size_t i = 0; i < count; ++i) values.push_back(probe.value(i));

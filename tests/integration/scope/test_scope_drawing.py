@@ -1,5 +1,6 @@
 """Drawing of the scope's page: each cycle is drawn, and the pixels do not depend on the path."""
 
+import itertools
 import re
 from collections.abc import Iterator
 from typing import Any
@@ -245,6 +246,23 @@ def test_tick_labels_are_short_and_distinct(
     for text, value in zip(texts, found["at"], strict=True):
         said = float(text.replace("−", "-").replace("\u202f", "")) * factor + base
         assert said == pytest.approx(value, rel=1e-12, abs=1e-3 * (high - low))
+
+
+@pytest.mark.parametrize("height", [40, 55, 80, 200, 900])
+@pytest.mark.parametrize("high", [1.0, 1.5, 2.75, 3.0, 7.5])
+def test_a_value_axis_has_two_ticks_at_least_which_do_not_overlap(
+    visit: Opener, height: int, high: float
+) -> None:
+    rows = _blank(visit).ask(
+        f"""(async () => {{
+          const {{ Sight }} = await import("/page/drawing/sight.js");
+          const scale = {{ low: -{high!r}, high: {high!r} }};
+          const sight = new Sight({{ begin: 0, span: 5 }}, scale, 600, {height}, 1);
+          return sight.rows.at.map((value) => sight.y(value));
+        }})()"""
+    )
+    assert len(rows) >= 2
+    assert min(abs(a - b) for a, b in itertools.pairwise(rows)) >= 12
 
 
 def _note(text: str) -> tuple[float, float]:

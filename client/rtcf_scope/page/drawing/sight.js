@@ -3,7 +3,7 @@
 import { ticks } from "./axes.js";
 import { rulerOf } from "./ruler.js";
 
-const EVERY_Y = 45; // approximate distance of ticks, CSS pixels
+const EVERY_Y = [45, 30, 18, 12]; // approximate distance of ticks, CSS pixels; the first with two ticks
 
 export class Sight {
   // The size is in CSS pixels; `ratio` is the number of screen pixels in one. The scale uses `tall` of the height.
@@ -27,7 +27,11 @@ export class Sight {
   }
 
   get rows() {
-    this.ticksOfRows ??= this.bottom > this.top ? ticks(this.low, this.high, Math.max(2, (this.bottom - this.top) / this.ratio / EVERY_Y)) : { step: 1, at: [] };
+    if (this.ticksOfRows) return this.ticksOfRows;
+    this.ticksOfRows = { step: 1, at: [] };
+    const height = (this.bottom - this.top) / this.ratio;
+    for (const every of EVERY_Y)
+      if (height > 0 && this.ticksOfRows.at.length < 2) this.ticksOfRows = ticks(this.low, this.high, Math.max(2, height / every));
     return this.ticksOfRows;
   }
 

@@ -50,10 +50,10 @@ namespace rtcf::test {
 namespace {
 
 // True if a component's member, or the component, has a public function of that name.
-#define HAS(NAME)                                                          \
-    template <typename T, typename = void>                                 \
-    constexpr bool has_##NAME = false;                                     \
-    template <typename T>                                                  \
+#define HAS(NAME)                          \
+    template <typename T, typename = void> \
+    constexpr bool has_##NAME = false;     \
+    template <typename T>                  \
     constexpr bool has_##NAME<T, std::void_t<decltype(&T::NAME)>> = true
 HAS(attach);
 HAS(close);
@@ -238,12 +238,16 @@ TEST_F(InputOutput, ContinuedConnectionKeepsReadAndUnreadValues) {
     connect(first);
     write(first, 1.0);
     in.read();
-    portOf(component, first).type().copy(*portOf(component, copy).slot(), *portOf(component, first).slot());
+    portOf(component, first)
+        .type()
+        .copy(*portOf(component, copy).slot(), *portOf(component, first).slot());
     port().connect(portOf(component, copy).slot().get(), true);
     EXPECT_EQ(read(), DataStatus::Old) << "the write was read before";
     EXPECT_EQ(in.value(), 1.0);
     write(first, 2.0);
-    portOf(component, first).type().copy(*portOf(component, copy).slot(), *portOf(component, first).slot());
+    portOf(component, first)
+        .type()
+        .copy(*portOf(component, copy).slot(), *portOf(component, first).slot());
     port().connect(portOf(component, first).slot().get(), true);
     EXPECT_EQ(read(), DataStatus::New);
     EXPECT_EQ(in.value(), 2.0);
@@ -256,12 +260,16 @@ TEST_F(InputOutput, ContinuedConnectionKeepsAnEarlierWritersValueToo) {
     write(first, 1.0);
     in.read();
     connect(second);
-    portOf(component, first).type().copy(*portOf(component, copy).slot(), *portOf(component, second).slot());
+    portOf(component, first)
+        .type()
+        .copy(*portOf(component, copy).slot(), *portOf(component, second).slot());
     port().connect(portOf(component, copy).slot().get(), true);
     EXPECT_EQ(read(), DataStatus::Old);
     EXPECT_EQ(in.value(), 1.0) << "the new writer has not written yet";
     write(second, 9.5);
-    portOf(component, first).type().copy(*portOf(component, copy).slot(), *portOf(component, second).slot());
+    portOf(component, first)
+        .type()
+        .copy(*portOf(component, copy).slot(), *portOf(component, second).slot());
     EXPECT_EQ(read(), DataStatus::New);
     EXPECT_EQ(in.value(), 9.5);
 }
@@ -322,7 +330,8 @@ TEST_F(InputOutput, MoveOfTheTimeKeepsAgesAndNews) {
     in.read();
     access(component).setTime(1'000'500);
     for (const std::int64_t by : {-1'000'000, -1'000'500, -999'999}) {
-        portOf(component, first).slot()->stamp = movedStamp(portOf(component, first).slot()->stamp, by);
+        portOf(component, first).slot()->stamp =
+            movedStamp(portOf(component, first).slot()->stamp, by);
         port().moveTime(by);
         other_port.moveTime(by);
         access(component).setTime(component.time() + by);
@@ -393,7 +402,8 @@ TEST(StagedOutput, ComponentContinuesFromTheValueThatItWrote) {
     Output<std::vector<int>> out{&component, "out"};
     out.reserve(std::vector<int>(100));
     portOf(component, out).stage();
-    const auto& seen = static_cast<const Slot<std::vector<int>>&>(*portOf(component, out).slot()).value;
+    const auto& seen =
+        static_cast<const Slot<std::vector<int>>&>(*portOf(component, out).slot()).value;
     out.write({1});
     EXPECT_TRUE(portOf(component, out).commit());
     access(component).setTime(component.time() + 1);

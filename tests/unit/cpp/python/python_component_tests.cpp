@@ -114,7 +114,8 @@ class PythonComponents : public testing::Test {
         source_->stamp = component_.time();
     }
     const Slot<double>& written() const {
-        return *static_cast<const Slot<double>*>(access(component_).outputs().front()->slot().get());
+        return *static_cast<const Slot<double>*>(
+            access(component_).outputs().front()->slot().get());
     }
 
     std::shared_ptr<Slot<double>> source_ = std::make_shared<Slot<double>>();

@@ -158,7 +158,8 @@ TEST(ComponentArena, HoldsComponentsThatConstructOthers) {
     EXPECT_EQ(detail::ObjectHead::of(made.get()).memory, &arena);
     EXPECT_EQ(detail::ObjectHead::of(made->part.get()).memory, nullptr);
     const auto begin = reinterpret_cast<std::uintptr_t>(made.get());
-    const auto last = reinterpret_cast<std::uintptr_t>(access(*made).outputs().back()->slot().get());
+    const auto last =
+        reinterpret_cast<std::uintptr_t>(access(*made).outputs().back()->slot().get());
     EXPECT_LE(last - begin, sizeof(Assembly) + 64);
 }
 
