@@ -16,6 +16,8 @@ from rtcf_shared.naming import suggestion
 from rtcf_shared.spec import parse_value
 
 _GRAPH_KEYS = ("settings", "components")
+_DEEPEST = 10  # groups and arrays around a parameter
+_MOST_PARAMETERS = 10_000  # of a component
 _COMPONENT_KEYS = ("name", "ns", "package", "type", "remaps", "parameters", "first", "ignore",
                    "breaks", "every", "phase", "optional")  # fmt: skip
 _NOTHING = ("", "~", "null", "Null", "NULL")
@@ -113,8 +115,15 @@ class _Reader:
                 self._field(value, key, spec, key)
         return spec
 
-    def _parameters(self, name: str, node: Any, found: dict[str, graph_pb2.ParameterValue]) -> None:
+    def _parameters(
+        self, name: str, node: Any, found: dict[str, graph_pb2.ParameterValue], depth: int = 0
+    ) -> None:
         """Add the parameters that a value sets, as flat() of spec.py."""
+        # Aliases may contain themselves, or each other many times.
+        if depth > _DEEPEST:
+            raise self._error(node, f"a parameter is in more than {_DEEPEST} groups")
+        if len(found) > _MOST_PARAMETERS:
+            raise self._error(node, f"a component has more than {_MOST_PARAMETERS} parameters")
         if node.id == "scalar":
             if name in found:
                 raise self._error(node, f"parameters.{name} is set twice")
@@ -124,10 +133,10 @@ class _Reader:
             raise self._error(node, f"parameters.{name} is empty")
         if node.id == "mapping":
             for key, (_, member) in self._mapping(node, f"parameters.{name}").items():
-                self._parameters(f"{name}/{key}", member, found)
+                self._parameters(f"{name}/{key}", member, found, depth + 1)
         else:
             for index, element in enumerate(node.value):
-                self._parameters(f"{name}_{index}", element, found)
+                self._parameters(f"{name}_{index}", element, found, depth + 1)
 
     def _message(self, node: Any, where: str, message: Any) -> None:
         """Set the fields of a settings message by the keys of a mapping."""

@@ -108,8 +108,12 @@ def parse_value(text: str) -> graph_pb2.ParameterValue:
 def flat(name: str, value: object) -> Iterator[tuple[str, object]]:
     """Yield the parameters that a value sets: those of a group for a mapping, `gains/p`, and the
     elements of an array for a list or a NumPy array, `gains_0`.
+
+    Raises ValueError for an empty mapping or list.
     """
     value = value.tolist() if hasattr(value, "tolist") else value
+    if isinstance(value, Mapping | list | tuple) and not value:
+        raise ValueError(f"{name} is empty")
     if isinstance(value, Mapping):
         for key, member in value.items():
             yield from flat(f"{name}/{key}", member)

@@ -1,12 +1,12 @@
 """The private parameters of rt_launcher: its own, and load-time values of its component."""
 
-from collections.abc import Callable, Container, Mapping
+import re
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from rtcf.v1 import control_pb2, graph_pb2
 from rtcf_shared.enums import choices
-from rtcf_shared.spec import flat
 
 from rtcf_launch.codes import Code, Ending
 from rtcf_launch.parameters import Parameters, as_boolean, as_integer, close_to
@@ -40,7 +40,7 @@ def named_runner(values: Mapping[str, Any]) -> str | None:
 
 
 def read(
-    values: Mapping[str, Any], declared: Container[str] = ()
+    values: Mapping[str, Any], declared: Collection[str] = ()
 ) -> tuple[LauncherParameters, list[str]]:
     """Check the launcher's own parameters; return them, and a note for each that belongs to the
     component instead.
@@ -56,7 +56,7 @@ def read(
         if given.has(PREFIX + name):
             return take(PREFIX + name)
         why = ""
-        if name in declared:
+        if name in declared or _is_group(name, declared) or _is_array(name, declared):
             why = "the component declares it"
         elif not fits:
             why = "it has no effect without ~every"
@@ -98,14 +98,16 @@ def settings(
     A mapping sets the members of a group, a list the elements of an array. The component's node
     handle can read the others, which may have any name.
     """
+    slips: list[str] = []
+    given: dict[str, Any] = {}
+    # Lists last: they override values that somebody has left under the names of their elements.
+    for name, value in sorted(others.items(), key=lambda each: isinstance(each[1], list)):
+        for part, leaf in _parts(name, value, declared, slips):
+            if part in given:
+                slips.append(f"~{part} is ignored: ~{name} sets it, too")
+            given[part] = leaf
     result = []
     rest = []
-    slips = []
-    given: dict[str, Any] = {}
-    for name, value in others.items():
-        parts = dict(flat(name, value))
-        in_use = not declared.keys().isdisjoint(parts)
-        given |= parts if in_use else {name: value}
     for name, value in sorted(given.items()):
         info = declared.get(name)
         if info is not None:
@@ -113,10 +115,46 @@ def settings(
             continue
         rest.append(name)
         missing = [each for each in declared if each not in given]
-        hint = close_to(name, missing)
-        if hint or name not in others:
+        if hint := close_to(name, missing):
             slips.append(f"the component declares no parameter ~{name}{hint}")
     return result, rest, slips
+
+
+def _parts(
+    name: str, value: Any, declared: Collection[str], slips: list[str]
+) -> Iterator[tuple[str, Any]]:
+    """Yield the members of a declared group, the elements of a declared array, or else the value
+    as it is; add a warning for each value that cannot be one of these.
+    """
+    if name in declared:
+        yield name, value
+    elif _is_group(name, declared):
+        if isinstance(value, Mapping):
+            for key, member in value.items():
+                yield from _parts(f"{name}/{key}", member, declared, slips)
+        else:
+            slips.append(f"~{name} is a group of parameters: set ~{name}/NAME")
+    elif _is_array(name, declared):
+        if not isinstance(value, list):
+            slips.append(f"~{name} is an array: set a list, or its elements ~{name}_0 …")
+            return
+        for index, element in enumerate(value):
+            part = f"{name}_{index}"
+            if part not in declared and not _is_array(part, declared):
+                slips.append(f"~{name} has {len(value)} values: the component takes {index}")
+                return
+            yield from _parts(part, element, declared, slips)
+    else:
+        yield name, value
+
+
+def _is_group(name: str, declared: Iterable[str]) -> bool:
+    return any(each.startswith(f"{name}/") for each in declared)
+
+
+def _is_array(name: str, declared: Iterable[str]) -> bool:
+    element = re.compile(rf"{re.escape(name)}(_[0-9]+)+")
+    return any(element.fullmatch(each) for each in declared)
 
 
 def _value(info: graph_pb2.ParameterInfo, value: Any) -> graph_pb2.ParameterValue:

@@ -103,9 +103,11 @@ def as_boolean(value: Any) -> Any:
 
 
 def close_to(name: str, known: Iterable[str]) -> str:
-    """Return '; did you mean ~x?', or nothing."""
-    close = difflib.get_close_matches(name, list(known), n=1)
-    return f"; did you mean ~{close[0]}?" if close else ""
+    """Return '; did you mean ~x?' with a name in the same group, or nothing."""
+    group = name[: name.rfind("/") + 1]
+    there = [each.removeprefix(group) for each in known if each.startswith(group)]
+    close = difflib.get_close_matches(name.removeprefix(group), there, n=1)
+    return f"; did you mean ~{group}{close[0]}?" if close else ""
 
 
 def _shown(value: Any) -> str:

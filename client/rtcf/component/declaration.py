@@ -251,7 +251,7 @@ def describe(cls: type) -> Description:
         groups = _groups(member.elements[0]) if member.elements else []
         if group := next((each for each in groups if each in taken), None):
             both = DeclarationError(
-                f"is in a group {group}, and {taken[group]} is a parameter {group}: rename one"
+                f"makes {group} a group, which is also a parameter (of {taken[group]}): rename one"
             )
             raise _at(both, cls, member.line, member.name)
     return result

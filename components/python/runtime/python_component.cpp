@@ -113,7 +113,7 @@ void PythonComponent::declare() {
         declaration.value = record + state.offset;
         declaration.initial.resize(declaration.size);
         std::memcpy(declaration.initial.data(), declaration.value, declaration.size);
-        access(*this).declare(std::move(declaration));
+        accessTo(*this).declare(std::move(declaration));
     }
 }
 

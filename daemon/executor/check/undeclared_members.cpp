@@ -15,17 +15,17 @@ constexpr std::size_t kWord = 8;  // granularity, as a number rarely changes in 
 UndeclaredMembers::UndeclaredMembers(const Component& component) {
     const void* complete = dynamic_cast<const void*>(&component);  // the complete object
     object_ = static_cast<const std::byte*>(complete);
-    const std::size_t size = access(component).context().object_size;
+    const std::size_t size = accessTo(component).context().object_size;
     before_.assign(object_, object_ + size);
     changed_.resize(size);
     add(&component, sizeof component, "the base class", true);
-    for (const InputPort* input : access(component).inputs())
+    for (const InputPort* input : accessTo(component).inputs())
         add(&input->input(), sizeof(InputBase), "input " + input->name(), true);
-    for (const OutputPort* output : access(component).outputs())
+    for (const OutputPort* output : accessTo(component).outputs())
         add(&output->output(), sizeof(OutputBase), "output " + output->name(), true);
-    for (const ParameterBase* parameter : access(component).parameters())
+    for (const ParameterBase* parameter : accessTo(component).parameters())
         add(parameter->place(), 0, "parameter " + parameter->declaration().name, false);
-    for (const StateDeclaration& state : access(component).states())
+    for (const StateDeclaration& state : accessTo(component).states())
         add(state.value, state.size, "state " + state.name, true);
     std::sort(fields_.begin(), fields_.end(),
               [](const Field& a, const Field& b) { return a.begin < b.begin; });

@@ -41,7 +41,7 @@ std::string replacementReason(const Instance& present, const WantedComponent& wa
 std::vector<std::pair<std::string, ParameterValue>> otherParameters(
     const Instance& present, const ComponentDefinition& shall, std::string& detail) {
     std::vector<std::pair<std::string, ParameterValue>> others;
-    const auto& declared = access(present.component()).parameters();
+    const auto& declared = accessTo(present.component()).parameters();
     for (const auto& [name, value] : shall.parameters) {
         const bool known = std::any_of(declared.begin(), declared.end(),
                                        [&name = name](const ParameterBase* parameter) {

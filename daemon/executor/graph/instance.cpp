@@ -29,7 +29,7 @@ const ComponentRecord& findRecord(const Library& library, const ComponentDefinit
 
 std::string parameterNames(const Component& component) {
     std::string names;
-    for (const ParameterBase* parameter : access(component).parameters()) {
+    for (const ParameterBase* parameter : accessTo(component).parameters()) {
         names += (names.empty() ? "" : ", ") + parameter->declaration().name;
     }
     return names.empty() ? "none" : names;
@@ -102,8 +102,8 @@ Instance::Instance(ComponentDefinition definition, std::shared_ptr<const Library
         component_.reset(record_->create(definition_.name.c_str(), &context_));
         return true;
     });
-    access(*component_).attach(context_);
-    for (const ParameterBase* parameter : access(*component_).parameters()) {
+    accessTo(*component_).attach(context_);
+    for (const ParameterBase* parameter : accessTo(*component_).parameters()) {
         parameter_values_.push_back(parameter->declaration().default_value);
     }
     setFirstParameters();
@@ -116,7 +116,7 @@ Instance::~Instance() {
 
 void Instance::setFirstParameters() {
     auto batch = definition_.parameters;
-    const auto& declared = access(*component_).parameters();
+    const auto& declared = accessTo(*component_).parameters();
     for (const auto& [name, given, chosen] : definition_.inherited) {
         const auto names_it = [&name = name](const auto& setting) { return setting.first == name; };
         if (std::any_of(batch.begin(), batch.end(), names_it)) continue;
@@ -158,8 +158,9 @@ void Instance::callHook(Hook hook, const std::function<bool()>& call) {
         } else if (passed) {
             return;
         } else {
-            why = access(*component_).failure().empty() ? "it returned false without an error text"
-                                                        : access(*component_).failure();
+            why = accessTo(*component_).failure().empty()
+                      ? "it returned false without an error text"
+                      : accessTo(*component_).failure();
         }
     } catch (const Error&) {
         throw;
@@ -194,7 +195,7 @@ void Instance::callLastHook(Hook hook, const std::function<void()>& call) noexce
 // Stamps of a hook's writes: later than those of the last cycle and of earlier hooks, and earlier
 // than those of the next cycle. A constructor's writes have the stamp 1.
 void Instance::setHookTime() noexcept {
-    access(*component_)
+    accessTo(*component_)
         .setTime(std::max<std::int64_t>(context_.clock->time_ns + 2, component_->time() + 1));
 }
 
@@ -213,8 +214,8 @@ void Instance::configure() {
 }
 
 void Instance::freezePorts() {
-    access(*component_).freeze();
-    access(*component_).stageOutputs([this](const OutputPort& output) {
+    accessTo(*component_).freeze();
+    accessTo(*component_).stageOutputs([this](const OutputPort& output) {
         const TypeInfo& type = output.type();
         return definition_.optional || !type.fixed_size || type.size > kLargestPutBack;
     });
@@ -223,9 +224,9 @@ void Instance::freezePorts() {
         requireLength("mapped name", name);
         return name;
     };
-    for (const InputPort* input : access(*component_).inputs())
+    for (const InputPort* input : accessTo(*component_).inputs())
         input_names_.push_back(mapped(input->name()));
-    for (const OutputPort* output : access(*component_).outputs()) {
+    for (const OutputPort* output : accessTo(*component_).outputs()) {
         output_names_.push_back(mapped(output->name()));
         samples_.push_back(output->type().make_slot(output->sample()));
     }
@@ -243,11 +244,11 @@ void Instance::start() {
         if (!component_->start()) return false;
         // Publishes first values for components that run earlier in the schedule. Checked outputs
         // wait for the cycle, which reports values that are not finite.
-        for (OutputPort* output : access(*component_).stagedOutputs())
+        for (OutputPort* output : accessTo(*component_).stagedOutputs())
             if (!output->checked()) output->commit();
         return true;
     });
-    for (MailboxBase* mailbox : access(*component_).mailboxes()) mailbox->open();
+    for (MailboxBase* mailbox : accessTo(*component_).mailboxes()) mailbox->open();
     started_ = true;
 }
 
@@ -255,7 +256,7 @@ void Instance::stop() noexcept {
     if (!started_) return;
     started_ = false;
     // First ends calls that wait in a callback: stop() may wait for the callback.
-    for (MailboxBase* mailbox : access(*component_).mailboxes()) mailbox->close();
+    for (MailboxBase* mailbox : accessTo(*component_).mailboxes()) mailbox->close();
     setHookTime();
     callLastHook(Hook::Stop, [this] { component_->stop(); });
 }
@@ -273,8 +274,8 @@ std::vector<std::string> Instance::uselessRemaps() const {
         const auto is_port = [&](const auto* port) {
             return resolveName(port->name(), definition_.ns, context_.full_name) == resolved;
         };
-        const auto& inputs = access(*component_).inputs();
-        const auto& outputs = access(*component_).outputs();
+        const auto& inputs = accessTo(*component_).inputs();
+        const auto& outputs = accessTo(*component_).outputs();
         if (std::none_of(inputs.begin(), inputs.end(), is_port) &&
             std::none_of(outputs.begin(), outputs.end(), is_port)) {
             useless.push_back(from + ":=" + to);
@@ -284,7 +285,7 @@ std::vector<std::string> Instance::uselessRemaps() const {
 }
 
 InputPort* Instance::findInput(const std::string& port) const noexcept {
-    for (InputPort* input : access(*component_).inputs()) {
+    for (InputPort* input : accessTo(*component_).inputs()) {
         if (input->name() == port) return input;
     }
     return nullptr;
@@ -293,7 +294,7 @@ InputPort* Instance::findInput(const std::string& port) const noexcept {
 const InputPort& Instance::requireInput(const std::string& port) const {
     if (const InputPort* const found = findInput(port)) return *found;
     std::string names;
-    for (const InputPort* input : access(*component_).inputs())
+    for (const InputPort* input : accessTo(*component_).inputs())
         names += (names.empty() ? "" : ", ") + input->name();
     throw Error(ErrorKind::PortNotFound, fmt::format("{} has no input {}; it has {}", fullName(),
                                                      port, names.empty() ? "none" : names));
@@ -305,13 +306,13 @@ void Instance::restoreParameterValues(std::vector<ParameterValue> values) {
 }
 
 void Instance::releaseStaged() noexcept {
-    for (ParameterBase* parameter : access(*component_).parameters()) parameter->release();
-    for (DerivedBase* derived : access(*component_).derived()) derived->release();
+    for (ParameterBase* parameter : accessTo(*component_).parameters()) parameter->release();
+    for (DerivedBase* derived : accessTo(*component_).derived()) derived->release();
 }
 
 std::vector<StagedValue*> Instance::stageParameters(
     const std::vector<std::pair<std::string, ParameterValue>>& batch) {
-    const auto& declared = access(*component_).parameters();
+    const auto& declared = accessTo(*component_).parameters();
     std::vector<std::pair<std::size_t, ParameterValue>> checked;
     for (const auto& [name, given] : batch) {
         const auto found = std::find_if(declared.begin(), declared.end(),
@@ -340,7 +341,7 @@ std::vector<StagedValue*> Instance::stageParameters(
     for (ParameterBase* parameter : declared) {
         if (parameter->staged()) staged.push_back(parameter);
     }
-    for (DerivedBase* derived : access(*component_).derived()) {
+    for (DerivedBase* derived : accessTo(*component_).derived()) {
         if (derived->staged()) staged.push_back(derived);
     }
     for (auto& [index, value] : checked) parameter_values_[index] = std::move(value);

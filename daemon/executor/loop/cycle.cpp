@@ -56,7 +56,7 @@ void Cycle::begin(std::int64_t period_ns, std::uint64_t warmup_cycles, std::int6
     total_elapsed_ns_ = 0;
     warmup_cycles_ = warmup_cycles;
     for (const Step& step : schedule_->steps) {
-        ComponentContext& context = access(*step.component).context();
+        ComponentContext& context = accessTo(*step.component).context();
         context.period_ns = period_ns * step.every;
         context.updated_ns = -1;
         context.disabled = false;
@@ -79,12 +79,13 @@ void Cycle::moveTime(std::int64_t by_ns) {
         const_cast<SlotHeader*>(slot)->stamp = movedStamp(slot->stamp, by_ns);
     };
     for (const Step& step : schedule_->steps) {
-        access(*step.component).setTime(std::max<std::int64_t>(1, step.component->time() + by_ns));
-        for (const OutputPort* output : access(*step.component).outputs()) {
+        accessTo(*step.component)
+            .setTime(std::max<std::int64_t>(1, step.component->time() + by_ns));
+        for (const OutputPort* output : accessTo(*step.component).outputs()) {
             move(output->slot().get());
             move(output->written());
         }
-        for (InputPort* input : access(*step.component).inputs()) {
+        for (InputPort* input : accessTo(*step.component).inputs()) {
             move(&input->slot());
             input->moveTime(by_ns);
             if (QueueBase* const queue = input->queue()) queue->moveTime(by_ns);
@@ -118,11 +119,11 @@ template <bool Plain>
                 }
                 notes.enterComponent(next->slot);
                 Component& component = *next->component;
-                access(component).setTime(time);
+                accessTo(component).setTime(time);
                 if (Plain) {
                     next->update(&component);
                 } else {
-                    const DeviceLoan loan(access(component).context(),
+                    const DeviceLoan loan(accessTo(component).context(),
                                           counted_ ? nullptr : &uncounted_);
                     component.update();
                     commit(component, *schedule_->turnOf(*next).statistics, OnBadOutput::End);
@@ -255,7 +256,7 @@ bool Cycle::exchange(std::int64_t time_ns) noexcept {
 
 // True if a component runs in this cycle; also sets its elapsed time.
 bool Cycle::due(const Step& step) const noexcept RTCF_NONBLOCKING {
-    ComponentContext& context = access(*step.component).context();
+    ComponentContext& context = accessTo(*step.component).context();
     if (context.disabled) return false;
     if (step.every == 1) return true;
     if (clock_.iteration % step.every != schedule_->turnOf(step).phase) return false;
@@ -281,7 +282,7 @@ void Cycle::dropConnected() noexcept {
 
 // Publishes a component's staged outputs. @throws any exception of a copy
 void Cycle::commit(Component& component, ComponentStatistics& statistics, OnBadOutput may) {
-    for (OutputPort* output : access(component).stagedOutputs()) {
+    for (OutputPort* output : accessTo(component).stagedOutputs()) {
         if (output->commit()) continue;
         if (output->nonFinitePolicy() == OnNonFinite::Stop && may == OnBadOutput::End &&
             !faulted()) {
@@ -297,7 +298,7 @@ void Cycle::commit(Component& component, ComponentStatistics& statistics, OnBadO
 // @return true if the cycle goes on with the next component
 bool Cycle::threw(const Step& step, const char* text) noexcept {
     const Turn& turn = schedule_->turnOf(step);
-    access(*step.component).context().disabled = true;
+    accessTo(*step.component).context().disabled = true;
     putBack(step);
     if (!turn.optional) {
         endLoop(LoopFault::Kind::Exception, step.component, text);
@@ -307,7 +308,7 @@ bool Cycle::threw(const Step& step, const char* text) noexcept {
     turn.statistics->faults.count.add(1);
     statistics_.faults.add(1);
     // If a commit threw, outputs committed before it already have the stamp of this cycle.
-    access(*step.component).setTime(clock_.time_ns + 1);
+    accessTo(*step.component).setTime(clock_.time_ns + 1);
     makeSafe(*step.component, *turn.statistics, OnBadOutput::End);
     return true;
 }
@@ -326,7 +327,8 @@ void Cycle::endLoop(LoopFault::Kind kind, const Component* component, const char
 void Cycle::makeSafe(Component& component, ComponentStatistics& statistics,
                      OnBadOutput may) noexcept {
     {
-        const RealtimeHookNote note(notes_, access(component).context().recorder_slot, Hook::Safe);
+        const RealtimeHookNote note(notes_, accessTo(component).context().recorder_slot,
+                                    Hook::Safe);
         component.safe();
     }
     const auto keepBefore = [&](const char* text) {
@@ -346,7 +348,7 @@ void Cycle::makeSafe(Component& component, ComponentStatistics& statistics,
 // Restores the outputs of a component that threw, so that neither readers nor its own safe() see
 // half-written values.
 void Cycle::putBack(const Step& step) noexcept {
-    for (OutputPort* output : access(*step.component).outputs()) {
+    for (OutputPort* output : accessTo(*step.component).outputs()) {
         if (!output->staged()) {
             frames_->putBack(output->slot().get());
             continue;
@@ -388,10 +390,10 @@ void Cycle::makeSafe(std::int64_t time_ns) noexcept {
     next_waiting_ = 0;
     for (const Step& step : schedule_->steps) {
         connectWaiting(step);
-        access(*step.component).setTime(time_ns);
+        accessTo(*step.component).setTime(time_ns);
         // safe() of a component that was taken out has already run.
         const Turn& turn = schedule_->turnOf(step);
-        if (turn.optional && access(*step.component).context().disabled) continue;
+        if (turn.optional && accessTo(*step.component).context().disabled) continue;
         makeSafe(*step.component, *turn.statistics, OnBadOutput::GoOn);
     }
     dropConnected();

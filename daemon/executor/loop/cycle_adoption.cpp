@@ -31,7 +31,7 @@ void Cycle::apply(Adoption& adoption) noexcept {
         clock_.period_ns = adoption.period_ns;
         clock_.elapsed_ns = adoption.period_ns;
         for (const Step& step : schedule_->steps)
-            access(*step.component).context().period_ns = adoption.period_ns * step.every;
+            accessTo(*step.component).context().period_ns = adoption.period_ns * step.every;
     }
     statistics_.adoption.add(readCycleCounter() - begin);
 }
@@ -47,13 +47,13 @@ void Cycle::changeComponents(Adoption& adoption) noexcept {
     std::for_each(adoption.rewires.begin(), new_inputs, [](Rewire& each) { each.apply(); });
     for (HandOver& hand_over : adoption.hand_overs) {
         // The exception may have left any state.
-        hand_over.skipped = access(*hand_over.previous).context().disabled;
+        hand_over.skipped = accessTo(*hand_over.previous).context().disabled;
         if (hand_over.skipped) continue;
         for (const StateCopy& state : hand_over.states) state.copy();
         // Its writes here are later than those of its hooks, and earlier than the first cycle's.
         Component& successor = *hand_over.successor;
-        access(successor).setTime(active_ ? boundary_time_ns_ - 1 : successor.time() + 1);
-        const RealtimeHookNote note(notes_, access(successor).context().recorder_slot,
+        accessTo(successor).setTime(active_ ? boundary_time_ns_ - 1 : successor.time() + 1);
+        const RealtimeHookNote note(notes_, accessTo(successor).context().recorder_slot,
                                     Hook::TakeOver);
         successor.takeOver(Predecessor(*hand_over.previous));
     }
@@ -61,9 +61,9 @@ void Cycle::changeComponents(Adoption& adoption) noexcept {
         for (Leaving& leaving : adoption.leaving) {
             // If the component threw, its safe() has already run. A fault of a leaving component
             // does not end the loop.
-            access(*leaving.component).setTime(boundary_time_ns_);
-            for (InputPort* input : access(*leaving.component).inputs()) input->connectWritten();
-            if (!access(*leaving.component).context().disabled)
+            accessTo(*leaving.component).setTime(boundary_time_ns_);
+            for (InputPort* input : accessTo(*leaving.component).inputs()) input->connectWritten();
+            if (!accessTo(*leaving.component).context().disabled)
                 makeSafe(*leaving.component, *leaving.statistics, OnBadOutput::GoOn);
             for (const Latch& latch : leaving.latches) copy(latch);
             for (SerializedTap* tap : leaving.serialized_taps) tap->push(clock_.stamp_ns);

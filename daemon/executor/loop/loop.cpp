@@ -311,7 +311,7 @@ std::int64_t Loop::afterLastCycle(std::int64_t time_ns) const noexcept {
 // The component whose device paces the loop; null = none, the clock does.
 Source* Loop::source() const noexcept {
     Source* const source = cycle_.schedule().source;
-    return source != nullptr && !access(*source).context().disabled ? source : nullptr;
+    return source != nullptr && !accessTo(*source).context().disabled ? source : nullptr;
 }
 
 void Loop::followRealTime() noexcept {
@@ -379,7 +379,7 @@ void Loop::followClock() noexcept {
 Loop::WakeUp Loop::waitForSource(Source& device) noexcept {
     constexpr std::int64_t kPatience = 10'000'000;
     const FlightRecorder::RealtimeNotes notes = recorder_.realtimeNotes();
-    notes.enterHook(access(device).context().recorder_slot, Hook::Wait);
+    notes.enterHook(accessTo(device).context().recorder_slot, Hook::Wait);
     const bool ready = device.wait(monotonicNow() + kPatience);
     notes.leaveHook();
     waits_.add(1);

@@ -118,7 +118,7 @@ struct Schedule {
     void findStretches() {
         for (const Step& step : steps) {
             const bool plain = step.every == 1 && !turnOf(step).optional &&
-                               access(*step.component).stagedOutputs().empty();
+                               accessTo(*step.component).stagedOutputs().empty();
             selective = selective || !plain;
             if (stretches.empty() || stretches.back().plain != plain)
                 stretches.push_back({&step, &step, plain});

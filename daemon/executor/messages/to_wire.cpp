@@ -313,19 +313,19 @@ pb::ComponentType typeTo(const std::string& package, const std::string& library,
     type.set_type(record.type);
     type.set_library(library);
     type.set_doc(record.doc);
-    for (const InputPort* input : access(component).inputs()) {
+    for (const InputPort* input : accessTo(component).inputs()) {
         setPortType(*type.add_ports(), input->name(), false, input->type());
     }
-    for (const OutputPort* output : access(component).outputs()) {
+    for (const OutputPort* output : accessTo(component).outputs()) {
         pb::PortInfo& port = *type.add_ports();
         setPortType(port, output->name(), true, output->type());
         port.set_unit(output->unit());
     }
-    for (const ParameterBase* parameter : access(component).parameters()) {
+    for (const ParameterBase* parameter : accessTo(component).parameters()) {
         *type.add_parameters() =
             parameterTo(parameter->declaration(), parameter->declaration().default_value);
     }
-    for (const StateDeclaration& state : access(component).states()) {
+    for (const StateDeclaration& state : accessTo(component).states()) {
         pb::StateInfo& message = *type.add_states();
         message.set_name(state.name);
         message.set_type(state.type);

@@ -39,11 +39,11 @@ std::vector<const void*> footprint(
         if (lines.full()) break;
         lines.add(&step, sizeof step);
         lines.add(step.component, sizeof *step.component);
-        for (const InputPort* input : access(*step.component).inputs()) {
+        for (const InputPort* input : accessTo(*step.component).inputs()) {
             lines.add(&input->input(), sizeof(InputBase));
             lines.addSlot(source(input));
         }
-        for (const OutputPort* output : access(*step.component).outputs()) {
+        for (const OutputPort* output : accessTo(*step.component).outputs()) {
             lines.add(&output->output(), sizeof(OutputBase));
             lines.addSlot(output->slot().get());
         }

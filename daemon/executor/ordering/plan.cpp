@@ -258,7 +258,7 @@ class Builder {
         std::set<const InputPort*> rewired;
         for (const Rewire& rewire : adoption_.rewires) rewired.insert(rewire.input);
         for (const Step& step : plan_.schedule.steps) {
-            for (InputPort* input : access(*step.component).inputs()) {
+            for (InputPort* input : accessTo(*step.component).inputs()) {
                 if (adoption_.restoration != nullptr || input->waiting() ||
                     rewired.count(input) != 0)
                     adoption_.waiting.push_back({&step, input});
@@ -273,7 +273,7 @@ class Builder {
             const Instance& instance = *previous_.graph.nodes()[index].instance;
             if (staying.count(&instance) != 0) continue;
             Leaving leaving{&instance.component(), instance.statistics().get(), {}, {}, {}};
-            for (const OutputPort* output : access(instance.component()).outputs()) {
+            for (const OutputPort* output : accessTo(instance.component()).outputs()) {
                 const SlotHeader* const slot = output->slot().get();
                 if (const auto found = previous_.latches.find(slot);
                     found != previous_.latches.end())

@@ -50,10 +50,10 @@ class Collector {
     void addNode(std::size_t index) {
         const GraphNode& node = graph_.nodes()[index];
         const Instance& instance = *node.instance;
-        const auto& outputs = access(instance.component()).outputs();
+        const auto& outputs = accessTo(instance.component()).outputs();
         for (std::size_t i = 0; i < outputs.size(); ++i)
             addOutput(index, i, outputs[i], instance.outputNames()[i]);
-        const auto& inputs = access(instance.component()).inputs();
+        const auto& inputs = accessTo(instance.component()).inputs();
         for (std::size_t i = 0; i < inputs.size(); ++i)
             addInput(index, node, inputs[i], instance.inputNames()[i]);
     }

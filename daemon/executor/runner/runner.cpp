@@ -208,9 +208,9 @@ std::vector<Probe::Value> Runner::probe(const std::string& name) {
     loop_.adoptInjections();
     Probe probe;
     std::size_t count = 0;
-    for (const InputPort* input : access(instance.component()).inputs())
+    for (const InputPort* input : accessTo(instance.component()).inputs())
         count = probe.add(*input) + 1;
-    for (const OutputPort* output : access(instance.component()).outputs())
+    for (const OutputPort* output : accessTo(instance.component()).outputs())
         count = probe.add(*output) + 1;
     std::vector<Probe::Value> values;
     if (!loop_.probe(probe, kProbeTimeout + 2 * settings_.loop.period_ns)) return values;

@@ -15,7 +15,7 @@ namespace {
 // Computes a component's derived values for another period of the loop. Adds them to `values`.
 void stagePeriod(Instance& instance, std::int64_t loop_period_ns,
                  std::vector<StagedValue*>& values) {
-    for (DerivedBase* derived : access(instance.component()).derived()) {
+    for (DerivedBase* derived : accessTo(instance.component()).derived()) {
         auto* const period = dynamic_cast<DesignPeriod*>(derived);
         if (period == nullptr) continue;
         period->propose(loop_period_ns * instance.definition().every);
@@ -213,7 +213,7 @@ ChangeOutcome Transactions::replace(const std::string& name, ComponentDefinition
     const GraphNode old = plan_->graph.get(name);
     if (definition.fullName() != name) plan_->graph.requireFree(definition.fullName());
     if (!reset) {
-        const auto& declared = access(old.instance->component()).parameters();
+        const auto& declared = accessTo(old.instance->component()).parameters();
         for (std::size_t i = 0; i < declared.size(); ++i) {
             const ParameterDeclaration& declaration = declared[i]->declaration();
             const ParameterValue& value = old.instance->parameterValues()[i];
@@ -319,7 +319,7 @@ void Transactions::renewComponents(const Progress& progress) {
         const Instance& old = *node.instance;
         ComponentDefinition definition = old.definition();
         definition.parameters.clear();
-        const auto& parameters = access(old.component()).parameters();
+        const auto& parameters = accessTo(old.component()).parameters();
         for (std::size_t i = 0; i < parameters.size(); ++i) {
             definition.parameters.emplace_back(parameters[i]->declaration().name,
                                                old.parameterValues()[i]);

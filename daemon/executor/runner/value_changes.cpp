@@ -25,7 +25,7 @@ ValueChanges::ValueChanges(std::string runner, const Loop& loop, LoopBoundary& b
 
 ChangeOutcome ValueChanges::reset(const std::string& name) {
     const Component& component = plan_->graph.get(name).instance->component();
-    if (access(component).states().empty()) {
+    if (accessTo(component).states().empty()) {
         throw Error(ErrorKind::NoState,
                     fmt::format("{} declares no state (rtcf::State) to reset", name));
     }
@@ -41,7 +41,7 @@ ChangeOutcome ValueChanges::reset(const std::string& name) {
 ChangeOutcome ValueChanges::setStates(
     const std::string& name, const std::vector<std::pair<std::string, ParameterValue>>& batch) {
     control_.noticeEnd();
-    const auto& states = access(plan_->graph.get(name).instance->component()).states();
+    const auto& states = accessTo(plan_->graph.get(name).instance->component()).states();
     if (loop_.joinable()) {
         throw Error(ErrorKind::FailedPrecondition,
                     fmt::format("the loop of {0} runs: stop it to set state: rtcfctl -r "

@@ -23,7 +23,7 @@ std::string orNothing(const std::string& source) { return source.empty() ? "noth
 SnapshotRestorer::SnapshotRestorer(const Snapshot& saved, const Plan& plan)
     : snapshot_(saved), plan_(plan), sources_(plan) {
     for (const GraphNode& node : plan.graph.nodes()) {
-        const auto& outputs = access(node.instance->component()).outputs();
+        const auto& outputs = accessTo(node.instance->component()).outputs();
         for (std::size_t i = 0; i < outputs.size(); ++i) {
             outputs_[node.instance->fullName() + "." + outputs[i]->name()] = {
                 outputs[i], node.instance->sample(i)};
@@ -131,7 +131,7 @@ void SnapshotRestorer::fitParameters(const SnapshotComponent& saved, Instance& i
     };
     std::vector<Named> from;
     for (const auto& [name, value] : saved.parameters) from.push_back({name, &value});
-    const auto& declared = access(instance.component()).parameters();
+    const auto& declared = accessTo(instance.component()).parameters();
     std::vector<std::size_t> to(declared.size());
     for (std::size_t i = 0; i < to.size(); ++i) to[i] = i;
     fitEach(
@@ -145,7 +145,7 @@ void SnapshotRestorer::fitParameters(const SnapshotComponent& saved, Instance& i
 
 void SnapshotRestorer::fitStates(const SnapshotComponent& saved, const Instance& instance) {
     fitEach(
-        saved.name + ".", "state", saved.states, access(instance.component()).states(),
+        saved.name + ".", "state", saved.states, accessTo(instance.component()).states(),
         [](const StateDeclaration& state) { return state.name; },
         [&](const SnapshotState& from, const StateDeclaration& to) {
             if (from.identity != to.identity || from.bytes.size() != to.size) {
@@ -159,7 +159,7 @@ void SnapshotRestorer::fitStates(const SnapshotComponent& saved, const Instance&
 
 void SnapshotRestorer::fitOutputs(const SnapshotComponent& saved, const Instance& instance) {
     fitEach(
-        saved.name + ".", "output", saved.outputs, access(instance.component()).outputs(),
+        saved.name + ".", "output", saved.outputs, accessTo(instance.component()).outputs(),
         [](const OutputPort* output) { return output->name(); },
         [&](const SnapshotOutput& from, OutputPort* to) {
             const std::string name = saved.name + "." + to->name();
@@ -187,7 +187,7 @@ void SnapshotRestorer::fitOutputs(const SnapshotComponent& saved, const Instance
 
 void SnapshotRestorer::fitInputs(const SnapshotComponent& saved, const Instance& instance) {
     fitEach(
-        saved.name + ".", "input", saved.inputs, access(instance.component()).inputs(),
+        saved.name + ".", "input", saved.inputs, accessTo(instance.component()).inputs(),
         [](const InputPort* input) { return input->name(); },
         [&](const SnapshotInput& from, InputPort* to) {
             fitInput(from, *to, saved.name + "." + to->name());

@@ -31,7 +31,7 @@ void requireCopied(const TypeInfo& type) {
 
 Sources::Sources(const Plan& plan) : plan_(plan) {
     for (const GraphNode& node : plan.graph.nodes()) {
-        for (const OutputPort* output : access(node.instance->component()).outputs())
+        for (const OutputPort* output : accessTo(node.instance->component()).outputs())
             names_[output->slot().get()] = node.instance->fullName() + "." + output->name();
     }
     for (const auto& [topic, injector] : plan.injectors) names_[injector.get()] = "topic " + topic;
@@ -49,17 +49,17 @@ SnapshotTaker::SnapshotTaker(const Plan& plan) : plan_(plan), sources_(plan) {
     for (std::size_t step = 0; step < plan.wiring.order.size(); ++step) {
         const Instance& instance = instanceOf(plan, step);
         const Component& component = instance.component();
-        capture_.turns.push_back({&access(component).context()});
+        capture_.turns.push_back({&accessTo(component).context()});
         states_.emplace_back();
         std::size_t size = 0;
-        for (const StateDeclaration& state : access(component).states()) size += state.size;
+        for (const StateDeclaration& state : accessTo(component).states()) size += state.size;
         states_.back().resize(size);
         std::byte* to = states_.back().data();
-        for (const StateDeclaration& state : access(component).states()) {
+        for (const StateDeclaration& state : accessTo(component).states()) {
             capture_.states.push_back({to, state.value, state.size});
             to += state.size;
         }
-        const auto& outputs = access(component).outputs();
+        const auto& outputs = accessTo(component).outputs();
         for (std::size_t port = 0; port < outputs.size(); ++port) {
             const OutputPort& output = *outputs[port];
             const SlotHeader* const slot = output.slot().get();
@@ -69,7 +69,7 @@ SnapshotTaker::SnapshotTaker(const Plan& plan) : plan_(plan), sources_(plan) {
             if (const auto latch = plan.latches.find(slot); latch != plan.latches.end())
                 add(output.type(), latch->second.get(), instance.sample(port));
         }
-        for (const InputPort* input : access(component).inputs()) addInput(*input);
+        for (const InputPort* input : accessTo(component).inputs()) addInput(*input);
     }
     for (const auto& [name, injector] : plan.injectors) {
         const TypeInfo& type = injector->type();
@@ -139,17 +139,17 @@ SnapshotComponent SnapshotTaker::componentOf(std::size_t step) const {
     result.phase = instance.phase();
     result.updated_ns = capture_.turns[step].updated_ns;
     result.elapsed_ns = capture_.turns[step].elapsed_ns;
-    const auto& parameters = access(component).parameters();
+    const auto& parameters = accessTo(component).parameters();
     for (std::size_t i = 0; i < parameters.size(); ++i)
         result.parameters.emplace_back(parameters[i]->declaration().name,
                                        instance.parameterValues()[i]);
     const char* state_bytes = reinterpret_cast<const char*>(states_[step].data());
-    for (const StateDeclaration& state : access(component).states()) {
+    for (const StateDeclaration& state : accessTo(component).states()) {
         result.states.push_back(
             {state.name, state.type, state.identity, std::string(state_bytes, state.size)});
         state_bytes += state.size;
     }
-    for (const OutputPort* output : access(component).outputs()) {
+    for (const OutputPort* output : accessTo(component).outputs()) {
         const SlotHeader* const slot = output->slot().get();
         SnapshotOutput port{output->name(), snapshotTypeOf(output->type()), valueAt(slot), {}, {}};
         if (output->written() != slot) port.staged = valueAt(output->written());
@@ -173,7 +173,7 @@ Snapshot SnapshotTaker::snapshot() const {
                                     instance.fullName()));
         }
         result.components.push_back(componentOf(step));
-        for (std::size_t i = 0; i < access(instance.component()).inputs().size(); ++i)
+        for (std::size_t i = 0; i < accessTo(instance.component()).inputs().size(); ++i)
             result.components.back().inputs.push_back(inputOf(*input++));
     }
     for (const Capture::Topic& topic : capture_.topics) {

@@ -9,7 +9,7 @@ namespace rtcf::executor {
 namespace {
 
 const StateDeclaration* find(const Component& component, const std::string& name) {
-    const auto& states = access(component).states();
+    const auto& states = accessTo(component).states();
     const auto found = std::find_if(states.begin(), states.end(),
                                     [&](const auto& state) { return state.name == name; });
     return found == states.end() ? nullptr : &*found;
@@ -26,13 +26,13 @@ std::size_t bytesOf(const std::vector<StateCopy>& copies) {
 void planHandOver(const Component& previous, const Component& successor,
                   std::vector<StateCopy>& copies, std::vector<std::string>& notes) {
     const std::string& name = successor.fullName();
-    if (access(previous).states().empty() && !access(successor).states().empty())
+    if (accessTo(previous).states().empty() && !accessTo(successor).states().empty())
         notes.push_back(name +
                         " begins at its initial state: the replaced component declares no state");
-    for (const StateDeclaration& state : access(successor).states()) {
+    for (const StateDeclaration& state : accessTo(successor).states()) {
         const StateDeclaration* before = find(previous, state.name);
         if (before == nullptr) {
-            if (access(previous).states().empty()) continue;  // reported above
+            if (accessTo(previous).states().empty()) continue;  // reported above
             notes.push_back(fmt::format("state {} of {} is new: it begins at {}", state.name, name,
                                         state.print(state.initial.data())));
         } else if (before->identity != state.identity || before->size != state.size) {
@@ -43,7 +43,7 @@ void planHandOver(const Component& previous, const Component& successor,
             copies.push_back({state.value, before->value, state.size});
         }
     }
-    for (const StateDeclaration& state : access(previous).states()) {
+    for (const StateDeclaration& state : accessTo(previous).states()) {
         if (find(successor, state.name) == nullptr)
             notes.push_back(fmt::format("state {} of {} no longer exists", state.name, name));
     }
@@ -51,12 +51,12 @@ void planHandOver(const Component& previous, const Component& successor,
 
 std::vector<StateCopy> planReset(const Component& component) {
     std::vector<StateCopy> copies;
-    for (const StateDeclaration& state : access(component).states())
+    for (const StateDeclaration& state : accessTo(component).states())
         copies.push_back({state.value, state.initial.data(), state.size});
     return copies;
 }
 
-StateTexts::StateTexts(const Component& component) : declared_(access(component).states()) {
+StateTexts::StateTexts(const Component& component) : declared_(accessTo(component).states()) {
     std::size_t size = 0;
     for (const StateDeclaration& state : declared_) size += state.size;
     bytes_.resize(size);

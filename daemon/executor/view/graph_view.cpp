@@ -18,8 +18,8 @@ std::shared_ptr<const ComponentView> viewOf(const GraphNode& node) {
     result->full_name = instance.fullName();
     result->library = instance.library().path();
     result->doc = instance.record().doc;
-    const auto& inputs = access(instance.component()).inputs();
-    const auto& outputs = access(instance.component()).outputs();
+    const auto& inputs = accessTo(instance.component()).inputs();
+    const auto& outputs = accessTo(instance.component()).outputs();
     result->ports.reserve(inputs.size() + outputs.size());
     for (std::size_t i = 0; i < inputs.size(); ++i) {
         result->ports.push_back(
@@ -29,13 +29,13 @@ std::shared_ptr<const ComponentView> viewOf(const GraphNode& node) {
         result->ports.push_back({outputs[i]->name(), true, instance.outputNames()[i],
                                  &outputs[i]->type(), outputs[i]->unit()});
     }
-    const auto& parameters = access(instance.component()).parameters();
+    const auto& parameters = accessTo(instance.component()).parameters();
     result->parameters.reserve(parameters.size());
     for (std::size_t i = 0; i < parameters.size(); ++i) {
         result->parameters.push_back({parameters[i]->declaration(), instance.parameterValues()[i]});
     }
-    result->states.reserve(access(instance.component()).states().size());
-    for (const StateDeclaration& state : access(instance.component()).states()) {
+    result->states.reserve(accessTo(instance.component()).states().size());
+    for (const StateDeclaration& state : accessTo(instance.component()).states()) {
         result->states.push_back(
             {state.name, state.type, state.unit, state.doc, state.print(state.initial.data())});
     }

@@ -43,7 +43,7 @@ std::vector<Candidate> candidatesOf(const Plan& plan) {
     for (const std::size_t index : plan.wiring.order) {
         const Instance& instance = *plan.graph.nodes()[index].instance;
         const Component& component = instance.component();
-        const auto& outputs = access(component).outputs();
+        const auto& outputs = accessTo(component).outputs();
         for (std::size_t port = 0; port < outputs.size(); ++port) {
             const OutputPort& output = *outputs[port];
             const TypeInfo& type = output.type();
@@ -53,7 +53,7 @@ std::vector<Candidate> candidatesOf(const Plan& plan) {
                              sourceOf(type, *output.slot()),
                              !output.staged() || tapped.count(output.slot().get()) != 0});
         }
-        for (const StateDeclaration& state : access(component).states()) {
+        for (const StateDeclaration& state : accessTo(component).states()) {
             found.push_back({{instance.fullName(),
                               state.name,
                               state.type,
@@ -118,7 +118,7 @@ std::vector<Candidate> chosenOf(const Plan& plan, const FrameDemand& demand, Fra
 std::vector<FrameRing::Source> stampsOf(const Plan& plan) {
     std::vector<FrameRing::Source> found;
     for (const Step& step : plan.schedule.steps) {
-        for (const OutputPort* output : access(*step.component).outputs()) {
+        for (const OutputPort* output : accessTo(*step.component).outputs()) {
             if (!output->type().fixed_size && !output->staged())
                 found.push_back({output->slot().get(), sizeof(SlotHeader)});
         }

@@ -50,7 +50,7 @@ class Component {
 
     // The value of an input, for writing in each cycle.
     std::function<void(double)> input(const std::string& name) {
-        for (rtcf::InputPort* input : access(component_).inputs()) {
+        for (rtcf::InputPort* input : accessTo(component_).inputs()) {
             if (input->name() != name) continue;
             slots_.push_back(input->type().make_slot(nullptr));
             input->connect(slots_.back().get(), false);
@@ -63,9 +63,9 @@ class Component {
         throw std::runtime_error("no input " + name);
     }
     void update() {
-        access(component_).setTime(component_.time() + 1);
+        accessTo(component_).setTime(component_.time() + 1);
         component_.update();
-        for (rtcf::OutputPort* output : access(component_).stagedOutputs()) output->commit();
+        for (rtcf::OutputPort* output : accessTo(component_).stagedOutputs()) output->commit();
     }
 
    private:

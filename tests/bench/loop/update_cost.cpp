@@ -70,17 +70,17 @@ class Contender {
         context_.clock = &clock_;
         context_.period_ns = 1'000'000;
         component_.reset(recordOf(library, type).create(type.c_str(), &context_));
-        access(*component_).attach(context_);
+        accessTo(*component_).attach(context_);
         if (!component_->prepare(rtcf::Values{}) || !component_->configure()) fail();
-        for (rtcf::DerivedBase* derived : access(*component_).derived())
+        for (rtcf::DerivedBase* derived : accessTo(*component_).derived())
             if (derived->staged()) derived->commit();
         // By name: the two may declare their ports in different orders.
-        std::vector<rtcf::InputPort*> inputs = access(*component_).inputs();
+        std::vector<rtcf::InputPort*> inputs = accessTo(*component_).inputs();
         std::sort(inputs.begin(), inputs.end(),
                   [](const auto* a, const auto* b) { return a->name() < b->name(); });
         std::mt19937 draw(1);
         for (rtcf::InputPort* input : inputs) feed(*input, signalOf(type, input->name()), draw);
-        outputs_ = access(*component_).outputs();
+        outputs_ = accessTo(*component_).outputs();
         std::sort(outputs_.begin(), outputs_.end(),
                   [](const auto* a, const auto* b) { return a->name() < b->name(); });
         if (!component_->start()) fail();
@@ -124,7 +124,7 @@ class Contender {
     };
 
     [[noreturn]] void fail() const {
-        throw std::runtime_error(name_ + ": " + access(*component_).failure());
+        throw std::runtime_error(name_ + ": " + accessTo(*component_).failure());
     }
 
     template <typename Header>
@@ -162,7 +162,7 @@ class Contender {
 
     void write() {
         const std::size_t at = written_++ % kUpdates;
-        access(*component_).setTime(component_->time() + 1);
+        accessTo(*component_).setTime(component_->time() + 1);
         for (Feed& each : feeds_) {
             if (each.every != 1 && at % each.every != 0) continue;
             const std::size_t doubles = each.size / sizeof(double);

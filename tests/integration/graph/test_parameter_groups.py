@@ -31,19 +31,6 @@ components:
     parameters:
       gains: {p: 5, filter: {order: 3}, k: [1.0, 2.0, 3.0]}
 """
-IN_PYTHON = """\
-import numpy as np
-from rtcf.component import Component, Output, Parameter
-
-
-class Written(Component):
-    sum: Output[float]
-    kp: Parameter[float] = Parameter(1.0, name="gains/p", max=100.0)
-    k: Parameter[np.float64, 2] = Parameter(0.5, name="gains/k")
-
-    def update(self):
-        self.sum.write(self.kp + np.sum(self.k))
-"""
 LAUNCH = """
 <launch>
   <node name="rt_runner" pkg="rtcf" type="rt_runner" output="screen">
@@ -51,7 +38,7 @@ LAUNCH = """
   </node>
   <node name="grouped" pkg="rtcf" type="rt_launcher" args="rtcf_test Grouped" output="screen">
     <rosparam>
-      gains: {p: 5, filter: {order: 3}, k: [1.0, 2.0, 3.0], d: 7}
+      gains: {p: 5, filter: {order: 3}, k: [1.0, 2.0, 3.0, 4.0], d: 7}
       joints: [left, right]
     </rosparam>
     <param name="offset" value="1"/>
@@ -114,20 +101,8 @@ def test_a_bench_takes_groups_and_arrays() -> None:
         assert bench.run(steps=1)["sum"].tolist() == [17.0]
         with pytest.raises(ValueError, match="gains/p: None is not a bool"):
             bench.set(gains={"p": None})
-
-
-def test_a_component_in_python_has_groups(
-    daemon: Daemon, client: rtcf.Client, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    file = tmp_path / "written.py"
-    file.write_text(IN_PYTHON)
-    loaded = daemon.ctl("load", str(file), "--param", "gains/k_1:=2")
-    assert loaded.returncode == 0, loaded.stderr
-    assert daemon.ctl("set", "Written", "gains/p:=3").returncode == 0
-    client.step(1)
-    assert port_value(client, "Written", "sum") == 5.5
-    assert "gains/p = 101" in daemon.ctl("set", "Written", "gains/p:=101").stderr
+        with pytest.raises(ValueError, match="gains is empty"):
+            bench.set(gains={})
 
 
 @pytest.fixture
@@ -179,7 +154,7 @@ def test_a_launch_file_has_groups_and_arrays(tmp_path: Path, master: Master) -> 
         given = {"gains/p": 5.0, "gains/filter/order": 3, "offset": 1.0}
         given |= {f"gains/k_{i}": i + 1.0 for i in range(3)}
         assert found == given
-        launch.wait_for_output("no parameter ~gains/d")
+        launch.wait_for_output("~gains/k has 4 values: the component takes 3")
         assert "~gains/d, ~joints" in launch.output()
     finally:
         launching.end()

@@ -15,7 +15,7 @@ import rtcf
 import yaml
 from daemon_process import BUILD_TREE, DEADLINE_S, Daemon, wait_for
 from rtcfctl.graph import python_source
-from values import parameter_values
+from values import parameter_values, port_value
 
 COMPILE_DEADLINE_S = 900.0
 
@@ -425,6 +425,32 @@ def test_an_enum_parameter_is_set_by_name_as_in_cpp(daemon: Daemon, client: rtcf
     done = daemon.ctl("apply", str(graph))
     assert done.returncode == 0, done.stderr
     assert parameter_values(client, "other") == {"mode": "HÄLT"}
+
+
+GROUPED = """\
+import numpy as np
+from rtcf.component import Component, Output, Parameter
+
+
+class Grouped(Component):
+    sum: Output[float]
+    kp: Parameter[float] = Parameter(1.0, name="gains/p", max=100.0)
+    k: Parameter[np.float64, 2] = Parameter(0.5, name="gains/k")
+
+    def update(self):
+        self.sum.write(self.kp + np.sum(self.k))
+"""
+
+
+def test_parameters_are_in_groups(daemon: Daemon, client: rtcf.Client) -> None:
+    source = daemon.folder / "grouped.py"
+    source.write_text(GROUPED)
+    loaded = daemon.ctl("load", str(source), "Grouped", "--param", "gains/k_1:=2")
+    assert loaded.returncode == 0, loaded.stderr
+    assert daemon.ctl("set", "Grouped", "gains/p:=3").returncode == 0
+    client.step(1)
+    assert port_value(client, "Grouped", "sum") == 5.5
+    assert "gains/p = 101" in daemon.ctl("set", "Grouped", "gains/p:=101").stderr
 
 
 def test_a_wrong_source_is_rejected_in_one_line(own_cache: Path, daemon: Daemon) -> None:

@@ -279,11 +279,11 @@ namespace rtcf {
 
 template <typename T>
 void State<T>::declareIn(Component* owner, StateDeclaration declaration) {
-    access(*owner).declare(std::move(declaration));
+    accessTo(*owner).declare(std::move(declaration));
 }
 
 inline const StateDeclaration* Predecessor::findState(std::string_view name) const noexcept {
-    for (const StateDeclaration& state : access(component_).states()) {
+    for (const StateDeclaration& state : accessTo(component_).states()) {
         if (state.name == name) return &state;
     }
     return nullptr;
@@ -291,7 +291,7 @@ inline const StateDeclaration* Predecessor::findState(std::string_view name) con
 
 template <typename T>
 const T* Predecessor::output(std::string_view name) const noexcept {
-    for (const OutputPort* output : access(component_).outputs()) {
+    for (const OutputPort* output : accessTo(component_).outputs()) {
         if (output->name() != name) continue;
         const bool there = output->slot()->stamp != 0 && sameType(output->type(), typeInfo<T>());
         return there ? &static_cast<const Slot<T>*>(output->slot().get())->value : nullptr;
@@ -302,7 +302,7 @@ const T* Predecessor::output(std::string_view name) const noexcept {
 inline InputBase::InputBase(Component* owner, std::string name, const TypeInfo& type,
                             const SlotHeader& empty)
     : source_(&empty) {
-    access(*owner).declare(std::make_unique<InputPort>(*this, *owner, std::move(name), type));
+    accessTo(*owner).declare(std::make_unique<InputPort>(*this, *owner, std::move(name), type));
 }
 
 inline std::int64_t InputBase::age(const Component* owner) const noexcept RTCF_NONBLOCKING {
@@ -311,7 +311,7 @@ inline std::int64_t InputBase::age(const Component* owner) const noexcept RTCF_N
 }
 
 inline bool InputBase::connected(const Component* owner) const noexcept RTCF_NONBLOCKING {
-    for (const InputPort* port : access(*owner).inputs())
+    for (const InputPort* port : accessTo(*owner).inputs())
         if (&port->input() == this) return port->connected();
     return false;
 }
@@ -319,7 +319,7 @@ inline bool InputBase::connected(const Component* owner) const noexcept RTCF_NON
 inline QueueBase::QueueBase(Component* owner, std::string name, const TypeInfo& type,
                             const Ring& ring)
     : InputBase(owner, std::move(name), type, kNoValue), ring_(new Ring(ring)) {
-    ring_->port = access(*owner).inputs().back();
+    ring_->port = accessTo(*owner).inputs().back();
     ring_->port->setQueue(this);
 }
 
@@ -331,15 +331,15 @@ inline std::int64_t QueueBase::age() noexcept {
 
 inline OutputBase::OutputBase(Component* owner, std::string name, std::string unit,
                               const TypeInfo& type, const Finite* finite)
-    : now_(&access(*owner).now()),
+    : now_(&accessTo(*owner).now()),
       port_(std::make_unique<OutputPort>(*this, std::move(name), std::move(unit), type, finite)) {
     raw_ = port_->written();
-    access(*owner).declare(port_.get());
+    accessTo(*owner).declare(port_.get());
 }
 
-inline DerivedBase::DerivedBase(Component* owner) { access(*owner).declare(this); }
+inline DerivedBase::DerivedBase(Component* owner) { accessTo(*owner).declare(this); }
 
-inline MailboxBase::MailboxBase(Component* owner) { access(*owner).declare(this); }
+inline MailboxBase::MailboxBase(Component* owner) { accessTo(*owner).declare(this); }
 
 inline ParameterBase::ParameterBase(Component* owner, ParameterDeclaration declaration,
                                     const void* place)
@@ -347,11 +347,11 @@ inline ParameterBase::ParameterBase(Component* owner, ParameterDeclaration decla
     ParameterValue initial = declaration_.default_value;
     if (const std::string why = check(initial); !why.empty())
         throw std::logic_error("default value: " + why);
-    access(*owner).declare(this);
+    accessTo(*owner).declare(this);
 }
 
 inline void detail::undeclareParameters(Component& owner, std::size_t count) noexcept {
-    access(owner).undeclareParameters(count);
+    accessTo(owner).undeclareParameters(count);
 }
 
 inline std::string ParameterBase::check(ParameterValue& value) const {

@@ -14,8 +14,6 @@
 #include <utility>
 #include <vector>
 
-#include "rtcf/component.hpp"
-
 namespace rtcf {
 
 /// @tparam C Component or const Component
@@ -95,10 +93,10 @@ class ComponentAccess {
 /// @name Access to a component
 /// Real-time safe.
 /// @{
-inline ComponentAccess<Component> access(Component& component) noexcept RTCF_NONBLOCKING {
+inline ComponentAccess<Component> accessTo(Component& component) noexcept RTCF_NONBLOCKING {
     return ComponentAccess<Component>(component);
 }
-inline ComponentAccess<const Component> access(const Component& component) noexcept
+inline ComponentAccess<const Component> accessTo(const Component& component) noexcept
     RTCF_NONBLOCKING {
     return ComponentAccess<const Component>(component);
 }

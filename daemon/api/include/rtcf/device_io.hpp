@@ -26,7 +26,7 @@ namespace rtcf {
 class DeviceIo {
    public:
     explicit DeviceIo(Component* component) noexcept
-        : statistics_(access(*component).context().device), begin_ns_(now()) {
+        : statistics_(accessTo(*component).context().device), begin_ns_(now()) {
         if (__rtsan_disable != nullptr) __rtsan_disable();
     }
     ~DeviceIo() {

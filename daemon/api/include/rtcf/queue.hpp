@@ -33,6 +33,8 @@ class QueueBase : public InputBase {
         ring_->oldest = (ring_->oldest + 1) % ring_->capacity;
         --ring_->count;
     }
+    /// Removes all messages, without counting drops. Real-time safe.
+    void clear() noexcept RTCF_NONBLOCKING { ring_->count = 0; }
     /// Loop time since the oldest message was written, ns; -1 if the queue is empty. Real-time safe
     /// if the assignment of T is.
     std::int64_t age() noexcept;
@@ -83,8 +85,6 @@ class QueueBase : public InputBase {
     }
     /// Counts messages that were lost before they reached the queue.
     void noteDropped(std::uint64_t count) noexcept RTCF_NONBLOCKING { ring_->dropped += count; }
-    /// Empties the queue without counting drops.
-    void clear() noexcept RTCF_NONBLOCKING { ring_->count = 0; }
     /// @}
 
    protected:
@@ -159,7 +159,6 @@ class Queue final : public QueueBase {
 
    private:
     // The executor calls these by QueueBase.
-    using QueueBase::clear;
     using QueueBase::moveTime;
     using QueueBase::noteDropped;
     using QueueBase::receive;

@@ -23,7 +23,7 @@ namespace rtcf {
 namespace detail {
 
 inline ros::NodeHandle openHandle(const Component& component, const std::string& name_space) {
-    const ComponentContext& context = access(component).context();
+    const ComponentContext& context = accessTo(component).context();
     if (context.gate == nullptr) {
         throw std::logic_error(
             "nodeHandle() is for configure(), start(), stop() and cleanup() in an executor with a "
@@ -37,7 +37,7 @@ inline ros::NodeHandle openHandle(const Component& component, const std::string&
 
 /// True if the runner has a ROS node, so that nodeHandle() works in a hook. Real-time safe.
 inline bool hasNode(const Component* component) noexcept {
-    return access(*component).context().gate != nullptr;
+    return accessTo(*component).context().gate != nullptr;
 }
 
 /// A node handle whose relative names are in the component's namespace. A call to the master by
@@ -46,7 +46,7 @@ inline bool hasNode(const Component* component) noexcept {
 /// @throws NoMaster if no master answers
 /// @throws std::logic_error outside of a hook, or without a ROS node
 inline ros::NodeHandle nodeHandle(const Component* component) {
-    return detail::openHandle(*component, access(*component).context().ns);
+    return detail::openHandle(*component, accessTo(*component).context().ns);
 }
 
 /// Like nodeHandle(), but relative names are below the component's full name, as `~name` is for a

@@ -51,14 +51,14 @@ class Bench {
         context_.log = &log_;
         context_.log_level = LogLevel::Debug;
         component_.reset(find(type).create(type.c_str(), &context_));
-        access(*component_).attach(context_);
+        accessTo(*component_).attach(context_);
         set(parameters);
         require(component_->configure(), "configure");
-        access(*component_).freeze();
+        accessTo(*component_).freeze();
         countWrites();
     }
     ~Bench() {
-        for (MailboxBase* mailbox : access(*component_).mailboxes()) mailbox->close();
+        for (MailboxBase* mailbox : accessTo(*component_).mailboxes()) mailbox->close();
         if (started_) component_->stop();
         component_->cleanup();
     }
@@ -68,7 +68,7 @@ class Bench {
     /// Sets a batch of parameters, as `rtcfctl set` does.
     void set(const Parameters& batch) {
         for (const auto& [name, given] : batch) {
-            ParameterBase& parameter = named(access(*component_).parameters(), name, "parameter");
+            ParameterBase& parameter = named(accessTo(*component_).parameters(), name, "parameter");
             ParameterValue value = given;
             if (const std::string why = parameter.check(value); !why.empty()) {
                 release();
@@ -79,10 +79,10 @@ class Bench {
         const bool prepared = component_->prepare(Values{});
         if (!prepared) release();
         require(prepared, "prepare");
-        for (ParameterBase* parameter : access(*component_).parameters()) {
+        for (ParameterBase* parameter : accessTo(*component_).parameters()) {
             if (parameter->staged()) parameter->commit();
         }
-        for (DerivedBase* derived : access(*component_).derived()) {
+        for (DerivedBase* derived : accessTo(*component_).derived()) {
             if (derived->staged()) derived->commit();
         }
         release();
@@ -91,7 +91,7 @@ class Bench {
     /// Writes a new value to an input, or one more message to a queue.
     template <typename T>
     void write(const std::string& name, const T& value) {
-        InputPort& input = named(access(*component_).inputs(), name, "input");
+        InputPort& input = named(accessTo(*component_).inputs(), name, "input");
         requireType(input.type(), typeInfo<T>(), name);
         SlotHeader& slot = slotOf(input);
         static_cast<Slot<T>&>(slot).value = value;
@@ -103,13 +103,13 @@ class Bench {
     /// Runs cycles; calls start() before the first one.
     void cycle(std::uint64_t cycles = 1) {
         if (!started_) {
-            access(*component_).setTime(now() - 1);  // before the first cycle
+            accessTo(*component_).setTime(now() - 1);  // before the first cycle
             require(component_->start(), "start");
             countWrites();
-            for (MailboxBase* mailbox : access(*component_).mailboxes()) mailbox->open();
+            for (MailboxBase* mailbox : accessTo(*component_).mailboxes()) mailbox->open();
         }
         for (started_ = true; cycles > 0; --cycles) {
-            access(*component_).setTime(now());
+            accessTo(*component_).setTime(now());
             component_->update();
             commit();
             clock_.iteration = clock_.iteration + 1;
@@ -119,7 +119,7 @@ class Bench {
     }
     /// Calls safe(), as at the end of a loop.
     void safe() {
-        access(*component_).setTime(now());
+        accessTo(*component_).setTime(now());
         component_->safe();
         commit();
     }
@@ -127,7 +127,7 @@ class Bench {
     /// The last value that an output has written; null if it has not written.
     template <typename T>
     const T* read(const std::string& name) const {
-        const OutputPort& output = named(access(*component_).outputs(), name, "output");
+        const OutputPort& output = named(accessTo(*component_).outputs(), name, "output");
         requireType(output.type(), typeInfo<T>(), name);
         return output.slot()->stamp == 0 ? nullptr
                                          : &static_cast<const Slot<T>*>(output.slot().get())->value;
@@ -135,7 +135,7 @@ class Bench {
     /// Number of cycles and hooks in which an output was written, without those in which the value
     /// of a Finite output was not finite.
     std::uint64_t writes(const std::string& name) const {
-        const auto found = writes_.find(&named(access(*component_).outputs(), name, "output"));
+        const auto found = writes_.find(&named(accessTo(*component_).outputs(), name, "output"));
         return found == writes_.end() ? 0 : found->second.count;
     }
     /// Number of non-finite values on outputs declared Finite.
@@ -144,7 +144,7 @@ class Bench {
     /// A declared state, for reading and writing.
     template <typename T>
     T& state(const std::string& name) {
-        for (const StateDeclaration& state : access(*component_).states()) {
+        for (const StateDeclaration& state : accessTo(*component_).states()) {
             if (state.name != name) continue;
             if (state.identity == StateType<T>::identity() && state.size == sizeof(T))
                 return *static_cast<T*>(state.value);
@@ -155,14 +155,14 @@ class Bench {
     /// Takes over declared state of the same name and type from another bench, as `rtcfctl replace`
     /// does.
     void takeOver(const Bench& previous) {
-        for (const StateDeclaration& state : access(*component_).states()) {
-            for (const StateDeclaration& before : access(*previous.component_).states()) {
+        for (const StateDeclaration& state : accessTo(*component_).states()) {
+            for (const StateDeclaration& before : accessTo(*previous.component_).states()) {
                 if (before.name == state.name && before.identity == state.identity &&
                     before.size == state.size)
                     std::memcpy(state.value, before.value, state.size);
             }
         }
-        access(*component_).setTime(now() - 1);  // before the next cycle
+        accessTo(*component_).setTime(now() - 1);  // before the next cycle
         component_->takeOver(Predecessor(*previous.component_));
     }
 
@@ -231,26 +231,26 @@ class Bench {
     }
     void require(bool passed, const char* hook) const {
         if (passed) return;
-        throw std::runtime_error(std::string(hook) + " failed: " + access(*component_).failure());
+        throw std::runtime_error(std::string(hook) + " failed: " + accessTo(*component_).failure());
     }
     /// The loop's time; 0 is no stamp.
     std::int64_t now() const { return std::max<std::int64_t>(2, clock_.time_ns); }
     /// Publishes the values of staged outputs.
     void commit() {
-        for (OutputPort* output : access(*component_).stagedOutputs())
+        for (OutputPort* output : accessTo(*component_).stagedOutputs())
             if (!output->commit()) ++non_finite_;
         countWrites();
     }
     void countWrites() {
-        for (const OutputPort* output : access(*component_).outputs()) {
+        for (const OutputPort* output : accessTo(*component_).outputs()) {
             Writes& writes = writes_[output];
             if (std::exchange(writes.last, output->slot()->stamp) != output->slot()->stamp)
                 ++writes.count;
         }
     }
     void release() {
-        for (ParameterBase* parameter : access(*component_).parameters()) parameter->release();
-        for (DerivedBase* derived : access(*component_).derived()) derived->release();
+        for (ParameterBase* parameter : accessTo(*component_).parameters()) parameter->release();
+        for (DerivedBase* derived : accessTo(*component_).derived()) derived->release();
     }
     SlotHeader& slotOf(InputPort& input) {
         std::shared_ptr<SlotHeader>& slot = slots_[&input];

@@ -107,7 +107,7 @@ TEST(FiniteCheck, KeepsAStructFromReaders) {
     out.write(pair);
     EXPECT_TRUE(portOf(component, out).commit());
     pair.second.torque = kInfinity;
-    access(component).setTime(component.time() + 1);
+    accessTo(component).setTime(component.time() + 1);
     out.write(pair);
     EXPECT_FALSE(portOf(component, out).commit());
     const auto& seen = static_cast<const Slot<Commands>&>(*portOf(component, out).slot()).value;

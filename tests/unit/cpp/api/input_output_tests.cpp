@@ -6,6 +6,7 @@
 #include <new>
 #include <stdexcept>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "support/bare_component.hpp"
@@ -68,12 +69,25 @@ HAS(setConnected);
 HAS(setTime);
 HAS(slot);
 HAS(stage);
-HAS(stageOutputs);
 #undef HAS
+// For templates and overloaded functions.
+template <typename T, typename = void>
+constexpr bool declares = false;
+template <typename T>
+constexpr bool
+    declares<T, std::void_t<decltype(std::declval<T&>().declare(std::declval<OutputPort*>()))>> =
+        true;
+template <typename T, typename = void>
+constexpr bool stages_outputs = false;
+template <typename T>
+constexpr bool stages_outputs<T, std::void_t<decltype(std::declval<T&>().stageOutputs(
+                                     std::declval<bool (*)(const OutputPort&)>()))>> = true;
 
 static_assert(has_fullName<Component>);
 static_assert(!has_attach<Component> && !has_context<Component> && !has_inputs<Component> &&
-              !has_setTime<Component> && !has_stageOutputs<Component>);
+              !has_setTime<Component> && !declares<Component> && !stages_outputs<Component>);
+using Access = ComponentAccess<Component>;
+static_assert(has_setTime<Access> && declares<Access> && stages_outputs<Access>);
 static_assert(!has_connect<Input<double>> && !has_slot<Input<double>>);
 static_assert(!has_commit<Output<double>> && !has_setConnected<Output<double>> &&
               !has_slot<Output<double>> && !has_stage<Output<double>>);
@@ -84,12 +98,12 @@ static_assert(!has_receive<Queue<double, 2>> && !has_close<Mailbox<double, doubl
 
 class InputOutput : public ::testing::Test {
    protected:
-    InputPort& port() { return *access(component).inputs().front(); }
+    InputPort& port() { return *accessTo(component).inputs().front(); }
     void connect(const OutputBase& output) {
         port().connect(portOf(component, output).slot().get(), false);
     }
     void writeAt(Output<double>& output, double value, std::int64_t time_ns) {
-        access(component).setTime(time_ns);
+        accessTo(component).setTime(time_ns);
         output.write(value);
     }
     // In the next cycle.
@@ -316,25 +330,25 @@ TEST_F(InputOutput, AgeIsLoopTimeSinceTheWrite) {
     connect(first);
     writeAt(first, 1.0, 1000);
     in.read();
-    access(component).setTime(3500);
+    accessTo(component).setTime(3500);
     EXPECT_EQ(in.age(&component), 2500);
 }
 
 // A simulated clock restarts.
 TEST_F(InputOutput, MoveOfTheTimeKeepsAgesAndNews) {
     Input<double> other{&component, "other"};
-    InputPort& other_port = *access(component).inputs().back();
+    InputPort& other_port = *accessTo(component).inputs().back();
     connect(first);
     other_port.connect(portOf(component, first).slot().get(), false);
     writeAt(first, 1.0, 1'000'000);
     in.read();
-    access(component).setTime(1'000'500);
+    accessTo(component).setTime(1'000'500);
     for (const std::int64_t by : {-1'000'000, -1'000'500, -999'999}) {
         portOf(component, first).slot()->stamp =
             movedStamp(portOf(component, first).slot()->stamp, by);
         port().moveTime(by);
         other_port.moveTime(by);
-        access(component).setTime(component.time() + by);
+        accessTo(component).setTime(component.time() + by);
         EXPECT_EQ(in.read(), DataStatus::Old);
         EXPECT_TRUE(other.isNew());
         EXPECT_EQ(in.age(&component), 500);
@@ -366,13 +380,13 @@ TEST(StagedOutput, ReadersSeeWholeValuesEvenIfACopyFails) {
     Output<Halves> out{&component, "out"};
     Input<Halves> in{&component, "in"};
     portOf(component, out).stage();
-    access(component).inputs().front()->connect(portOf(component, out).slot().get(), false);
+    accessTo(component).inputs().front()->connect(portOf(component, out).slot().get(), false);
     out.value().first = out.value().second = {1.0};
     out.publish();
     EXPECT_EQ(in.read(), DataStatus::None);
     EXPECT_TRUE(portOf(component, out).commit());
     EXPECT_EQ(in.read(), DataStatus::New);
-    access(component).setTime(component.time() + 1);
+    accessTo(component).setTime(component.time() + 1);
     out.value().first = out.value().second = {2.0, 3.0};
     out.publish();
     Halves::copies_throw = true;
@@ -386,13 +400,13 @@ TEST(QueueWithoutMemory, DropsMessagesThatItCannotCopy) {
     BareComponent component;
     Output<Halves> out{&component, "out"};
     Queue<Halves, 2> queue{&component, "queue"};
-    access(component).inputs().front()->connect(portOf(component, out).slot().get(), false);
+    accessTo(component).inputs().front()->connect(portOf(component, out).slot().get(), false);
     Halves::copies_throw = true;
     out.publish();
     EXPECT_EQ(queue.size(), 0U);
     EXPECT_EQ(queue.dropped(), 1U);
     Halves::copies_throw = false;
-    access(component).setTime(component.time() + 1);
+    accessTo(component).setTime(component.time() + 1);
     out.publish();
     EXPECT_EQ(queue.size(), 1U);
 }
@@ -406,7 +420,7 @@ TEST(StagedOutput, ComponentContinuesFromTheValueThatItWrote) {
         static_cast<const Slot<std::vector<int>>&>(*portOf(component, out).slot()).value;
     out.write({1});
     EXPECT_TRUE(portOf(component, out).commit());
-    access(component).setTime(component.time() + 1);
+    accessTo(component).setTime(component.time() + 1);
     out.value().push_back(2);
     out.publish();
     EXPECT_EQ(seen, std::vector<int>({1}));
@@ -437,7 +451,7 @@ TEST(Declaration, OfAnIllegalNameIsRefused) {
 
 TEST(Declaration, AfterFreezeIsRefused) {
     BareComponent component;
-    access(component).freeze();
+    accessTo(component).freeze();
     const auto declare = [&] { const Input<double> in{&component, "in"}; };
     EXPECT_THROW(declare(), std::logic_error);
 }

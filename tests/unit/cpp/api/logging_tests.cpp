@@ -138,7 +138,7 @@ TEST_F(LoggingMacros, OnceWaitsForItsLevel) {
 TEST_F(LoggingMacros, ThrottleUsesLoopTime) {
     BareComponent* self = &component;
     for (int i = 0; i < 20; ++i) {
-        access(component).setTime(std::int64_t{i} * 10'000'000);
+        accessTo(component).setTime(std::int64_t{i} * 10'000'000);
         RTCF_INFO_THROTTLE(self, 0.05, "{}", i);
     }
     EXPECT_EQ(messages(), (std::vector<std::string>{"0", "5", "10", "15"}));
@@ -147,7 +147,7 @@ TEST_F(LoggingMacros, ThrottleUsesLoopTime) {
 TEST_F(LoggingMacros, ThrottleFollowsARestartedClock) {
     BareComponent* self = &component;
     for (const std::int64_t time : std::vector<std::int64_t>{3'600'000'000'000, 0, 1}) {
-        access(component).setTime(time);
+        accessTo(component).setTime(time);
         RTCF_INFO_THROTTLE(self, 1.0, "at {}", time);
     }
     EXPECT_EQ(messages(), (std::vector<std::string>{"at 3600000000000", "at 0"}));

@@ -19,7 +19,7 @@ using Int = std::int64_t;
 class ParameterTest : public ::testing::Test {
    protected:
     ParameterBase& named(const std::string& name) {
-        for (ParameterBase* parameter : access(component).parameters())
+        for (ParameterBase* parameter : accessTo(component).parameters())
             if (parameter->declaration().name == name) return *parameter;
         throw std::out_of_range(name);
     }
@@ -73,7 +73,7 @@ TEST_F(ParameterTest, RejectsNamesThatRosHasNot) {
         EXPECT_THROW((Parameter<double>{&component, name, 1.0}), std::logic_error) << name;
     }
     EXPECT_THROW((Output<double>{&component, "gains/p"}), std::logic_error) << "a port";
-    EXPECT_TRUE(access(component).parameters().empty());
+    EXPECT_TRUE(accessTo(component).parameters().empty());
 }
 
 TEST_F(ParameterTest, IsNotAGroupToo) {
@@ -92,7 +92,7 @@ TEST_F(ParameterTest, IsNotAGroupToo) {
     EXPECT_EQ(error("gains/p"), "parameter 'gains/p' is declared twice");
     const Parameter<std::array<double, 2>> k{&component, "k", {}};
     EXPECT_EQ(error("k_1/low"), "'k_1' is a parameter and the group of 'k_1/low': rename one");
-    EXPECT_EQ(access(component).parameters().size(), 3U);
+    EXPECT_EQ(accessTo(component).parameters().size(), 3U);
 }
 
 TEST_F(ParameterTest, ChangesAtCommitOnly) {
@@ -219,9 +219,9 @@ TEST_F(ParameterTest, DuplicateDeclarationIsRejected) {
 TEST_F(ParameterTest, ElementsOfAnArrayAreParameters) {
     const Parameter<std::array<double, 3>> gains{&component, "gains",     {1.0, 2.0, 3.0},
                                                  Min(0.0),   Unit("N/m"), Doc("stiffness")};
-    ASSERT_EQ(access(component).parameters().size(), 3U);
+    ASSERT_EQ(accessTo(component).parameters().size(), 3U);
     for (std::size_t i = 0; i < 3; ++i) {
-        const ParameterDeclaration& element = access(component).parameters()[i]->declaration();
+        const ParameterDeclaration& element = accessTo(component).parameters()[i]->declaration();
         EXPECT_EQ(element.name, "gains_" + std::to_string(i));
         EXPECT_EQ(element.type, "double");
         EXPECT_EQ(std::get<double>(element.default_value), static_cast<double>(i + 1));
@@ -242,8 +242,8 @@ TEST_F(ParameterTest, AnArrayIsDeclaredWholeOrNotAtAll) {
         const Parameter<std::array<double, 3>> gains{&component, "gains", {1.0, 2.0, 3.0}};
     };
     EXPECT_THROW(declare(), std::logic_error);
-    ASSERT_EQ(access(component).parameters().size(), 1U);
-    EXPECT_EQ(access(component).parameters()[0]->declaration().name, "gains_2");
+    ASSERT_EQ(accessTo(component).parameters().size(), 1U);
+    EXPECT_EQ(accessTo(component).parameters()[0]->declaration().name, "gains_2");
 }
 
 TEST_F(ParameterTest, AnArrayIsARange) {
@@ -265,7 +265,7 @@ TEST_F(ParameterTest, ElementsOfAnArrayChangeTogether) {
     named("limits_1").stage(Int{5});
     EXPECT_EQ(limits.value(), (std::array<int, 2>{-1, 1}));
     EXPECT_EQ(Values{}[limits], (std::array<int, 2>{-5, 5}));
-    for (ParameterBase* parameter : access(component).parameters()) parameter->commit();
+    for (ParameterBase* parameter : accessTo(component).parameters()) parameter->commit();
     EXPECT_EQ(limits.value(), (std::array<int, 2>{-5, 5}));
     named("limits_0").stage(Int{-7});
     named("limits_0").release();

@@ -19,12 +19,13 @@ class QueueAlone : public ::testing::Test {
     // As at a boundary, like Rewire::apply().
     void connect(OutputBase& output) {
         as_executor.receive();
-        access(component).inputs().front()->connect(portOf(component, output).slot().get(), false);
+        accessTo(component).inputs().front()->connect(portOf(component, output).slot().get(),
+                                                      false);
         as_executor.skip();
     }
     void write(Output<int>& output, int value) { write(output, value, component.time() + 1); }
     void write(Output<int>& output, int value, std::int64_t time_ns) {
-        access(component).setTime(time_ns);
+        accessTo(component).setTime(time_ns);
         output.write(value);
         as_executor.receive();
     }
@@ -99,7 +100,7 @@ TEST_F(QueueAlone, AgeIsThatOfTheOldestMessage) {
     connect(first);
     write(first, 1, 100);
     write(first, 2, 300);
-    access(component).setTime(450);
+    accessTo(component).setTime(450);
     EXPECT_EQ(queue.age(), 350);
     queue.pop();
     EXPECT_EQ(queue.age(), 150);
@@ -113,7 +114,7 @@ TEST_F(QueueAlone, MessagesKeepTheirAgesIfTheTimeMoves) {
     write(first, 2, 1000);
     write(first, 3, 1200);
     as_executor.moveTime(-1500);
-    access(component).setTime(10);
+    accessTo(component).setTime(10);
     EXPECT_EQ(queue.age(), 510);
     queue.pop();
     EXPECT_EQ(queue.age(), 310);
@@ -128,9 +129,9 @@ TEST_F(QueueAlone, MessagesOfVariableSizeKeepTheirCapacity) {
     std_msgs::String longest;
     longest.data = std::string(100, 'x');
     texts.reserve(longest);
-    access(component).inputs().back()->connect(portOf(component, output).slot().get(), false);
+    accessTo(component).inputs().back()->connect(portOf(component, output).slot().get(), false);
     for (int round = 0; round < 4; ++round) {
-        access(component).setTime(component.time() + 1);
+        accessTo(component).setTime(component.time() + 1);
         output.value().data = "a text that is longer than what a string has at hand";
         output.publish();
         const char* const place = texts.front()->data.data();

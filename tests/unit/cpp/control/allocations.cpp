@@ -25,7 +25,7 @@ void updateInLoop(Component& component) noexcept RTCF_NONBLOCKING { component.up
 }  // namespace
 
 std::size_t allocationsInUpdate(Component& component) {
-    access(component).context().log_level = LogLevel::Fatal;
+    accessTo(component).context().log_level = LogLevel::Fatal;
 #ifdef RTCF_SANITIZED
     updateInLoop(component);
     return 0;

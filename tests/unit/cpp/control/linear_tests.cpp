@@ -116,15 +116,15 @@ INSTANTIATE_TEST_SUITE_P(KalmanFilter, Modes, testing::Bool());
 // Changes the period as a running loop does: the next cycle still has the time of the old one.
 void changePeriod(Bench& bench, std::int64_t period_ns) {
     Component& component = bench.component();
-    for (DerivedBase* derived : access(component).derived()) {
+    for (DerivedBase* derived : accessTo(component).derived()) {
         if (auto* const period = dynamic_cast<DesignPeriod*>(derived)) period->propose(period_ns);
     }
     ASSERT_TRUE(component.prepare(Values{}));
-    for (DerivedBase* derived : access(component).derived()) {
+    for (DerivedBase* derived : accessTo(component).derived()) {
         if (derived->staged()) derived->commit();
         derived->release();
     }
-    access(component).context().period_ns = period_ns;
+    accessTo(component).context().period_ns = period_ns;
     bench.clock().period_ns = period_ns;
 }
 

@@ -138,7 +138,7 @@ TEST(Injector, KeepsTheAgesOfMessagesOlderThanTheLoop) {
         ASSERT_TRUE(injector.deliver(bytes.data(), static_cast<std::uint32_t>(bytes.size()), 1));
         injector.deliverUntil(1 + age, 1.0);
         component.loop_clock.time_ns = 100;
-        access(component).setTime(100);
+        accessTo(component).setTime(100);
         ASSERT_TRUE(injector.adopt(component.loop_clock));
         EXPECT_NE(injector.front()->stamp, 0);
         EXPECT_EQ(100 - timeOf(injector.front()->stamp), age);

@@ -43,7 +43,7 @@ class LoopAlone : public ::testing::Test {
         context_.full_name = "/worker";
         context_.clock = &loop_.clock();
         context_.recorder_slot = recorder_.addSlot("/worker");
-        access(*worker_).attach(context_);
+        accessTo(*worker_).attach(context_);
         schedule_.steps.push_back({worker_.get(), updateOf(*worker_), context_.recorder_slot, 1});
         schedule_.turns.push_back({&component_, 0, false});
         schedule_.findStretches();

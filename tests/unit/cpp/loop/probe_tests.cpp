@@ -28,7 +28,7 @@ class Talkative final : public Component {
 class ProbeTest : public ::testing::Test {
    protected:
     ProbeTest() {
-        for (const OutputPort* output : access(component_).outputs()) probe_.add(*output);
+        for (const OutputPort* output : accessTo(component_).outputs()) probe_.add(*output);
     }
     // The number of boundaries used.
     int boundaries(std::int64_t period_ns) {

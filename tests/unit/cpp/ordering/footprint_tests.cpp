@@ -42,9 +42,9 @@ TEST_F(FootprintTest, CoversStepsComponentsPortsAndValues) {
     for (const Step& step : plan->schedule.steps) {
         EXPECT_TRUE(covers(lines, &step));
         EXPECT_TRUE(covers(lines, step.component));
-        for (const InputPort* input : access(*step.component).inputs())
+        for (const InputPort* input : accessTo(*step.component).inputs())
             EXPECT_TRUE(covers(lines, &input->input()));
-        for (const OutputPort* output : access(*step.component).outputs()) {
+        for (const OutputPort* output : accessTo(*step.component).outputs()) {
             EXPECT_TRUE(covers(lines, &output->output()));
             EXPECT_TRUE(covers(lines, output->slot().get()));
         }

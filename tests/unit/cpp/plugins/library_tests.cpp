@@ -29,7 +29,7 @@ std::string errorOf(const std::string& path) {
 std::int32_t versionOf(const Library& library) {
     const std::unique_ptr<Component> component(library.find("Versioned")->create("V", nullptr));
     component->update();
-    return static_cast<const Slot<std::int32_t>&>(*access(*component).outputs()[0]->slot()).value;
+    return static_cast<const Slot<std::int32_t>&>(*accessTo(*component).outputs()[0]->slot()).value;
 }
 
 TEST(Library, ListsItsTypesByName) {

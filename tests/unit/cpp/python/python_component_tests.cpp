@@ -106,16 +106,16 @@ class PythonComponents : public testing::Test {
    protected:
     PythonComponents() {
         source_->value = 3.0;
-        access(component_).inputs().front()->connect(source_.get(), false);
+        accessTo(component_).inputs().front()->connect(source_.get(), false);
     }
     // A new value, in the next cycle.
     void arrive() {
-        access(component_).setTime(component_.time() + 1);
+        accessTo(component_).setTime(component_.time() + 1);
         source_->stamp = component_.time();
     }
     const Slot<double>& written() const {
         return *static_cast<const Slot<double>*>(
-            access(component_).outputs().front()->slot().get());
+            accessTo(component_).outputs().front()->slot().get());
     }
 
     std::shared_ptr<Slot<double>> source_ = std::make_shared<Slot<double>>();
@@ -123,14 +123,14 @@ class PythonComponents : public testing::Test {
 };
 
 TEST_F(PythonComponents, DeclaresTheContentOfItsTable) {
-    EXPECT_EQ(access(component_).inputs().front()->name(), "u");
-    EXPECT_EQ(access(component_).outputs().front()->unit(), "m");
-    const ParameterDeclaration& gain = access(component_).parameters().front()->declaration();
+    EXPECT_EQ(accessTo(component_).inputs().front()->name(), "u");
+    EXPECT_EQ(accessTo(component_).outputs().front()->unit(), "m");
+    const ParameterDeclaration& gain = accessTo(component_).parameters().front()->declaration();
     EXPECT_EQ(gain.type, "double");
     EXPECT_EQ(std::get<double>(gain.default_value), 2.5);
     EXPECT_EQ(gain.minimum, 0.0);
     EXPECT_FALSE(gain.maximum);
-    EXPECT_EQ(access(component_).states().front().type, "int64");
+    EXPECT_EQ(accessTo(component_).states().front().type, "int64");
 }
 
 TEST_F(PythonComponents, WritesOnlyInACycle) {
@@ -142,13 +142,13 @@ TEST_F(PythonComponents, WritesOnlyInACycle) {
     const std::int64_t time = component_.time();
     EXPECT_EQ(written().stamp, time);
     EXPECT_EQ(written().value, 7.5);
-    access(component_).setTime(time + 1);
+    accessTo(component_).setTime(time + 1);
     component_.update();
     EXPECT_EQ(written().stamp, time);
 }
 
 TEST_F(PythonComponents, AParameterTakesEffectAtItsCommit) {
-    ParameterBase& gain = *access(component_).parameters().front();
+    ParameterBase& gain = *accessTo(component_).parameters().front();
     arrive();
     gain.stage(10.0);
     component_.update();
@@ -171,13 +171,14 @@ TEST(PythonParameters, AnEnumIsSetByName) {
     table.record = &fresh;
     table.parameters = &parameter;
     PythonComponent component(table);
-    ParameterBase& mode = *access(component).parameters().front();
+    ParameterBase& mode = *accessTo(component).parameters().front();
     EXPECT_EQ(mode.declaration().type, "enum");
     EXPECT_EQ(std::get<std::string>(mode.declaration().default_value), "RUN");
     EXPECT_EQ(mode.declaration().choices.size(), 3U);
     ParameterValue unknown = std::string("FLY");
     EXPECT_EQ(mode.check(unknown), "parameter mode = FLY is none of IDLE, RUN, GO");
-    const auto* count = static_cast<const std::int64_t*>(access(component).states().front().value);
+    const auto* count =
+        static_cast<const std::int64_t*>(accessTo(component).states().front().value);
     EXPECT_EQ(*count, -4);
     mode.stage(std::string("IDLE"));
     mode.commit();
@@ -206,7 +207,7 @@ TEST_F(PythonComponents, AnExceptionWritesNothingAndHasItsPlace) {
 TEST_F(PythonComponents, StateIsInItsRecord) {
     component_.update();
     component_.update();
-    const StateDeclaration& count = access(component_).states().front();
+    const StateDeclaration& count = accessTo(component_).states().front();
     EXPECT_EQ(*static_cast<const std::int64_t*>(count.value), 2);
     EXPECT_EQ(count.print(count.value), "2");
     EXPECT_EQ(count.print(count.initial.data()), "0");

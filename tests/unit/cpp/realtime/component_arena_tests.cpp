@@ -113,7 +113,7 @@ TEST(ComponentArena, HoldsComponentsAndTheirValues) {
         EXPECT_EQ(placeOf(made.get()) % 128, 0U);
         EXPECT_EQ(detail::ObjectHead::of(made.get()).memory, &arena);
         EXPECT_EQ(detail::ObjectHead::of(made.get()).size, sizeof(WideComponent));
-        const std::uintptr_t value = placeOf(access(*made).outputs()[0]->slot().get());
+        const std::uintptr_t value = placeOf(accessTo(*made).outputs()[0]->slot().get());
         EXPECT_LE(value - placeOf(made.get()), sizeof(WideComponent) + 128);
     }
     EXPECT_EQ(context.object_size, sizeof(WideComponent));
@@ -153,13 +153,13 @@ TEST(ComponentArena, HoldsComponentsThatConstructOthers) {
     outer.memory = &arena;
     ComponentContext inner;
     const std::unique_ptr<Assembly> made(detail::construct<Assembly>(&outer, &inner));
-    EXPECT_EQ(&access(*made).context(), &outer);
-    EXPECT_EQ(&access(*made->part).context(), &inner);
+    EXPECT_EQ(&accessTo(*made).context(), &outer);
+    EXPECT_EQ(&accessTo(*made->part).context(), &inner);
     EXPECT_EQ(detail::ObjectHead::of(made.get()).memory, &arena);
     EXPECT_EQ(detail::ObjectHead::of(made->part.get()).memory, nullptr);
     const auto begin = reinterpret_cast<std::uintptr_t>(made.get());
     const auto last =
-        reinterpret_cast<std::uintptr_t>(access(*made).outputs().back()->slot().get());
+        reinterpret_cast<std::uintptr_t>(accessTo(*made).outputs().back()->slot().get());
     EXPECT_LE(last - begin, sizeof(Assembly) + 64);
 }
 
@@ -169,11 +169,11 @@ TEST(ComponentArena, KeepsAValueThatOutlivesItsComponent) {
     context.memory = &arena;
     std::unique_ptr<WideComponent> first(detail::construct<WideComponent>(&context));
     first->out.write(3.5);
-    const std::shared_ptr<SlotHeader> kept = access(*first).outputs()[0]->slot();
+    const std::shared_ptr<SlotHeader> kept = accessTo(*first).outputs()[0]->slot();
     first.reset();
     const std::unique_ptr<WideComponent> second(detail::construct<WideComponent>(&context));
     second->out.write(-1.0);
-    EXPECT_NE(access(*second).outputs()[0]->slot(), kept);
+    EXPECT_NE(accessTo(*second).outputs()[0]->slot(), kept);
     EXPECT_EQ(static_cast<const Slot<double>&>(*kept).value, 3.5);
 }
 
@@ -192,7 +192,7 @@ TEST_F(ComponentPlaces, AreSideBySideInTheOrderOfLoading) {
         const auto begin = reinterpret_cast<std::uintptr_t>(&component);
         const bool follows = begin > last && begin - last < 256;
         last = begin;
-        for (const OutputPort* output : access(component).outputs()) {
+        for (const OutputPort* output : accessTo(component).outputs()) {
             const auto value = reinterpret_cast<std::uintptr_t>(output->slot().get());
             if (follows) {
                 EXPECT_LT(value - begin, 256U);

@@ -16,7 +16,7 @@ class BareComponent final : public Component {
         context.name = "bare";
         context.clock = &loop_clock;
         context.period_ns = loop_clock.period_ns;
-        access(*this).attach(context);
+        accessTo(*this).attach(context);
     }
     void update() override {}
 
@@ -26,7 +26,7 @@ class BareComponent final : public Component {
 
 /// The executor's side of an output.
 inline OutputPort& portOf(const Component& owner, const OutputBase& output) {
-    for (OutputPort* port : access(owner).outputs())
+    for (OutputPort* port : accessTo(owner).outputs())
         if (&port->output() == &output) return *port;
     throw std::out_of_range(output.name());
 }

@@ -176,10 +176,13 @@ def test_parameters_have_names_in_groups(tmp_path: Path) -> None:
         ('d: Parameter[float] = Parameter(1.0, name="µ/p")', "has name='µ/p': use names"),
         ("d: Parameter[float] = Parameter(1.0, name=3)", "has name=3: use names"),
         ('d: Parameter[float] = Parameter(1.0, name="gains/p")', "and p both have a parameter"),
-        ("gains: Parameter[float] = 1.0", "is in a group gains, and gains is a parameter gains"),
+        (
+            "gains: Parameter[float] = 1.0",
+            "makes gains a group, which is also a parameter (of gains)",
+        ),
         (
             'd: Parameter[float] = Parameter(1.0, name="gains/k_1/low")',
-            "is in a group gains/k_1, and k is a parameter gains/k_1: rename one",
+            "makes gains/k_1 a group, which is also a parameter (of k): rename one",
         ),
         ('d: State[float] = State(1.0, name="gains/d")', "has no option 'name'"),
     ],

@@ -290,26 +290,68 @@ def test_declared_parameters_get_values_of_their_type() -> None:
         component_parameters.settings({"kp": [1, 2]}, declared)
 
 
+GROUPED = {
+    name: graph_pb2.ParameterInfo(name=name, type="double")
+    for name in ("gains/p", "gains/filter/q", "k_0", "k_1", "m_0_0", "m_0_1", "text")
+}
+
+
 def test_mappings_are_groups_and_lists_are_arrays_where_these_are_declared() -> None:
-    names = ("gains/p", "gains/filter/q", "k_0", "k_1", "text")
-    declared = {name: graph_pb2.ParameterInfo(name=name, type="double") for name in names}
     settings, rest, slips = component_parameters.settings(
         {
             "gains": {"p": 2, "filter": {"q": 3}, "d": 4},
-            "k": [5, 6, 7],
+            "k": [5, 6],
+            "m": [[7, 8]],
             "limits": {"low": 1, "high": [2]},
             "joints": ["a", "b"],
         },
-        declared,
+        GROUPED,
     )
     assert {each.name: each.value.int_value for each in settings} == {
-        "gains/p": 2, "gains/filter/q": 3, "k_0": 5, "k_1": 6,
+        "gains/p": 2, "gains/filter/q": 3, "k_0": 5, "k_1": 6, "m_0_0": 7, "m_0_1": 8,
     }  # fmt: skip
-    assert rest == ["gains/d", "joints", "k_2", "limits"]
-    assert slips == [
-        "the component declares no parameter ~gains/d",
-        "the component declares no parameter ~k_2",
-    ]
+    assert (rest, slips) == (["gains/d", "joints", "limits"], [])
+
+
+@pytest.mark.parametrize(
+    ("values", "warning"),
+    [
+        ({"gains": {"fliter": {"q": 1}}}, "no parameter ~gains/fliter; did you mean ~gains/f"),
+        ({"gains": {"unlike": {"q": 1}}}, ""),
+        ({"gains": {"filter": {"qq": 1}}}, "declares no parameter ~gains/filter/qq; did you mean"),
+        ({"gains": 1.0}, "~gains is a group of parameters: set ~gains/NAME"),
+        ({"gains": {"filter": [1]}}, "~gains/filter is a group of parameters"),
+        ({"k": 1.0}, "~k is an array: set a list, or its elements ~k_0 …"),
+        ({"k": [1, 2, 3]}, "~k has 3 values: the component takes 2"),
+        ({"m": [[1], [2]]}, "~m has 2 values: the component takes 1"),
+        ({"m": [1]}, "~m_0 is an array: set a list"),
+        ({"k": [1], "k_0": 9}, "~k_0 is ignored: ~k sets it, too"),
+        ({"k_0": 9, "k": [1]}, "~k_0 is ignored: ~k sets it, too"),
+        # What remains of a group at the parameter server when its members are deleted.
+        ({"gains": {"filter": {}}, "k": []}, ""),
+    ],
+)
+def test_values_that_fit_no_group_or_array_cause_a_warning(
+    values: dict[str, Any], warning: str
+) -> None:
+    settings, _, slips = component_parameters.settings(values, GROUPED)
+    assert len(slips) == (1 if warning else 0)
+    assert not warning or warning in slips[0]
+    assert all(each.value.int_value != 9 for each in settings)
+
+
+@pytest.mark.parametrize("wrong", [{"gains": {"p": []}}, {"gains": {"p": {}}}, {"k": [[1], 2]}])
+def test_a_list_for_a_single_parameter_is_rejected(wrong: dict[str, Any]) -> None:
+    with pytest.raises(Ending, match="must be one double, not a"):
+        component_parameters.settings(wrong, GROUPED)
+
+
+def test_a_group_or_array_with_a_launchers_name_belongs_to_the_component() -> None:
+    declared = ("phase_0", "phase_1", "every/rate")
+    found, notes = component_parameters.read({"phase": [0.0, 1.5], "every": {"rate": 2}}, declared)
+    assert (found.every, found.phase) == (0, None)
+    assert found.others == {"phase": [0.0, 1.5], "every": {"rate": 2}}
+    assert all("the component declares it" in each for each in notes)
 
 
 def test_arguments_are_parsed_as_by_a_ros_node() -> None:

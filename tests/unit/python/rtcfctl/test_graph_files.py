@@ -100,6 +100,13 @@ def test_several_runners_are_read() -> None:
         ("components:\n- package: p\n  type: T\n  parameters: {g: {a: }}\n", 4, "g/a has no value"),
         ("components:\n- package: p\n  type: T\n  parameters:\n    g/a: 1\n    g: {a: 2}\n", 6,
          "parameters.g/a is set twice"),
+        ("components:\n- package: p\n  type: T\n  parameters: {a: &x {b: *x}}\n", 4,
+         "in more than 10 groups"),
+        ("components:\n- package: p\n  type: T\n  parameters: " + "{k: [" * 20 + "1" + "]}" * 20, 4,
+         "in more than 10 groups"),
+        ("components:\n- package: p\n  type: T\n  parameters:\n    a: &a [" + "1," * 100
+         + "]\n    b: &b [" + "*a," * 100 + "]\n    c: [" + "*b," * 100 + "]\n", 5,
+         "more than 10000 parameters"),
         ("components:\n- package: p\n  type: T\n  parameters: {k: 9e}\n  breaks: in1", 5, "a list"),
         ("components:\n- {package: p, type: T}\n- {package: p, type: T, ns: /}\n", 3,
          "component /T is already in line 2"),

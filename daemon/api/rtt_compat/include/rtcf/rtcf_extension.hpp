@@ -75,7 +75,7 @@ class RtcfExtension {
     void configureTestLogger() {
         auto* const task = dynamic_cast<RTT::TaskContext*>(this);
         if (task == nullptr) throw std::logic_error("configureTestLogger() needs a TaskContext");
-        if (test_logger_ != nullptr || access(*task).context().log != nullptr) return;
+        if (test_logger_ != nullptr || accessTo(*task).context().log != nullptr) return;
         test_logger_ = std::make_unique<rtcf::rtt_compat::TestLogger>(*task, task->getName());
         component_ = task;
         ROS_WARN("Component logger was set to non real-time safe test mode.");

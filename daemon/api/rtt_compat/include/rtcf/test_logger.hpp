@@ -24,7 +24,7 @@ class TestLogger final : public LogSink {
         context_.period_ns = clock_.period_ns;
         context_.log = this;
         context_.log_level = LogLevel::Debug;  // rosconsole decides
-        access(component).attach(context_);
+        accessTo(component).attach(context_);
     }
     TestLogger(const TestLogger&) = delete;
     TestLogger& operator=(const TestLogger&) = delete;
