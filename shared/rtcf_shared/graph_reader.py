@@ -4,7 +4,7 @@ docs/graph-files.md describes the format.  Scalars have the types of YAML 1.2 (s
 spec.py), so that a graph file and the command line agree.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,7 +16,7 @@ from rtcf_shared.naming import suggestion
 from rtcf_shared.spec import parse_value
 
 _GRAPH_KEYS = ("settings", "components")
-_DEEPEST = 10  # groups and arrays around a parameter
+_DEEPEST = 100  # mappings and lists in each other
 _MOST_PARAMETERS = 10_000  # of a component
 _COMPONENT_KEYS = ("name", "ns", "package", "type", "remaps", "parameters", "first", "ignore",
                    "breaks", "every", "phase", "optional")  # fmt: skip
@@ -43,6 +43,7 @@ def read_graphs(text: str, file: str) -> list[Graph]:
 
     loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     try:
+        _check_depth(yaml.parse(text, Loader=loader), file)  # compose() has no limit
         root = yaml.compose(text, Loader=loader)
     except yaml.YAMLError as error:
         mark = getattr(error, "problem_mark", None)
@@ -52,6 +53,18 @@ def read_graphs(text: str, file: str) -> list[Graph]:
     if root is None:
         raise GraphFileError(f"{file}: it has no graph")
     return _Reader(file).document(root)
+
+
+def _check_depth(events: Iterable[Any], file: str) -> None:
+    depth = 0
+    for event in events:
+        kind = type(event).__name__
+        depth += kind.endswith("StartEvent") - kind.endswith("EndEvent")
+        if depth > _DEEPEST:
+            raise GraphFileError(
+                f"{file}:{event.start_mark.line + 1}: more than {_DEEPEST} mappings or lists in "
+                "each other"
+            )
 
 
 class _Reader:
@@ -121,7 +134,7 @@ class _Reader:
         """Add the parameters that a value sets, as flat() of spec.py."""
         # Aliases may contain themselves, or each other many times.
         if depth > _DEEPEST:
-            raise self._error(node, f"a parameter is in more than {_DEEPEST} groups")
+            raise self._error(node, f"more than {_DEEPEST} mappings or lists in each other")
         if len(found) > _MOST_PARAMETERS:
             raise self._error(node, f"a component has more than {_MOST_PARAMETERS} parameters")
         if node.id == "scalar":

@@ -285,11 +285,12 @@ def _compressor() -> Any:
     except ImportError:
         return lambda data: ("", data)
     # Heads and smooth values match those of the column before, at a large distance: a lazy search
-    # finds longer matches there than levels 1 to 6, which skip or forget it.
+    # finds longer matches there than levels 1 to 6, which skip or forget it. Readers check the
+    # checksum, which is faster than the CRC of MCAP.
     compressor = zstandard.ZstdCompressor(
         compression_params=zstandard.ZstdCompressionParameters(
             strategy=zstandard.STRATEGY_LAZY, window_log=22, hash_log=17, chain_log=16,
-            search_log=1, min_match=6, target_length=8,
+            search_log=1, min_match=6, target_length=8, write_checksum=True,
         )
     )  # fmt: skip
     return lambda data: ("zstd", compressor.compress(data))

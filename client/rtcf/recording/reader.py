@@ -338,7 +338,9 @@ class Recording(Closing):
         try:
             yield
         except _NONSENSE as error:
-            raise RecordingError(f"{self.path} is damaged: {error}") from None
+            raise RecordingError(
+                f"{self.path} is damaged: {error}; rtcfctl convert --repair keeps the rest"
+            ) from None
 
     def _read(
         self,

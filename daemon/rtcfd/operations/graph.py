@@ -4,6 +4,7 @@ Functions on a RunnerCore; each is one Change, and one transaction of its execut
 """
 
 import asyncio
+import contextlib
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 
 from rtcf.executor.v1 import executor_pb2 as wire
@@ -262,7 +263,7 @@ async def apply(
         result = await _ask_to_apply(runner, request, specs, kept, progress)
         if not request.dry_run:
             changed = (each for each in specs if full_name(each) not in kept)
-            _note_parameters(runner, changed, acting)
+            await _note_parameters(runner, changed, acting)
             for name, each in kept.items():
                 each.note(runner, name, acting, "apply")
         return result
@@ -381,7 +382,7 @@ async def set_breaks(
     )
 
 
-def _note_parameters(
+async def _note_parameters(
     runner: RunnerCore, specs: Iterable[graph_pb2.ComponentSpec], acting: Caller | None
 ) -> None:
     """Note the parameters that a graph has changed."""
@@ -389,10 +390,17 @@ def _note_parameters(
         name = full_name(spec)
         before = runner.desired.components.get(name)
         known = {} if before is None else {each.name: each.value for each in before.parameters}
+        now = {each.name: each.value for each in spec.parameters}
+        if before is not None and now != known:
+            # A parameter that the graph does not set has its default.
+            with contextlib.suppress(RequestError):
+                library = await runner.shared.catalog.find(spec.package, spec.type)
+                defaults = {each.name: each.default_value for each in library.parameters}
+                known, now = defaults | known, defaults | now
         changed = [
-            each
-            for each in spec.parameters
-            if each.name not in known or not same_value(known[each.name], each.value)
+            graph_pb2.ParameterSetting(name=each, value=value)
+            for each, value in now.items()
+            if each not in known or not same_value(known[each], value)
         ]
         quiet = before is None  # a new component, perhaps one of a thousand
         parameters.note(runner, name, changed, known, acting, "apply", quiet=quiet)

@@ -29,7 +29,7 @@ components:
   - package: rtcf_test
     type: Grouped
     parameters:
-      gains: {p: 5, filter: {order: 3}, k: [1.0, 2.0, 3.0]}
+      gains: {p: 5.0, filter: {order: 3}, k: [1.0, 2.0, 3.0]}
 """
 LAUNCH = """
 <launch>
@@ -90,6 +90,34 @@ def test_a_graph_file_has_groups_as_mappings(
     assert rejected.returncode != 0
     assert "gains/filter/ordr" in rejected.stderr
     assert "gains/filter/order" in rejected.stderr
+
+
+def test_a_graph_file_that_resets_tuned_values_is_in_the_history(
+    daemon: Daemon, client: rtcf.Client, tmp_path: Path
+) -> None:
+    file = tmp_path / "graph.yaml"
+    file.write_text(GRAPH)
+    assert daemon.ctl("apply", str(file)).returncode == 0
+    assert daemon.ctl("set", "Grouped", "gains/p:=42.0", "offset:=7.0").returncode == 0
+    file.write_text(GRAPH.replace("[1.0, 2.0, 3.0]", "[9.0]"))
+    assert daemon.ctl("apply", str(file)).returncode == 0
+    given = {"gains/p": 5.0, "gains/filter/order": 3, "gains/k_0": 9.0}
+    assert parameter_values(client, "Grouped") == {**DEFAULTS, **given}
+    changes = {
+        each.parameter: (each.before.double_value, each.value.double_value)
+        for each in client.get_history("Grouped")
+        if each.how == "apply" and each.HasField("before")
+    }
+    assert changes == {
+        "gains/p": (42.0, 5.0),
+        "gains/k_0": (1.0, 9.0),
+        "gains/k_1": (2.0, 0.5),
+        "gains/k_2": (3.0, 0.125),
+        "offset": (7.0, 10.0),
+    }
+    assert daemon.ctl("undo", "Grouped").returncode == 0
+    tuned = {"gains/p": 42.0, "offset": 7.0, "gains/k_0": 1.0, "gains/k_1": 2.0, "gains/k_2": 3.0}
+    assert parameter_values(client, "Grouped") == {**DEFAULTS, **given, **tuned}
 
 
 def test_a_bench_takes_groups_and_arrays() -> None:

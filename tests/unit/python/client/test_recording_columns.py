@@ -262,6 +262,29 @@ def test_a_repair_leaves_out_a_damaged_chunk(tmp_path: Path) -> None:
         assert recording.cycles.tolist() == [*range(1, 61), *range(91, 121)]
 
 
+def test_no_changed_bit_of_a_chunk_is_read_as_a_value(tmp_path: Path) -> None:
+    file = tmp_path / "run.mcap"
+    _some_chunks(file)
+    data = file.read_bytes()
+    with read_recording(file) as recording:
+        chunk = recording._chunks[2]
+        names = list(recording.signals)
+        before = recording.read_all(names)
+    found = 0
+    for at in range(chunk.at, chunk.at + chunk.length):
+        file.write_bytes(data[:at] + bytes([data[at] ^ 0x10]) + data[at + 1 :])
+        try:
+            with read_recording(file) as recording:
+                after = recording.read_all(names)
+        except RecordingError as error:
+            found += 1
+            assert "convert --repair" in str(error)
+            continue
+        for name in names:
+            assert np.array_equal(after[name].values, before[name].values)
+    assert found >= chunk.length - 8  # some bits of the frame's head have no meaning
+
+
 def test_a_repair_overwrites_no_file(tmp_path: Path) -> None:
     killed, whole = tmp_path / "killed.mcap", tmp_path / "whole.mcap"
     _some_chunks(killed)

@@ -101,9 +101,10 @@ def test_several_runners_are_read() -> None:
         ("components:\n- package: p\n  type: T\n  parameters:\n    g/a: 1\n    g: {a: 2}\n", 6,
          "parameters.g/a is set twice"),
         ("components:\n- package: p\n  type: T\n  parameters: {a: &x {b: *x}}\n", 4,
-         "in more than 10 groups"),
-        ("components:\n- package: p\n  type: T\n  parameters: " + "{k: [" * 20 + "1" + "]}" * 20, 4,
-         "in more than 10 groups"),
+         "more than 100 mappings or lists in each other"),
+        ("components:\n- package: p\n  type: T\n  parameters: " + "{k: [" * 90_000, 4,
+         "more than 100 mappings or lists in each other"),
+        ("- " * 200_000 + "1", 1, "more than 100 mappings or lists in each other"),
         ("components:\n- package: p\n  type: T\n  parameters:\n    a: &a [" + "1," * 100
          + "]\n    b: &b [" + "*a," * 100 + "]\n    c: [" + "*b," * 100 + "]\n", 5,
          "more than 10000 parameters"),
