@@ -316,7 +316,7 @@ def test_mappings_are_groups_and_lists_are_arrays_where_these_are_declared() -> 
 @pytest.mark.parametrize(
     ("values", "warning"),
     [
-        ({"gains": {"fliter": {"q": 1}}}, "no parameter ~gains/fliter; did you mean ~gains/f"),
+        ({"gains": {"filters": {"q": 1}}}, "no parameter ~gains/filters; did you mean ~gains/f"),
         ({"gains": {"unlike": {"q": 1}}}, ""),
         ({"gains": {"filter": {"qq": 1}}}, "declares no parameter ~gains/filter/qq; did you mean"),
         ({"gains": 1.0}, "~gains is a group of parameters: set ~gains/NAME"),
