@@ -80,7 +80,7 @@ def test_a_graph_file_has_groups_as_mappings(
     file.write_text(GRAPH)
     applied = daemon.ctl("apply", str(file))
     assert applied.returncode == 0, applied.stderr
-    given = {"gains/p": 5.0, "gains/filter/order": 3}
+    given: dict[str, float] = {"gains/p": 5.0, "gains/filter/order": 3}
     given |= {f"gains/k_{i}": i + 1.0 for i in range(3)}
     assert parameter_values(client, "Grouped") == {**DEFAULTS, **given}
     saved = daemon.ctl("save").stdout
@@ -163,7 +163,9 @@ def test_a_group_is_a_namespace_on_the_parameter_server(
     wait_for(lambda: master.parameter("/arm/c/gains/k_2") == 0.125, "the rest of the group")
     change = {"gains/p": 4.0, "gains/k_0": 2.0}
     master.run("rosrun", "dynamic_reconfigure", "dynparam", "set", "/arm/c", json.dumps(change))
-    assert parameter_values(client, "/arm/c") == {**DEFAULTS, **change, "gains/filter/order": 5}
+    expected: dict[str, float] = {**DEFAULTS, **change}
+    expected["gains/filter/order"] = 5
+    assert parameter_values(client, "/arm/c") == expected
     wait_for(lambda: master.parameter("/arm/c/gains/p") == 4.0, "the parameter server")
     client.unload(["/arm/c"])
     others = {"p": 3, "filter": {"order": 5}}  # values of another node
@@ -179,7 +181,7 @@ def test_a_launch_file_has_groups_and_arrays(tmp_path: Path, master: Master) -> 
         with launching.client() as (client, runner):
             wait_for(lambda: client.get_order(runner) == ["/grouped"], "the component")
             found = parameter_values(client, "/grouped", runner)
-        given = {"gains/p": 5.0, "gains/filter/order": 3, "offset": 1.0}
+        given: dict[str, float] = {"gains/p": 5.0, "gains/filter/order": 3, "offset": 1.0}
         given |= {f"gains/k_{i}": i + 1.0 for i in range(3)}
         assert found == given
         launch.wait_for_output("~gains/k has 4 values: the component takes 3")
