@@ -246,7 +246,7 @@ class Parameter final {
     /// @param initial default value
     /// @param options any of Min, Max, Unit, Doc, Choice
     template <typename... Options>
-    Parameter(Component* owner, std::string name, T initial, Options... options)
+    Parameter(Component* owner, std::string name, const T& initial, Options... options)
         : value_(initial),
           setting_(std::make_unique<detail::ParameterSetting<T>>(
               owner,
