@@ -6,9 +6,10 @@ from pathlib import Path
 import pytest
 import rtcf
 from browser import Browser
-from daemon_process import NO_ROS, Daemon
+from daemon_process import NO_ROS, Daemon, with_ros
 from launch_processes import Launching
 from ros_processes import Master
+from rtcf.v1 import runner_pb2
 
 
 @pytest.fixture
@@ -67,3 +68,14 @@ def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     """Yield a headless browser, shared by the tests of a module."""
     with Browser(tmp_path_factory.mktemp("browser")) as browser:
         yield browser
+
+
+@pytest.fixture
+def ros_daemon(tmp_path: Path, master: Master) -> Iterator[tuple[Daemon, rtcf.Client]]:
+    """Yield a daemon without mapped connections, and its client."""
+    daemon = Daemon(tmp_path, with_ros(master.uri, ""))
+    daemon.start()
+    with rtcf.Client(daemon.socket) as client:
+        client.set_runner(runner_pb2.RunnerSettings(frequency_hz=200.0))
+        yield daemon, client
+    daemon.end()

@@ -1,7 +1,6 @@
 """Parameters in groups: `gains/p`, on all ways in."""
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +8,10 @@ import pytest
 import rtcf
 import yaml
 from block_bench import PATH
-from daemon_process import Daemon, wait_for, with_ros
+from daemon_process import Daemon, wait_for
 from launch_processes import Launching
 from ros_processes import Master
 from rtcf.testing import Bench
-from rtcf.v1 import runner_pb2
 from values import parameter_values, port_value
 
 DEFAULTS = {
@@ -133,24 +131,13 @@ def test_a_bench_takes_groups_and_arrays() -> None:
             bench.set(gains={})
 
 
-@pytest.fixture
-def grouped(tmp_path: Path, master: Master) -> Iterator[tuple[Daemon, rtcf.Client]]:
-    """Yield a daemon with a running loop of Grouped on ROS."""
-    daemon = Daemon(tmp_path, with_ros(master.uri, ""))
-    daemon.start()
-    with rtcf.Client(daemon.socket) as client:
-        client.set_runner(runner_pb2.RunnerSettings(frequency_hz=200.0))
-        client.load(rtcf.component("rtcf_test", "Grouped", name="c", ns="/arm"))
-        client.start()
-        wait_for(lambda: "/arm/c/set_parameters" in master.services(), "the service")
-        yield daemon, client
-    daemon.end()
-
-
 def test_a_group_is_a_namespace_on_the_parameter_server(
-    grouped: tuple[Daemon, rtcf.Client], master: Master
+    ros_daemon: tuple[Daemon, rtcf.Client], master: Master
 ) -> None:
-    _, client = grouped
+    _, client = ros_daemon
+    client.load(rtcf.component("rtcf_test", "Grouped", name="c", ns="/arm"))
+    client.start()
+    wait_for(lambda: "/arm/c/set_parameters" in master.services(), "the service")
     wait_for(lambda: master.parameter("/arm/c/gains/k_2") == 0.125, "the parameter server")
     assert master.parameter("/arm/c/gains/filter") == {"order": 2}
     master.run("rosparam", "set", "/arm/c/gains", "{p: 3, filter: {order: 5}}")
@@ -172,19 +159,15 @@ def test_a_group_is_a_namespace_on_the_parameter_server(
     wait_for(lambda: master.parameter("/arm/c/gains") == others, "the end of its parameters")
 
 
-def test_a_launch_file_has_groups_and_arrays(tmp_path: Path, master: Master) -> None:
+def test_a_launch_file_has_groups_and_arrays(launching: Launching, tmp_path: Path) -> None:
     file = tmp_path / "grouped.launch"
     file.write_text(LAUNCH)
-    launching = Launching(master, tmp_path)
-    try:
-        launch = launching.roslaunch(str(file))
-        with launching.client() as (client, runner):
-            wait_for(lambda: client.get_order(runner) == ["/grouped"], "the component")
-            found = parameter_values(client, "/grouped", runner)
-        given: dict[str, float] = {"gains/p": 5.0, "gains/filter/order": 3, "offset": 1.0}
-        given |= {f"gains/k_{i}": i + 1.0 for i in range(3)}
-        assert found == given
-        launch.wait_for_output("~gains/k has 4 values: the component takes 3")
-        assert "~gains/d, ~joints" in launch.output()
-    finally:
-        launching.end()
+    launch = launching.roslaunch(str(file))
+    with launching.client() as (client, runner):
+        wait_for(lambda: client.get_order(runner) == ["/grouped"], "the component")
+        found = parameter_values(client, "/grouped", runner)
+    given: dict[str, float] = {"gains/p": 5.0, "gains/filter/order": 3, "offset": 1.0}
+    given |= {f"gains/k_{i}": i + 1.0 for i in range(3)}
+    assert found == given
+    launch.wait_for_output("~gains/k has 4 values: the component takes 3")
+    assert "~gains/d, ~joints" in launch.output()

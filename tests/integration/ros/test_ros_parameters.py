@@ -20,17 +20,13 @@ _NAME = "/arm/knobs"
 
 
 @pytest.fixture
-def knobs(tmp_path: Path, master: Master) -> Iterator[tuple[Daemon, rtcf.Client]]:
-    """Yield a daemon with a running loop of Knobs, which has a parameter of each type, on ROS."""
-    daemon = Daemon(tmp_path, with_ros(master.uri, ""))
-    daemon.start()
-    with rtcf.Client(daemon.socket) as client:
-        client.set_runner(runner_pb2.RunnerSettings(frequency_hz=200.0))
-        client.load(rtcf.component("rtcf_test", "Knobs", name="knobs", ns="/arm"))
-        client.start()
-        wait_for(lambda: f"{_NAME}/set_parameters" in master.services(), "the service")
-        yield daemon, client
-    daemon.end()
+def knobs(ros_daemon: tuple[Daemon, rtcf.Client], master: Master) -> tuple[Daemon, rtcf.Client]:
+    """Return a daemon with a running loop of Knobs, which has a parameter of each type, on ROS."""
+    _, client = ros_daemon
+    client.load(rtcf.component("rtcf_test", "Knobs", name="knobs", ns="/arm"))
+    client.start()
+    wait_for(lambda: f"{_NAME}/set_parameters" in master.services(), "the service")
+    return ros_daemon
 
 
 def dynparam(master: Master, *arguments: str) -> str:

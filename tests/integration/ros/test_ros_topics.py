@@ -1,6 +1,5 @@
 """Connections as ROS topics: selection, decimation, size, age."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -10,17 +9,6 @@ from holding_master import HoldingMaster
 from ros_processes import Master, Node
 from rtcf.v1 import runner_pb2
 from values import iteration, port_value
-
-
-@pytest.fixture
-def ros_daemon(tmp_path: Path, master: Master) -> Iterator[tuple[Daemon, rtcf.Client]]:
-    """Yield a daemon without mapped connections, and its client."""
-    daemon = Daemon(tmp_path, with_ros(master.uri, ""))
-    daemon.start()
-    with rtcf.Client(daemon.socket) as client:
-        client.set_runner(runner_pb2.RunnerSettings(frequency_hz=200.0))
-        yield daemon, client
-    daemon.end()
 
 
 def ros(client: rtcf.Client) -> runner_pb2.RosStatus:
