@@ -81,7 +81,13 @@ def load(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     if args.watch and not python_source.is_source(args.package):
         raise ValueError("--watch requires a Python source: rtcfctl load FILE.py COMPONENT --watch")
     changes = python_source.changes(args.package) if args.watch else None
-    result = client.load(_spec(args, output), args.runner, output.progress, wait=args.wait)
+    spec = _spec(args, output)
+    try:
+        result = client.load(spec, args.runner, output.progress, wait=args.wait)
+    except rtcf.RefusedError as error:
+        if error.reason != "PACKAGE_NOT_FOUND" or not python_source.is_source(args.package):
+            raise
+        raise python_source.not_searched(args.package) from None
     output.changed(f"loaded {result.component}", result)
     if changes is not None:
         sys.stdout.flush()

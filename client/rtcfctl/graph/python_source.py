@@ -82,6 +82,15 @@ def compiled(
     return package
 
 
+def not_searched(source: str) -> NotCompiledError:
+    """Return the error for a rtcfd that does not search the folder of compiled libraries."""
+    return NotCompiledError(
+        f"this rtcfd does not load libraries from {compiled_folder()}: only a private rtcfd of the "
+        "same user does, see `rtcfctl run`; for the system's rtcfd, add the folder to `path` in "
+        f"/etc/rtcfd/rtcfd.toml, or use `rtcf-compile {source} -o FOLDER/PACKAGE/NAME.so`"
+    )
+
+
 def _ros_name(stem: str) -> str:
     """Return the first part of the package's name; the whole name has at most 64 characters."""
     name = re.sub(r"[^A-Za-z0-9_]", "_", stem)[:48]

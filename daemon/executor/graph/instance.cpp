@@ -72,34 +72,34 @@ class HookNote {
 Instance::Instance(ComponentDefinition definition, std::shared_ptr<const Library> library,
                    const std::string& runner, const LoopClock& clock, Log& log,
                    FlightRecorder& recorder, HookGate* gate)
-    : definition_(std::move(definition)),
+    : definition_(std::make_shared<ComponentDefinition>(std::move(definition))),
       library_(std::move(library)),
-      record_(&findRecord(*library_, definition_)),
-      ignore_("ignore of " + definition_.fullName(), definition_.ignore),
+      record_(&findRecord(*library_, *definition_)),
+      ignore_("ignore of " + definition_->fullName(), definition_->ignore),
       log_(log),
       recorder_(recorder),
       gate_(gate),
-      slot_(recorder, definition_.fullName()),
+      slot_(recorder, definition_->fullName()),
       drained_(log),
-      phase_(definition_.phase) {
-    context_.full_name = definition_.fullName();
-    context_.name = definition_.name;
-    context_.ns = definition_.ns;
+      phase_(definition_->phase) {
+    context_.full_name = definition_->fullName();
+    context_.name = definition_->name;
+    context_.ns = definition_->ns;
     context_.runner = runner;
     context_.clock = &clock;
-    context_.period_ns = clock.period_ns * definition_.every;
+    context_.period_ns = clock.period_ns * definition_->every;
     context_.recorder_slot = slot();
     context_.device = &statistics_->device;
     context_.log = &log;
     context_.memory = ComponentArena::ofProcess();
     level_.emplace(log.levels(), context_);
     context_.gate = gate;
-    for (const auto& [from, to] : definition_.remaps) {
+    for (const auto& [from, to] : definition_->remaps) {
         context_.remaps.emplace_back(resolveName(from, context_.ns, context_.full_name),
                                      resolveName(to, context_.ns, context_.full_name));
     }
     callHook(Hook::Constructor, [this] {
-        component_.reset(record_->create(definition_.name.c_str(), &context_));
+        component_.reset(record_->create(definition_->name.c_str(), &context_));
         return true;
     });
     accessTo(*component_).attach(context_);
@@ -115,9 +115,9 @@ Instance::~Instance() {
 }
 
 void Instance::setFirstParameters() {
-    auto batch = definition_.parameters;
+    auto batch = definition_->parameters;
     const auto& declared = accessTo(*component_).parameters();
-    for (const auto& [name, given, chosen] : definition_.inherited) {
+    for (const auto& [name, given, chosen] : definition_->inherited) {
         const auto names_it = [&name = name](const auto& setting) { return setting.first == name; };
         if (std::any_of(batch.begin(), batch.end(), names_it)) continue;
         const auto found = std::find_if(declared.begin(), declared.end(),
@@ -125,10 +125,10 @@ void Instance::setFirstParameters() {
                                             return parameter->declaration().name == name;
                                         });
         ParameterValue value = given;
-        const std::string why =
-            found == declared.end()
-                ? fmt::format("{}/{} has no such parameter", definition_.package, definition_.type)
-                : (*found)->check(value);
+        const std::string why = found == declared.end()
+                                    ? fmt::format("{}/{} has no such parameter",
+                                                  definition_->package, definition_->type)
+                                    : (*found)->check(value);
         if (why.empty()) {
             if (!sameValue(value, (*found)->declaration().default_value))
                 kept_parameters_.emplace_back(name, std::move(value));
@@ -140,8 +140,8 @@ void Instance::setFirstParameters() {
     batch.insert(batch.end(), kept_parameters_.begin(), kept_parameters_.end());
     for (StagedValue* value : stageParameters(batch)) value->commit();
     releaseStaged();
-    definition_.parameters = std::move(batch);
-    definition_.inherited.clear();
+    definition_->parameters = std::move(batch);
+    definition_->inherited.clear();
 }
 
 // Calls a hook. If it fails, throws an Error with the hook's error text, or the text of its
@@ -173,7 +173,7 @@ void Instance::callHook(Hook hook, const std::function<bool()>& call) {
         why = "it threw an exception of unknown type";
     }
     throw Error(kind, fmt::format("{} ({}/{}): {} failed: {}", context_.full_name,
-                                  definition_.package, definition_.type, hookName(hook), why));
+                                  definition_->package, definition_->type, hookName(hook), why));
 }
 
 void Instance::callLastHook(Hook hook, const std::function<void()>& call) noexcept {
@@ -217,20 +217,29 @@ void Instance::freezePorts() {
     accessTo(*component_).freeze();
     accessTo(*component_).stageOutputs([this](const OutputPort& output) {
         const TypeInfo& type = output.type();
-        return definition_.optional || !type.fixed_size || type.size > kLargestPutBack;
+        return definition_->optional || !type.fixed_size || type.size > kLargestPutBack;
     });
+    if (definition_->optional) statistics_->faults.taken_out.allocateText();
+    if (!accessTo(*component_).stagedOutputs().empty()) statistics_->faults.unsafe.allocateText();
     const auto mapped = [this](const std::string& port) {
-        std::string name = mappedName(port, definition_.ns, context_.full_name, definition_.remaps);
+        std::string name =
+            mappedName(port, definition_->ns, context_.full_name, definition_->remaps);
         requireLength("mapped name", name);
         return name;
     };
-    for (const InputPort* input : accessTo(*component_).inputs())
-        input_names_.push_back(mapped(input->name()));
-    for (const OutputPort* output : accessTo(*component_).outputs()) {
-        output_names_.push_back(mapped(output->name()));
+    const auto& inputs = accessTo(*component_).inputs();
+    const auto& outputs = accessTo(*component_).outputs();
+    auto ports = std::make_shared<std::vector<MappedPort>>();
+    ports->reserve(inputs.size() + outputs.size());
+    for (const InputPort* input : inputs)
+        ports->push_back({input->name(), mapped(input->name()), {}, &input->type(), false});
+    for (const OutputPort* output : outputs) {
+        ports->push_back(
+            {output->name(), mapped(output->name()), output->unit(), &output->type(), true});
         samples_.push_back(output->type().make_slot(output->sample()));
     }
-    for (const std::string& port : definition_.breaks) {
+    ports_ = std::move(ports);
+    for (const std::string& port : definition_->breaks) {
         if (findInput(port) != nullptr) continue;
         throw Error(ErrorKind::PortNotFound,
                     fmt::format("{} has no input {} to break", context_.full_name, port));
@@ -269,10 +278,10 @@ void Instance::cleanup() noexcept {
 
 std::vector<std::string> Instance::uselessRemaps() const {
     std::vector<std::string> useless;
-    for (const auto& [from, to] : definition_.remaps) {
-        const std::string resolved = resolveName(from, definition_.ns, context_.full_name);
+    for (const auto& [from, to] : definition_->remaps) {
+        const std::string resolved = resolveName(from, definition_->ns, context_.full_name);
         const auto is_port = [&](const auto* port) {
-            return resolveName(port->name(), definition_.ns, context_.full_name) == resolved;
+            return resolveName(port->name(), definition_->ns, context_.full_name) == resolved;
         };
         const auto& inputs = accessTo(*component_).inputs();
         const auto& outputs = accessTo(*component_).outputs();

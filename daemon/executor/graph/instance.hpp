@@ -20,6 +20,15 @@
 
 namespace rtcf::executor {
 
+/// A port of a component, with the name that it is mapped to. Types are never unloaded.
+struct MappedPort {
+    std::string name;
+    std::string mapped_name;
+    std::string unit;  ///< of an output
+    const TypeInfo* type;
+    bool output;
+};
+
 class Instance {
    public:
     /// Constructs the component and checks and sets its load-time parameters.
@@ -43,7 +52,11 @@ class Instance {
     void cleanup() noexcept;
     /// @}
 
-    const ComponentDefinition& definition() const noexcept { return definition_; }
+    const ComponentDefinition& definition() const noexcept { return *definition_; }
+    /// definition() for a view that may outlive the component.
+    std::shared_ptr<const ComponentDefinition> sharedDefinition() const noexcept {
+        return definition_;
+    }
     const std::string& fullName() const noexcept { return context_.full_name; }
     const Library& library() const noexcept { return *library_; }
     /// The library as a shared pointer, which keeps the code loaded.
@@ -54,9 +67,13 @@ class Instance {
     ComponentContext& context() noexcept { return context_; }
     const std::shared_ptr<ComponentStatistics>& statistics() const noexcept { return statistics_; }
 
-    /// Mapped names in the order of the component's inputs() and outputs(); after configure().
-    const std::vector<std::string>& inputNames() const noexcept { return input_names_; }
-    const std::vector<std::string>& outputNames() const noexcept { return output_names_; }
+    /// All inputs(), then all outputs() of the component. It may outlive the component. After
+    /// configure().
+    const std::shared_ptr<const std::vector<MappedPort>>& ports() const noexcept { return ports_; }
+    /// Position of an output in ports().
+    std::size_t placeOfOutput(std::size_t output) const noexcept {
+        return accessTo(*component_).inputs().size() + output;
+    }
     /// A slot with the output's capacity after configure(), to make copies from.
     const SlotHeader* sample(std::size_t output) const noexcept { return samples_[output].get(); }
     /// Remaps that match no port of the component; after configure().
@@ -105,7 +122,7 @@ class Instance {
     /// Calls a hook whose failure rejects nothing: errors are logged.
     void callLastHook(Hook hook, const std::function<void()>& call) noexcept;
 
-    ComponentDefinition definition_;
+    std::shared_ptr<ComponentDefinition> definition_;
     std::shared_ptr<const Library> library_;
     const ComponentRecord* record_;
     NamePattern ignore_;
@@ -159,8 +176,7 @@ class Instance {
     std::vector<ParameterValue> parameter_values_;
     std::vector<std::pair<std::string, ParameterValue>> kept_parameters_;
     std::vector<std::string> lost_parameters_;
-    std::vector<std::string> input_names_;
-    std::vector<std::string> output_names_;
+    std::shared_ptr<const std::vector<MappedPort>> ports_;
     std::vector<std::shared_ptr<SlotHeader>> samples_;
     bool configured_ = false;
     bool started_ = false;

@@ -304,7 +304,7 @@ bool Cycle::threw(const Step& step, const char* text) noexcept {
         endLoop(LoopFault::Kind::Exception, step.component, text);
         return false;
     }
-    turn.statistics->faults.taken_out.note(clock_.iteration, text);
+    turn.statistics->faults.taken_out.noteCopy(clock_.iteration, text);
     turn.statistics->faults.count.add(1);
     statistics_.faults.add(1);
     // If a commit threw, outputs committed before it already have the stamp of this cycle.
@@ -332,7 +332,7 @@ void Cycle::makeSafe(Component& component, ComponentStatistics& statistics,
         component.safe();
     }
     const auto keepBefore = [&](const char* text) {
-        statistics.faults.unsafe.note(clock_.iteration, text);
+        statistics.faults.unsafe.noteCopy(clock_.iteration, text);
         statistics.faults.count.add(1);
         statistics_.faults.add(1);
     };

@@ -7,8 +7,10 @@
 
 #include <array>
 #include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <memory>
 
 #include "rtcf/realtime.hpp"
 #include "statistics/counter.hpp"
@@ -34,19 +36,29 @@ struct LoopFault {
 /// A fault of a component that does not end the loop.
 struct ComponentFault {
     std::uint64_t iteration = 0;
-    std::array<char, 160> text{};
+    const char* text = "";
 };
 
 /// The first fault of one kind since the loop began, or since rearm().
 class FirstFault {
    public:
+    static constexpr std::size_t kTextSize = 160;  ///< of a copied text
+
+    /// Allocates the memory for the text of noteCopy(). Not real-time safe.
+    void allocateText() { copy_ = std::make_unique<std::array<char, kTextSize>>(); }
     /// Records the fault if it is the first. Cycle thread; real-time safe.
+    /// @param text must live as long as the record
     void note(std::uint64_t iteration, const char* text) noexcept RTCF_NONBLOCKING {
         // Acquire: pairs with rearm(), after which the previous fault has been read.
         if (state_.load(std::memory_order_acquire) != State::Empty) return;
-        fault_.iteration = iteration;
-        std::strncpy(fault_.text.data(), text, fault_.text.size() - 1);
+        fault_ = {iteration, text};
         state_.store(State::Noted, std::memory_order_release);
+    }
+    /// The same with a copy of the text, after allocateText().
+    void noteCopy(std::uint64_t iteration, const char* text) noexcept RTCF_NONBLOCKING {
+        if (state_.load(std::memory_order_acquire) != State::Empty) return;
+        if (copy_ != nullptr) std::strncpy(copy_->data(), text, kTextSize - 1);
+        note(iteration, copy_ != nullptr ? copy_->data() : "");
     }
     /// Takes the recorded fault. Graph thread.
     /// @return null if there is none, or it was taken before
@@ -68,13 +80,14 @@ class FirstFault {
     enum class State { Empty, Noted, Taken };
     std::atomic<State> state_{State::Empty};
     ComponentFault fault_;
+    std::unique_ptr<std::array<char, kTextSize>> copy_;
 };
 
 /// Faults of one component since the loop began.
 struct ComponentFaults {
     FirstFault not_finite;  ///< an output kept its last finite value; the text is the output's name
-    FirstFault taken_out;   ///< an optional component that threw
-    FirstFault unsafe;      ///< an output of safe() could not be copied for its readers
+    FirstFault taken_out;   ///< an optional component that threw; a copied text
+    FirstFault unsafe;      ///< an output of safe() could not be copied for its readers; likewise
     Counter count;          ///< number of all faults, also those not recorded
 
     /// While no cycle runs.

@@ -231,7 +231,7 @@ pb::ComponentInfo componentTo(const GraphView& graph, std::size_t position, Runn
     const ComponentView& component = *graph.components[position];
     pb::ComponentInfo info;
     info.set_full_name(component.full_name);
-    *info.mutable_spec() = specTo(component.definition);
+    *info.mutable_spec() = specTo(component.present());
     info.set_position(static_cast<std::uint32_t>(position));
     info.set_library(component.library);
     info.set_doc(component.doc);
@@ -241,20 +241,16 @@ pb::ComponentInfo componentTo(const GraphView& graph, std::size_t position, Runn
                                            ? pb::COMPONENT_STATE_RUNNING
                                            : pb::COMPONENT_STATE_CONFIGURED;
     info.set_state(component.fault.empty() ? healthy : pb::COMPONENT_STATE_FAULTED);
-    for (const PortView& port : component.ports) {
+    for (std::size_t i = 0; i < component.ports->size(); ++i) {
+        const MappedPort& port = (*component.ports)[i];
         pb::PortInfo& message = *info.add_ports();
         setPortType(message, port.name, port.output, *port.type);
         message.set_mapped_name(port.mapped_name);
         message.set_unit(port.unit);
-        const ConnectionView& connection = graph.connections.at(port.mapped_name);
-        message.set_connected(connection.writer.has_value() && !connection.readers.empty());
+        const ConnectionView& connection = graph.connectionOf(port);
+        message.set_connected(!connection.writers.empty() && !connection.readers.empty());
         message.set_mapped(port.output ? connection.published : connection.subscribed);
-        for (const EndpointView& reader : connection.readers) {
-            if (!port.output && reader.component == component.full_name &&
-                reader.port == port.name) {
-                message.set_broken(reader.broken);
-            }
-        }
+        message.set_broken(!port.output && graph.broken(position, i));
     }
     for (const ParameterView& parameter : component.parameters) {
         *info.add_parameters() = parameterTo(parameter.declaration, parameter.value);
@@ -287,18 +283,18 @@ void addValues(pb::ComponentInfo& info, const std::vector<Probe::Value>& values)
 
 v1::ListConnectionsResult connectionsTo(const GraphView& graph) {
     v1::ListConnectionsResult result;
-    const auto set = [](pb::Endpoint& message, const EndpointView& endpoint) {
-        message.set_component(endpoint.component);
-        message.set_port(endpoint.port);
+    const auto set = [&](pb::Endpoint& message, const EndpointView& endpoint) {
+        message.set_component(graph.components[endpoint.component]->full_name);
+        message.set_port(graph.portOf(endpoint).name);
         message.set_broken(endpoint.broken);
     };
-    for (const auto& [name, connection] : graph.connections) {
+    for (const ConnectionView& connection : graph.connections) {
         pb::Connection& message = *result.add_connections();
-        message.set_name(name);
-        message.set_type(connection.type);
-        if (connection.writer) set(*message.mutable_writer(), *connection.writer);
-        for (const EndpointView& writer : connection.other_writers)
-            set(*message.add_other_writers(), writer);
+        message.set_name(std::string(connection.name));
+        message.set_type(connection.type->name);
+        for (const EndpointView& writer : connection.writers)
+            set(message.has_writer() ? *message.add_other_writers() : *message.mutable_writer(),
+                writer);
         for (const EndpointView& reader : connection.readers) set(*message.add_readers(), reader);
         message.set_published(connection.published);
         message.set_subscribed(connection.subscribed);

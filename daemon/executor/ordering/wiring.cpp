@@ -50,12 +50,13 @@ class Collector {
     void addNode(std::size_t index) {
         const GraphNode& node = graph_.nodes()[index];
         const Instance& instance = *node.instance;
+        const auto& ports = *instance.ports();
+        const auto& inputs = accessTo(instance.component()).inputs();
         const auto& outputs = accessTo(instance.component()).outputs();
         for (std::size_t i = 0; i < outputs.size(); ++i)
-            addOutput(index, i, outputs[i], instance.outputNames()[i]);
-        const auto& inputs = accessTo(instance.component()).inputs();
+            addOutput(index, i, outputs[i], ports[inputs.size() + i].mapped_name);
         for (std::size_t i = 0; i < inputs.size(); ++i)
-            addInput(index, node, inputs[i], instance.inputNames()[i]);
+            addInput(index, node, inputs[i], ports[i].mapped_name);
     }
 
    private:

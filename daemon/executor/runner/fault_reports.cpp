@@ -3,7 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
+#include <cstddef>
+#include <string>
 #include <string_view>
 #include <utility>
 
@@ -15,14 +16,13 @@ namespace rtcf::executor {
 namespace {
 
 // The text of a fault. The cycle cuts it at the size of its array.
-template <std::size_t Size>
-std::string textOf(const std::array<char, Size>& array) {
-    const std::string_view text(array.data());
-    return std::string(text.size() < Size - 1 ? text : wholeCharacters(text));
+std::string textOf(const char* text, std::size_t array_size) {
+    const std::string_view whole(text);
+    return std::string(whole.size() < array_size - 1 ? whole : wholeCharacters(whole));
 }
 
 std::string whatFailed(const LoopFault& fault) {
-    const std::string text = textOf(fault.text);
+    const std::string text = textOf(fault.text.data(), fault.text.size());
     switch (fault.kind) {
         case LoopFault::Kind::NotFinite:
             return fmt::format("output {} is not finite", text);
@@ -75,7 +75,7 @@ void FaultReports::report(Instance& instance) {
     ComponentFaults& faults = instance.statistics()->faults;
     const auto say = [&](const ComponentFault* fault, const char* text, std::uint64_t more) {
         if (fault == nullptr) return;
-        const std::string of = textOf(fault->text);
+        const std::string of = textOf(fault->text, FirstFault::kTextSize);
         std::string what = fmt::vformat(text, fmt::make_format_args(of));
         if (more > 1) what += fmt::format("; {} times since the last report", more);
         instance.setFault(fmt::format("iteration {}: {}", fault->iteration, what));

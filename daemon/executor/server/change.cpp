@@ -53,7 +53,7 @@ ChangeOutcome change(Runner& runner, const v1::Request& request, const Progress&
             for (const auto& component : runner.graph()->components) {
                 if (component->full_name != name) continue;
                 return runner.replace(
-                    name, replacementFrom(request.replace().replacement(), component->definition),
+                    name, replacementFrom(request.replace().replacement(), component->present()),
                     request.replace().library(), request.replace().reset_parameters(), progress);
             }
             throw Error(ErrorKind::NotFound, fmt::format("no component {} to replace", name));

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "common/error.hpp"
 
 namespace rtcf::executor {
@@ -13,22 +15,12 @@ std::shared_ptr<const ComponentView> viewOf(const GraphNode& node) {
     auto result = std::make_shared<ComponentView>();
     result->instance = &instance;
     result->statistics = instance.statistics();
-    result->definition = instance.definition();
-    result->definition.breaks = node.breaks;
+    result->definition = instance.sharedDefinition();
+    result->breaks = node.breaks;
+    result->ports = instance.ports();
     result->full_name = instance.fullName();
     result->library = instance.library().path();
     result->doc = instance.record().doc;
-    const auto& inputs = accessTo(instance.component()).inputs();
-    const auto& outputs = accessTo(instance.component()).outputs();
-    result->ports.reserve(inputs.size() + outputs.size());
-    for (std::size_t i = 0; i < inputs.size(); ++i) {
-        result->ports.push_back(
-            {inputs[i]->name(), false, instance.inputNames()[i], &inputs[i]->type(), {}});
-    }
-    for (std::size_t i = 0; i < outputs.size(); ++i) {
-        result->ports.push_back({outputs[i]->name(), true, instance.outputNames()[i],
-                                 &outputs[i]->type(), outputs[i]->unit()});
-    }
     const auto& parameters = accessTo(instance.component()).parameters();
     result->parameters.reserve(parameters.size());
     for (std::size_t i = 0; i < parameters.size(); ++i) {
@@ -43,29 +35,84 @@ std::shared_ptr<const ComponentView> viewOf(const GraphNode& node) {
     return result;
 }
 
-ConnectionView viewOf(const Graph& graph, const ConnectionPlan& plan) {
-    const auto component = [&](std::size_t node) {
-        return graph.nodes()[node].instance->fullName();
-    };
-    ConnectionView result{plan.type->name, {}, {}, {}, plan.published, plan.subscribed};
-    if (plan.writer)
-        result.writer = {component(plan.writer->node), plan.writer->output->name(), false};
-    for (const Writer& writer : plan.others)
-        result.other_writers.push_back({component(writer.node), writer.output->name(), false});
-    result.readers.reserve(plan.readers.size());
-    for (const Reader& reader : plan.readers) {
-        result.readers.push_back({component(reader.node), reader.input->name(), reader.broken});
+// Adds the connections of a plan to a view that has its components.
+class ConnectionsAdder {
+   public:
+    ConnectionsAdder(const Plan& plan, GraphView& view)
+        : plan_(plan), view_(view), positions_(plan.wiring.order.size()) {
+        for (std::size_t i = 0; i < positions_.size(); ++i)
+            positions_[plan.wiring.order[i]] = static_cast<std::uint32_t>(i);
     }
-    return result;
-}
+
+    void addAll() {
+        std::size_t endpoints = 0;
+        for (const auto& component : view_.components) endpoints += component->ports->size();
+        view_.endpoints.reserve(endpoints);  // connections refer to them
+        view_.connections.reserve(plan_.wiring.connections.size());
+        for (const auto& [name, connection] : plan_.wiring.connections) add(connection);
+    }
+
+   private:
+    void add(const ConnectionPlan& plan) {
+        const EndpointView* const begin = end();
+        if (plan.writer) addWriter(*plan.writer);
+        for (const Writer& writer : plan.others) addWriter(writer);
+        const EndpointView* const readers = end();
+        for (const Reader& reader : plan.readers) addReader(reader);
+        view_.connections.push_back({view_.portOf(*begin).mapped_name,
+                                     plan.type,
+                                     {begin, readers},
+                                     {readers, end()},
+                                     plan.published,
+                                     plan.subscribed});
+    }
+    const EndpointView* end() const { return view_.endpoints.data() + view_.endpoints.size(); }
+    void addWriter(const Writer& writer) {
+        const Instance& instance = *plan_.graph.nodes()[writer.node].instance;
+        const std::size_t port = instance.placeOfOutput(writer.port);
+        view_.endpoints.push_back(
+            {positions_[writer.node], static_cast<std::uint32_t>(port), false});
+    }
+    void addReader(const Reader& reader) {
+        const Component& component = plan_.graph.nodes()[reader.node].instance->component();
+        const auto& inputs = accessTo(component).inputs();
+        const auto port = std::find(inputs.begin(), inputs.end(), reader.input) - inputs.begin();
+        view_.endpoints.push_back(
+            {positions_[reader.node], static_cast<std::uint32_t>(port), reader.broken});
+    }
+
+    const Plan& plan_;
+    GraphView& view_;
+    std::vector<std::uint32_t> positions_;  // in the order of execution, by node
+};
 
 }  // namespace
+
+ComponentDefinition ComponentView::present() const {
+    ComponentDefinition result = *definition;
+    result.breaks = breaks;
+    return result;
+}
 
 const ComponentView& GraphView::get(const std::string& full_name) const {
     for (const auto& component : components) {
         if (component->full_name == full_name) return *component;
     }
     throw Error(ErrorKind::NotFound, fmt::format("no component {} in this runner", full_name));
+}
+
+const ConnectionView& GraphView::connectionOf(const MappedPort& port) const {
+    return *std::lower_bound(connections.begin(), connections.end(), port.mapped_name,
+                             [](const ConnectionView& connection, const std::string& name) {
+                                 return connection.name < name;
+                             });
+}
+
+bool GraphView::broken(std::size_t component, std::size_t port) const {
+    for (const EndpointView& reader : connectionOf((*components[component]->ports)[port]).readers) {
+        if (reader.component == component && reader.port == port) return reader.broken;
+    }
+    return false;
 }
 
 std::shared_ptr<const GraphView> makeGraphView(const Plan& plan, const GraphView& previous,
@@ -80,14 +127,12 @@ std::shared_ptr<const GraphView> makeGraphView(const Plan& plan, const GraphView
         const bool same = found != known.end() &&
                           found->second->full_name == node.instance->fullName() &&
                           found->second->statistics == node.instance->statistics() &&
-                          found->second->definition.breaks == node.breaks &&
+                          found->second->breaks == node.breaks &&
                           found->second->fault == node.instance->faultText() &&
                           changed.count(node.instance->fullName()) == 0;
         result->components.push_back(same ? found->second : viewOf(node));
     }
-    for (const auto& [name, connection] : plan.wiring.connections) {
-        result->connections.emplace(name, viewOf(plan.graph, connection));
-    }
+    ConnectionsAdder(plan, *result).addAll();
     for (const auto& [name, tap] : plan.serialized_taps) result->taps.push_back(tap);
     for (const auto& [name, tap] : plan.frame_taps) result->taps.push_back(tap);
     for (const auto& [name, injector] : plan.injectors) result->injectors.push_back(injector);

@@ -3,26 +3,18 @@
 /// a new one after every change, so that a query never waits for a hook or for the loop.
 #pragma once
 
-#include <map>
+#include <cstddef>
+#include <cstdint>
 #include <memory>
-#include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "graph/definition.hpp"
 #include "ordering/plan.hpp"
 
 namespace rtcf::executor {
-
-/// A port of a component. Types are never unloaded.
-struct PortView {
-    std::string name;
-    bool output;
-    std::string mapped_name;
-    const TypeInfo* type;
-    std::string unit;
-};
 
 /// A declared state of a component.
 struct StateView {
@@ -33,45 +25,71 @@ struct StateView {
     std::string initial;
 };
 
-/// One component. Its statistics are shared, and it may outlive the component.
+/// One component. It shares what does not change with the component, which it may outlive.
 struct ComponentView : ParameterSet {
     const Instance* instance;  ///< for comparison only
     std::shared_ptr<const ComponentStatistics> statistics;
-    ComponentDefinition definition;  ///< with the present loop breaks
+    std::shared_ptr<const ComponentDefinition> definition;  ///< with the first loop breaks
+    std::set<std::string> breaks;                           ///< the present ones
+    std::shared_ptr<const std::vector<MappedPort>> ports;
     std::string library;
     std::string doc;
-    std::vector<PortView> ports;
     std::vector<StateView> states;
     std::string fault;
+
+    /// The definition with the present loop breaks.
+    ComponentDefinition present() const;
 };
 
 /// A port at one end of a connection.
 struct EndpointView {
-    std::string component;
-    std::string port;
-    bool broken;  ///< readers only: the connection is a loop break
+    std::uint32_t component;  ///< index into GraphView::components
+    std::uint32_t port;       ///< index into ComponentView::ports
+    bool broken;              ///< readers only: the connection is a loop break
+};
+
+/// Some endpoints of a graph view.
+struct EndpointRange {
+    const EndpointView* first;
+    const EndpointView* last;  ///< behind the last one
+    const EndpointView* begin() const noexcept { return first; }
+    const EndpointView* end() const noexcept { return last; }
+    bool empty() const noexcept { return first == last; }
 };
 
 /// The ports of one mapped name.
 struct ConnectionView {
-    std::string type;
-    std::optional<EndpointView> writer;
-    std::vector<EndpointView> other_writers;  ///< further writers of a name without a reader
-    std::vector<EndpointView> readers;
+    std::string_view name;  ///< text of one of its ports
+    const TypeInfo* type;
+    /// Several only if there is no reader.
+    EndpointRange writers;
+    EndpointRange readers;
     bool published;   ///< the bridge publishes its values
     bool subscribed;  ///< the bridge feeds it
 };
 
 /// The graph of one generation.
 struct GraphView {
+    GraphView() = default;
+    GraphView(const GraphView&) = delete;  // its connections refer to its endpoints
+    GraphView& operator=(const GraphView&) = delete;
+
     std::uint64_t generation = 0;
     std::vector<std::shared_ptr<const ComponentView>> components;  ///< in order of execution
-    std::map<std::string, ConnectionView> connections;
+    std::vector<ConnectionView> connections;                       ///< sorted by name
+    std::vector<EndpointView> endpoints;                           ///< of all connections
     std::vector<std::shared_ptr<Tap>> taps;
     std::vector<std::shared_ptr<const Injector>> injectors;
 
     /// @throws Error if there is no such component
     const ComponentView& get(const std::string& full_name) const;
+    const MappedPort& portOf(const EndpointView& endpoint) const noexcept {
+        return (*components[endpoint.component]->ports)[endpoint.port];
+    }
+    /// The connection of a port. Each port has one.
+    const ConnectionView& connectionOf(const MappedPort& port) const;
+    /// True if the connection of a component's input is a loop break.
+    bool broken(std::size_t component, std::size_t port) const;
 };
 
 /// Makes the graph view of `plan`. Unchanged components are shared with `previous`.

@@ -49,7 +49,8 @@ std::vector<Candidate> candidatesOf(const Plan& plan) {
             const TypeInfo& type = output.type();
             if (!type.fixed_size) continue;
             found.push_back({{instance.fullName(), output.name(), type.name, output.unit(),
-                              instance.outputNames()[port], &type, type.size, instance.code()},
+                              (*instance.ports())[instance.placeOfOutput(port)].mapped_name, &type,
+                              type.size, instance.code()},
                              sourceOf(type, *output.slot()),
                              !output.staged() || tapped.count(output.slot().get()) != 0});
         }

@@ -70,14 +70,16 @@ const std::vector<std::string>& Rosout::topicsOf(const std::string& component) {
     if (const auto graph = runner_->graph(); graph != graph_) {
         graph_ = graph;
         topics_.clear();
-        const auto add = [this](const std::string& of, const std::string& topic) {
-            auto& topics = topics_[of];
-            if (topics.empty() || topics.back() != topic) topics.push_back(topic);
-        };
-        for (const auto& [topic, connection] : graph->connections) {
-            if (connection.published && connection.writer) add(connection.writer->component, topic);
-            if (!connection.subscribed) continue;
-            for (const auto& reader : connection.readers) add(reader.component, topic);
+        for (const executor::ConnectionView& connection : graph->connections) {
+            const auto add = [&](const executor::EndpointRange& endpoints) {
+                for (const executor::EndpointView& endpoint : endpoints) {
+                    auto& topics = topics_[graph->components[endpoint.component]->full_name];
+                    if (topics.empty() || topics.back() != connection.name)
+                        topics.emplace_back(connection.name);
+                }
+            };
+            if (connection.published) add(connection.writers);
+            if (connection.subscribed) add(connection.readers);
         }
     }
     const auto found = topics_.find(component);

@@ -85,42 +85,40 @@ rtcf_msgs::GetLoop::Response describeRunner(const executor::RunnerView& runner) 
     response.overruns = statistics.overruns.value();
     response.generation = graph->generation;
     response.degraded = present.degraded;
-    for (const auto& component : graph->components) {
+    for (std::size_t place = 0; place < graph->components.size(); ++place) {
+        const auto& component = graph->components[place];
         rtcf_msgs::LoopComponent info;
         info.name = component->full_name;
-        info.package = component->definition.package;
-        info.type = component->definition.type;
-        info.is_first = component->definition.first ? 1 : 0;
+        info.package = component->definition->package;
+        info.type = component->definition->type;
+        info.is_first = component->definition->first ? 1 : 0;
         info.fault = component->fault;
-        for (const executor::PortView& port : component->ports) {
+        for (std::size_t i = 0; i < component->ports->size(); ++i) {
+            const executor::MappedPort& port = (*component->ports)[i];
             rtcf_msgs::LoopPort line;
             line.direction = port.output ? rtcf_msgs::LoopPort::OUTPUT : rtcf_msgs::LoopPort::INPUT;
             line.name = port.name;
             line.mapped_name = port.mapped_name;
             line.type = port.type->name;
-            if (const auto found = graph->connections.find(port.mapped_name);
-                found != graph->connections.end()) {
-                const executor::ConnectionView& connection = found->second;
-                line.connected = connection.writer && !connection.readers.empty() ? 1 : 0;
-                const bool mapped = connection.published || (!port.output && connection.subscribed);
-                line.mapped = mapped ? 1 : 0;
-                for (const executor::EndpointView& reader : connection.readers) {
-                    const bool same =
-                        reader.component == component->full_name && reader.port == port.name;
-                    if (same && !port.output) line.broken = reader.broken ? 1 : 0;
-                }
-            }
+            const executor::ConnectionView& connection = graph->connectionOf(port);
+            line.connected = !connection.writers.empty() && !connection.readers.empty() ? 1 : 0;
+            const bool mapped = connection.published || (!port.output && connection.subscribed);
+            line.mapped = mapped ? 1 : 0;
+            line.broken = !port.output && graph->broken(place, i) ? 1 : 0;
             info.ports.push_back(std::move(line));
         }
         response.component_order.push_back(info.name);
         response.components.push_back(std::move(info));
     }
-    for (const auto& [name, connection] : graph->connections) {
+    for (const executor::ConnectionView& connection : graph->connections) {
+        const auto name = [&](const executor::EndpointView& endpoint) {
+            return graph->components[endpoint.component]->full_name;
+        };
         rtcf_msgs::LoopConnection info;
-        info.name = name;
-        info.type = connection.type;
-        if (connection.writer) info.writer = connection.writer->component;
-        for (const auto& reader : connection.readers) info.readers.push_back(reader.component);
+        info.name = connection.name;
+        info.type = connection.type->name;
+        if (!connection.writers.empty()) info.writer = name(*connection.writers.begin());
+        for (const auto& reader : connection.readers) info.readers.push_back(name(reader));
         info.published = connection.published ? 1 : 0;
         info.subscribed = connection.subscribed ? 1 : 0;
         response.connections.push_back(std::move(info));

@@ -167,6 +167,23 @@ def test_code_that_differs_from_the_interpreter_is_rejected_by_default(
         client.unload(["Counts"])
 
 
+def test_a_rtcfd_that_does_not_search_the_cache_is_named(
+    tmp_path: Path, daemon: Daemon, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source = tmp_path / "counts.py"
+    source.write_text(COUNTS.replace("STEP", "1"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "other"))
+    done = daemon.ctl("load", str(source), "Counts")
+    assert done.returncode == 1
+    line = done.stderr.rstrip("\n")
+    assert line == (
+        f"rtcfctl: this rtcfd does not load libraries from {tmp_path}/other/rtcf-components: only a "
+        "private rtcfd of the same user does, see `rtcfctl run`; for the system's rtcfd, add the "
+        "folder to `path` in /etc/rtcfd/rtcfd.toml, or use "
+        f"`rtcf-compile {source} -o FOLDER/PACKAGE/NAME.so`"
+    )
+
+
 def test_a_saved_source_that_differs_does_not_change_the_loop(
     tmp_path: Path, daemon: Daemon, client: rtcf.Client
 ) -> None:

@@ -50,7 +50,7 @@ TEST_F(RttCompat, PortsOfConstructorAndConfigureHookExist) {
     loadOld("Reader", "R");
     std::vector<std::string> names;
     const auto graph = runner().graph();
-    for (const auto& port : graph->get("/R").ports) names.push_back(port.name);
+    for (const auto& port : *graph->get("/R").ports) names.push_back(port.name);
     EXPECT_EQ(names, (std::vector<std::string>{"in", "flow", "copied", "copied_old", "connected"}));
 }
 

@@ -124,7 +124,7 @@ void RunnerFixture::configure(const std::function<void(RunnerSettings&)>& change
 
 double RunnerFixture::value(const std::string& component, const std::string& port) {
     const auto graph = runner_->graph();
-    const auto& ports = graph->get(component).ports;
+    const auto& ports = *graph->get(component).ports;
     std::vector<executor::Probe::Value> values;
     // A query waits 0.1 s for the loop, which other load may delay longer.
     EXPECT_TRUE(eventually([&] {
