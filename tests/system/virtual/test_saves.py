@@ -31,8 +31,6 @@ class Follower(Component):
         self.x[:] = 0.9 * np.roll(self.x, 1) + {gain}
         self.y.write(self.kp * (self.x @ self.x))
 """
-
-
 CACHE = Path("/srv/cache")
 # The system's rtcfd searches no user's cache by itself.
 SETTINGS = f'[daemon]\npath = ["{CACHE}/rtcf-components"]\n[runner.ros]\nenabled = false\n'
