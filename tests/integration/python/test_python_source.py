@@ -177,9 +177,9 @@ def test_a_rtcfd_that_does_not_search_the_cache_is_named(
     assert done.returncode == 1
     line = done.stderr.rstrip("\n")
     assert line == (
-        f"rtcfctl: this rtcfd does not load libraries from {tmp_path}/other/rtcf-components: only a "
-        "private rtcfd of the same user does, see `rtcfctl run`; for the system's rtcfd, add the "
-        "folder to `path` in /etc/rtcfd/rtcfd.toml, or use "
+        f"rtcfctl: this rtcfd does not load libraries from {tmp_path}/other/rtcf-components: "
+        "only a private rtcfd of the same user does, see `rtcfctl run`; for the system's rtcfd, "
+        "add the folder to `path` in /etc/rtcfd/rtcfd.toml, or use "
         f"`rtcf-compile {source} -o FOLDER/PACKAGE/NAME.so`"
     )
 
