@@ -82,12 +82,8 @@ def load(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         raise ValueError("--watch requires a Python source: rtcfctl load FILE.py COMPONENT --watch")
     changes = python_source.changes(args.package) if args.watch else None
     spec = _spec(args, output)
-    try:
+    with python_source.found_by_rtcfd(args.package):
         result = client.load(spec, args.runner, output.progress, wait=args.wait)
-    except rtcf.RefusedError as error:
-        if error.reason != "PACKAGE_NOT_FOUND" or not python_source.is_source(args.package):
-            raise
-        raise python_source.not_searched(args.package) from None
     output.changed(f"loaded {result.component}", result)
     if changes is not None:
         sys.stdout.flush()
@@ -110,7 +106,8 @@ def watch(
         try:
             spec = _spec(args, output)
             # As the command line does not change, tuned parameters keep their values.
-            result = client.replace(name, spec, args.runner, output.progress, given_before=spec)
+            with python_source.found_by_rtcfd(args.package):
+                result = client.replace(name, spec, args.runner, output.progress, given_before=spec)
         except (rtcf.RefusedError, python_source.NotCompiledError) as error:
             # The loop continues with the present component.
             output.line(f"rtcfctl: {error}", to=sys.stderr)
@@ -140,13 +137,11 @@ def replace(client: rtcf.Client, args: argparse.Namespace, output: Output) -> No
     """Replace a component."""
     if args.rebuilt == bool(args.type):
         raise ValueError("replace: specify PKG COMPONENT or --rebuilt")
-    result = client.replace(
-        args.old,
-        _spec(args, output),
-        args.runner,
-        output.progress,
-        reset_parameters=args.reset_parameters,
-    )
+    spec = _spec(args, output)
+    with python_source.found_by_rtcfd(args.package):
+        result = client.replace(
+            args.old, spec, args.runner, output.progress, reset_parameters=args.reset_parameters
+        )
     output.changed(f"replaced {args.old} by {result.component}{_kept(result)}", result)
 
 

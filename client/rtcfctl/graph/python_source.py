@@ -13,6 +13,7 @@ import subprocess
 import sysconfig
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import rtcf
@@ -82,13 +83,22 @@ def compiled(
     return package
 
 
-def not_searched(source: str) -> NotCompiledError:
-    """Return the error for a rtcfd that does not search the folder of compiled libraries."""
-    return NotCompiledError(
-        f"this rtcfd does not load libraries from {compiled_folder()}: only a private rtcfd of the "
-        "same user does, see `rtcfctl run`; for the system's rtcfd, add the folder to `path` in "
-        f"/etc/rtcfd/rtcfd.toml, or use `rtcf-compile {source} -o FOLDER/PACKAGE/NAME.so`"
-    )
+@contextmanager
+def found_by_rtcfd(source: str) -> Iterator[None]:
+    """Add the remedy to the error of an rtcfd that does not search the compiled libraries.
+
+    `source` is the package argument; nothing changes if it is a package.
+    """
+    try:
+        yield
+    except rtcf.RefusedError as error:
+        if error.reason != "PACKAGE_NOT_FOUND" or not is_source(source):
+            raise
+        raise NotCompiledError(
+            f"{error}: only a private rtcfd with the same cache folder searches "
+            f"{compiled_folder()}, as that of `rtcfctl run`; for this rtcfd, compile into one of "
+            f"its folders: `rtcf-compile {source} -o FOLDER/PACKAGE/NAME.so`"
+        ) from None
 
 
 def _ros_name(stem: str) -> str:

@@ -15,7 +15,7 @@ namespace rtcf::executor {
 
 namespace {
 
-// The text of a fault. The cycle cuts it at the size of its array.
+// The text of a fault. The cycle cuts a copied text at the size of its array.
 std::string textOf(const char* text, std::size_t array_size) {
     const std::string_view whole(text);
     return std::string(whole.size() < array_size - 1 ? whole : wholeCharacters(whole));

@@ -167,21 +167,24 @@ def test_code_that_differs_from_the_interpreter_is_rejected_by_default(
         client.unload(["Counts"])
 
 
-def test_a_rtcfd_that_does_not_search_the_cache_is_named(
-    tmp_path: Path, daemon: Daemon, monkeypatch: pytest.MonkeyPatch
+def test_an_rtcfd_that_does_not_search_the_cache_names_the_remedy(
+    tmp_path: Path, daemon: Daemon, client: rtcf.Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     source = tmp_path / "counts.py"
     source.write_text(COUNTS.replace("STEP", "1"))
+    client.load(rtcf.component("rtcf_examples", "Identity", name="I"))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "other"))
-    done = daemon.ctl("load", str(source), "Counts")
-    assert done.returncode == 1
-    line = done.stderr.rstrip("\n")
-    assert line == (
-        f"rtcfctl: this rtcfd does not load libraries from {tmp_path}/other/rtcf-components: "
-        "only a private rtcfd of the same user does, see `rtcfctl run`; for the system's rtcfd, "
-        "add the folder to `path` in /etc/rtcfd/rtcfd.toml, or use "
-        f"`rtcf-compile {source} -o FOLDER/PACKAGE/NAME.so`"
-    )
+    for verb in (["load"], ["replace", "I"]):
+        done = daemon.ctl(*verb, str(source), "Counts")
+        assert done.returncode == 1
+        assert re.fullmatch(
+            r'rtcfctl: no package "counts_\w+" with component libraries in .+: only a private '
+            rf"rtcfd with the same cache folder searches {tmp_path}/other/rtcf-components, as "
+            r"that of `rtcfctl run`; for this rtcfd, compile into one of its folders: "
+            rf"`rtcf-compile {source} -o FOLDER/PACKAGE/NAME\.so`\n",
+            done.stderr,
+        ), done.stderr
+    assert client.get_order() == ["/I"]
 
 
 def test_a_saved_source_that_differs_does_not_change_the_loop(

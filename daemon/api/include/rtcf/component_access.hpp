@@ -25,7 +25,6 @@ class ComponentAccess {
     /// Sets the context. Before configure(); not real-time.
     void attach(ComponentContext& context) const noexcept { component_.context_ = &context; }
     ComponentContext& context() const noexcept RTCF_NONBLOCKING { return *component_.context_; }
-    const LoopClock& clock() const noexcept RTCF_NONBLOCKING { return *context().clock; }
     /// Sets the loop time of the next hook, > 0, the stamp of its writes. Real-time safe.
     void setTime(std::int64_t time_ns) const noexcept RTCF_NONBLOCKING {
         component_.now_ = time_ns;

@@ -91,7 +91,7 @@ class LogMemory {
         std::atomic<const LogSite*> site{nullptr};
         std::atomic<std::int64_t> next_ns{std::numeric_limits<std::int64_t>::min()};
     };
-    std::array<Entry, 8> entries_;
+    std::array<Entry, 32> entries_;
 };
 
 namespace detail {
