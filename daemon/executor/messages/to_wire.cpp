@@ -248,7 +248,7 @@ pb::ComponentInfo componentTo(const GraphView& graph, std::size_t position, Runn
         message.set_mapped_name(port.mapped_name);
         message.set_unit(port.unit);
         const ConnectionView& connection = graph.connectionOf(port);
-        message.set_connected(!connection.writers.empty() && !connection.readers.empty());
+        message.set_connected(connection.connected());
         message.set_mapped(port.output ? connection.published : connection.subscribed);
         message.set_broken(!port.output && graph.broken(position, i));
     }

@@ -51,10 +51,10 @@ class Collector {
         const GraphNode& node = graph_.nodes()[index];
         const Instance& instance = *node.instance;
         const auto& ports = *instance.ports();
-        const auto& inputs = accessTo(instance.component()).inputs();
         const auto& outputs = accessTo(instance.component()).outputs();
         for (std::size_t i = 0; i < outputs.size(); ++i)
-            addOutput(index, i, outputs[i], ports[inputs.size() + i].mapped_name);
+            addOutput(index, i, outputs[i], ports[instance.placeOfOutput(i)].mapped_name);
+        const auto& inputs = accessTo(instance.component()).inputs();
         for (std::size_t i = 0; i < inputs.size(); ++i)
             addInput(index, node, inputs[i], ports[i].mapped_name);
     }

@@ -25,7 +25,7 @@ struct StateView {
     std::string initial;
 };
 
-/// One component. It shares what does not change with the component, which it may outlive.
+/// One component. It may outlive the component, and shares its definition, ports and statistics.
 struct ComponentView : ParameterSet {
     const Instance* instance;  ///< for comparison only
     std::shared_ptr<const ComponentStatistics> statistics;
@@ -66,6 +66,8 @@ struct ConnectionView {
     EndpointRange readers;
     bool published;   ///< the bridge publishes its values
     bool subscribed;  ///< the bridge feeds it
+
+    bool connected() const noexcept { return !writers.empty() && !readers.empty(); }
 };
 
 /// The graph of one generation.

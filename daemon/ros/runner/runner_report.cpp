@@ -101,7 +101,7 @@ rtcf_msgs::GetLoop::Response describeRunner(const executor::RunnerView& runner) 
             line.mapped_name = port.mapped_name;
             line.type = port.type->name;
             const executor::ConnectionView& connection = graph->connectionOf(port);
-            line.connected = !connection.writers.empty() && !connection.readers.empty() ? 1 : 0;
+            line.connected = connection.connected() ? 1 : 0;
             const bool mapped = connection.published || (!port.output && connection.subscribed);
             line.mapped = mapped ? 1 : 0;
             line.broken = !port.output && graph->broken(place, i) ? 1 : 0;

@@ -6,14 +6,17 @@ import pytest
 from local_machine import LocalMachine
 from loop_2khz import Loop
 
-# No ROS master exists here; all other settings are the defaults.
-_SETTINGS = "[runner.ros]\nenabled = false\n"
+
+@pytest.fixture
+def settings() -> str:
+    """Return the settings: no ROS master exists here; all others are the defaults."""
+    return "[runner.ros]\nenabled = false\n"
 
 
 @pytest.fixture
-def loop() -> Iterator[Loop]:
+def loop(settings: str) -> Iterator[Loop]:
     """Yield the service with a loop running at 2 kHz."""
-    loop = Loop(LocalMachine(), _SETTINGS)
+    loop = Loop(LocalMachine(), settings)
     loop.reset()
     loop.begin()
     yield loop

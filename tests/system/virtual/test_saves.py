@@ -8,10 +8,8 @@ from pathlib import Path
 
 import pytest
 import rtcf
-from local_machine import LocalMachine
 from loop_2khz import FREQUENCY_HZ, Loop
 from machine import wait_for
-from rtcf.v1 import graph_pb2
 
 SAVES = 20
 DEADLINE_S = 600.0  # of emulated time
@@ -32,19 +30,13 @@ class Follower(Component):
         self.y.write(self.kp * (self.x @ self.x))
 """
 CACHE = Path("/srv/cache")
-# The system's rtcfd searches no user's cache by itself.
-SETTINGS = f'[daemon]\npath = ["{CACHE}/rtcf-components"]\n[runner.ros]\nenabled = false\n'
 
 
 @pytest.fixture
-def loop() -> Iterator[Loop]:
-    """Yield the service with a loop, and with the folder of compiled libraries in its path."""
+def settings(settings: str) -> str:
+    """Add the folder of compiled libraries: the system's rtcfd searches no user's cache."""
     (CACHE / "rtcf-components").mkdir(parents=True, exist_ok=True)
-    loop = Loop(LocalMachine(), SETTINGS)
-    loop.reset()
-    loop.begin()
-    yield loop
-    loop.reset()
+    return f'[daemon]\npath = ["{CACHE}/rtcf-components"]\n{settings}'
 
 
 @contextmanager
@@ -94,8 +86,7 @@ def test_saves_of_a_python_component(loop: Loop, tmp_path: Path) -> None:
     before = loop.now()
     with watching(source, said), rtcf.Client() as client:
         wait_until_said(said, "loaded /Follower")
-        value = graph_pb2.ParameterValue(double_value=3.0)
-        client.set_parameters("Follower", [graph_pb2.ParameterSetting(name="kp", value=value)])
+        client.set_parameters("Follower", [rtcf.parse_parameter("kp:=3.0")])
         without = cycles_without(client, loop)
         for number in range(1, SAVES + 1):
             save(source, number / 8)
