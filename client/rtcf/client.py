@@ -294,10 +294,17 @@ class Client(Closing):
         parameters: Iterable[graph_pb2.ParameterSetting],
         runner: str = "",
         on_progress: OnProgress | None = None,
+        lists: Iterable[graph_pb2.ListLength] = (),
     ) -> control_pb2.ChangeResult:
-        """Set parameters of a component, all at one cycle boundary."""
+        """Set parameters of a component, all at one cycle boundary.
+
+        lists  lists of which `parameters` has the elements; they set the sizes of vectors
+        """
         request = control_pb2.SetParametersRequest(
-            runner=runner, component=component, parameters=several("parameters", parameters)
+            runner=runner,
+            component=component,
+            parameters=several("parameters", parameters),
+            lists=several("lists", lists),
         )
         return self._connection.changed(self._stub.SetParameters, request, on_progress)
 

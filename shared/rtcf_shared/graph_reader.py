@@ -4,7 +4,7 @@ docs/graph-files.md describes the format.  Scalars have the types of YAML 1.2 (s
 spec.py), so that a graph file and the command line agree.
 """
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, MutableSequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -119,7 +119,7 @@ class _Reader:
             elif key == "parameters":
                 found: dict[str, graph_pb2.ParameterValue] = {}
                 for name, (_, content) in self._mapping(value, key).items():
-                    self._parameters(name, content, found)
+                    self._parameters(name, content, found, spec.lists)
                 for name, each in found.items():
                     spec.parameters.add(name=name, value=each)
             elif key == "breaks":
@@ -129,27 +129,33 @@ class _Reader:
         return spec
 
     def _parameters(
-        self, name: str, node: Any, found: dict[str, graph_pb2.ParameterValue], depth: int = 0
+        self,
+        name: str,
+        node: Any,
+        found: dict[str, graph_pb2.ParameterValue],
+        lists: MutableSequence[graph_pb2.ListLength],
+        depth: int = 0,
     ) -> None:
         """Add the parameters that a value sets, as flat() of spec.py."""
         # Aliases may contain themselves, or each other many times.
         if depth > _DEEPEST:
             raise self._error(node, f"more than {_DEEPEST} mappings or lists in each other")
-        if len(found) > _MOST_PARAMETERS:
+        if len(found) + len(lists) > _MOST_PARAMETERS:
             raise self._error(node, f"a component has more than {_MOST_PARAMETERS} parameters")
         if node.id == "scalar":
             if name in found:
                 raise self._error(node, f"parameters.{name} is set twice")
             found[name] = self._value(node, f"parameters.{name}")
             return
-        if not node.value:
-            raise self._error(node, f"parameters.{name} is empty")
         if node.id == "mapping":
+            if not node.value:
+                raise self._error(node, f"parameters.{name} is empty")
             for key, (_, member) in self._mapping(node, f"parameters.{name}").items():
-                self._parameters(f"{name}/{key}", member, found, depth + 1)
+                self._parameters(f"{name}/{key}", member, found, lists, depth + 1)
         else:
+            lists.append(graph_pb2.ListLength(name=name, length=len(node.value)))
             for index, element in enumerate(node.value):
-                self._parameters(f"{name}_{index}", element, found, depth + 1)
+                self._parameters(f"{name}_{index}", element, found, lists, depth + 1)
 
     def _message(self, node: Any, where: str, message: Any) -> None:
         """Set the fields of a settings message by the keys of a mapping."""

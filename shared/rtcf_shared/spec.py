@@ -6,7 +6,7 @@ always a string.
 """
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, MutableSequence
 from typing import TypeVar
 
 from rtcf.v1 import control_pb2, graph_pb2
@@ -105,21 +105,24 @@ def parse_value(text: str) -> graph_pb2.ParameterValue:
     return graph_pb2.ParameterValue(string_value=_unquoted(text))
 
 
-def flat(name: str, value: object) -> Iterator[tuple[str, object]]:
+def flat(
+    name: str, value: object, lists: MutableSequence[graph_pb2.ListLength]
+) -> Iterator[tuple[str, object]]:
     """Yield the parameters that a value sets: those of a group for a mapping, `gains/p`, and the
-    elements of an array for a list or a NumPy array, `gains_0`.
+    elements of an array or vector for a list or a NumPy array, `gains_0`.
 
-    Raises ValueError for an empty mapping or list.
+    `lists` gets the lists.  Raises ValueError for an empty mapping.
     """
     value = value.tolist() if hasattr(value, "tolist") else value
-    if isinstance(value, Mapping | list | tuple) and not value:
-        raise ValueError(f"{name} is empty")
     if isinstance(value, Mapping):
+        if not value:
+            raise ValueError(f"{name} is empty")
         for key, member in value.items():
-            yield from flat(f"{name}/{key}", member)
+            yield from flat(f"{name}/{key}", member, lists)
     elif isinstance(value, list | tuple):
+        lists.append(graph_pb2.ListLength(name=name, length=len(value)))
         for index, element in enumerate(value):
-            yield from flat(f"{name}_{index}", element)
+            yield from flat(f"{name}_{index}", element, lists)
     else:
         yield name, value
 

@@ -100,8 +100,7 @@ def settings(
     """
     slips: list[str] = []
     given: dict[str, Any] = {}
-    # Lists last: they override values that somebody has left under the names of their elements.
-    for name, value in sorted(others.items(), key=lambda each: isinstance(each[1], list)):
+    for name, value in _lists_last(others):
         for part, leaf in _parts(name, value, declared, slips):
             if part in given:
                 slips.append(f"~{part} is ignored: ~{name} sets it, too")
@@ -121,16 +120,16 @@ def settings(
 
 
 def _parts(
-    name: str, value: Any, declared: Collection[str], slips: list[str]
+    name: str, value: Any, declared: Mapping[str, graph_pb2.ParameterInfo], slips: list[str]
 ) -> Iterator[tuple[str, Any]]:
-    """Yield the members of a declared group, the elements of a declared array, or else the value
-    as it is; add a warning for each value that cannot be one of these.
+    """Yield the members of a declared group, the elements of a declared array or vector (with its
+    size), or else the value as it is; add a warning for each value that cannot be one of these.
     """
     if name in declared:
         yield name, value
     elif _is_group(name, declared):
         if isinstance(value, Mapping):
-            for key, member in value.items():
+            for key, member in _lists_last(value):
                 yield from _parts(f"{name}/{key}", member, declared, slips)
         else:
             slips.append(f"~{name} is a group of parameters: set ~{name}/NAME")
@@ -138,14 +137,24 @@ def _parts(
         if not isinstance(value, list):
             slips.append(f"~{name} is an array: set a list, or its elements ~{name}_0 …")
             return
-        for index, element in enumerate(value):
-            part = f"{name}_{index}"
+        taken = 0
+        for element in value:
+            part = f"{name}_{taken}"
             if part not in declared and not _is_array(part, declared):
-                slips.append(f"~{name} has {len(value)} values: the component takes {index}")
-                return
+                slips.append(f"~{name} has {len(value)} values: the component takes {taken}")
+                break
             yield from _parts(part, element, declared, slips)
+            taken += 1
+        for size in (each.name for each in declared.values() if each.vector == name):
+            yield size, taken
     else:
         yield name, value
+
+
+def _lists_last(values: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    """Return the values, so that lists override what somebody has left under the names of their
+    elements."""
+    return sorted(values.items(), key=lambda each: isinstance(each[1], list))
 
 
 def _is_group(name: str, declared: Iterable[str]) -> bool:

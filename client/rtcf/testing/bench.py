@@ -6,7 +6,7 @@ possible. The same inputs always result in bit-identical outputs.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, MutableSequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -114,9 +114,12 @@ class Bench(Closing):
     def set(self, component: str = "", **values: Any) -> None:
         """Set parameters of `component` (default: the only one) for the next runs.
 
-        A mapping sets the members of a group, a list or NumPy array the elements of an array.
+        A mapping sets the members of a group, a list or NumPy array the elements of an array or
+        a vector, and the vector's size.
         """
-        self._client.set_parameters(component or self._only().full_name, _settings(values))
+        lists: list[graph_pb2.ListLength] = []
+        settings = _settings(values, lists)
+        self._client.set_parameters(component or self._only().full_name, settings, lists=lists)
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -264,12 +267,14 @@ def _graph_of(what: str, parameters: Mapping[str, Any]) -> Graph:
     if not (package and slash and kind):
         raise ValueError(f'"{what}" is neither PACKAGE/TYPE nor a graph file (.yaml)')
     spec = rtcf_shared.spec.component(package, kind)
-    spec.parameters.extend(_settings(parameters))
+    spec.parameters.extend(_settings(parameters, spec.lists))
     return Graph(components=[spec])
 
 
-def _settings(values: Mapping[str, Any]) -> list[graph_pb2.ParameterSetting]:
-    given = (rtcf_shared.spec.flat(*each) for each in values.items())
+def _settings(
+    values: Mapping[str, Any], lists: MutableSequence[graph_pb2.ListLength]
+) -> list[graph_pb2.ParameterSetting]:
+    given = (rtcf_shared.spec.flat(*each, lists) for each in values.items())
     return [_setting(name, value) for each in given for name, value in each]
 
 

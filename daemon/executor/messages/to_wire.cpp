@@ -24,6 +24,7 @@ pb::ParameterInfo parameterTo(const ParameterDeclaration& declaration,
     info.set_doc(declaration.doc);
     for (const Choice& choice : declaration.choices) info.add_choices(choice.name);
     info.set_type(declaration.type);
+    info.set_vector(declaration.vectorName());
     return info;
 }
 

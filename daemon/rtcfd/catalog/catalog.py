@@ -17,9 +17,10 @@ from rtcf_shared.folders import packages
 from rtcf_shared.naming import closest, listing, suggestion
 
 from rtcfd.catalog.describe import Describer
+from rtcfd.common import declared_values
 from rtcfd.common.background import WorkerThreads
 from rtcfd.common.errors import FailedPrecondition, NotFound
-from rtcfd.common.names import check_base_name
+from rtcfd.common.names import check_base_name, full_name
 
 _FOLDERS_TIMEOUT_S = 10.0
 
@@ -59,8 +60,13 @@ class Library:
             f"not {', '.join(self.others)}"
         )
 
+    def set_vector_sizes(self, spec: graph_pb2.ComponentSpec) -> None:
+        """Set the vectors of a component that are given as lists; see declared_values.py."""
+        declared_values.set_vector_sizes(full_name(spec), spec, self.parameters)
+
     def load(self, spec: graph_pb2.ComponentSpec) -> wire.Load:
-        """Return the request to load a component from this library."""
+        """Return the request to load a component from this library; sets its `lists`."""
+        self.set_vector_sizes(spec)
         return wire.Load(component=spec, library=self.path, owner=self.owner)
 
 

@@ -5,9 +5,9 @@ when the component is loaded.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
-from rtcf.v1 import errors_pb2, graph_pb2
+from rtcf.v1 import control_pb2, errors_pb2, graph_pb2
 from rtcf_shared.graph_writer import same_value
 from rtcf_shared.naming import closest, listing, suggestion
 
@@ -49,6 +49,40 @@ def check(
             component=component,
             parameter=setting.name,
         )
+
+
+def set_vector_sizes(
+    component: str,
+    given: graph_pb2.ComponentSpec | control_pb2.SetParametersRequest,
+    declared: Iterable[graph_pb2.ParameterInfo],
+) -> None:
+    """Set the size of each vector that a list sets, and clear `lists`.
+
+    Raises InvalidArgument for a list that is too long, one that contradicts a size that is set,
+    too, and for an empty one that is no vector.
+    """
+    sizes = {each.vector: each for each in declared if each.vector}
+    values = {each.name: each.value for each in given.parameters}
+    for name, length in ((each.name, each.length) for each in given.lists):
+        size = sizes.get(name)
+        why = ""
+        if size is None:
+            why = "" if length else "an empty list: only a vector can be empty"
+        elif length > size.maximum:
+            why = f"a list of length {length}: it takes at most {size.maximum:g} elements"
+        elif size.name not in values:
+            value = graph_pb2.ParameterValue(int_value=length)
+            given.parameters.append(graph_pb2.ParameterSetting(name=size.name, value=value))
+        elif values[size.name].int_value != length:
+            why = f"a list of length {length}, but {size.name} is set, too, to another number"
+        if why:
+            raise InvalidArgument(
+                f"{component}: parameter {name} is {why}",
+                errors_pb2.REASON_VALUE_INVALID,
+                component=component,
+                parameter=name,
+            )
+    given.ClearField("lists")
 
 
 def _problem(value: graph_pb2.ParameterValue, declared: graph_pb2.ParameterInfo) -> str:

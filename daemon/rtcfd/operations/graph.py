@@ -143,6 +143,7 @@ async def replace(
     async def replace_request() -> wire.Request:
         nonlocal kept
         spec.CopyFrom(replacement(runner.desired.components.get(old), given))
+        library.set_vector_sizes(spec)
         if request.HasField("given_before"):
             kept = await tuned.keep(runner, old, spec, request.given_before)
         reset = request.reset_parameters or kept is not None

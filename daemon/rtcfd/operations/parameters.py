@@ -38,6 +38,8 @@ async def set_parameters(
     acting = caller.current()
 
     async def work() -> control_pb2.ChangeResult:
+        if request.lists:
+            declared_values.set_vector_sizes(name, request, await _declared(runner, name))
         return await _set(runner, name, list(request.parameters), acting, progress)
 
     return await runner.change(f"a change of parameters of {name}", work)
@@ -240,7 +242,7 @@ async def _check_left_out(
     runner: RunnerCore, name: str, settings: list[graph_pb2.ParameterSetting]
 ) -> control_pb2.ChangeResult:
     """Check parameters for a component that is left out: it gets them when it is loaded again."""
-    declared = {each.name: each for each in await _declared(runner, name)}
+    declared = {each.name: each for each in await _of_type(runner, name)}
     for each in settings:
         declared_values.check(name, each, declared)
     result = control_pb2.ChangeResult(component=name)
@@ -319,16 +321,23 @@ async def live_components(runner: RunnerCore) -> dict[str, graph_pb2.ComponentIn
 
 
 async def _declared(runner: RunnerCore, name: str) -> list[graph_pb2.ParameterInfo]:
+    """Return the declared parameters of a component."""
+    if name in runner.desired.left_out:
+        return await _of_type(runner, name)
+    return list((await live_component(runner, name)).parameters)
+
+
+async def _of_type(runner: RunnerCore, name: str) -> list[graph_pb2.ParameterInfo]:
     """Return the parameters that the type of a left-out component declares."""
     spec = runner.desired.components[name]
     return list((await runner.shared.catalog.find(spec.package, spec.type)).parameters)
 
 
 async def _values(runner: RunnerCore, name: str) -> dict[str, graph_pb2.ParameterValue]:
+    declared = await _declared(runner, name)
     if name in runner.desired.left_out:
-        return _last_values(runner, name, await _declared(runner, name))
-    found = await live_component(runner, name)
-    return {each.name: each.value for each in found.parameters}
+        return _last_values(runner, name, declared)
+    return {each.name: each.value for each in declared}
 
 
 def _last_values(

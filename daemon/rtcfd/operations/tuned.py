@@ -4,6 +4,7 @@ When the file is applied again, tuned values that still fit stay.  A parameter c
 its value is neither the given value nor the default.
 """
 
+import contextlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
@@ -51,6 +52,7 @@ async def keep_all(
     for spec in specs:
         name = full_name(spec)
         if name in earlier and (name in live or name in runner.desired.left_out):
+            await _set_vector_sizes(runner.shared.catalog, spec, earlier[name], live.get(name))
             values = _values(runner, name, live.get(name), earlier[name])
             found[name] = await _keep(runner.shared.catalog, spec, earlier[name], values)
     return found
@@ -64,8 +66,24 @@ async def keep(
 ) -> Tuned:
     """Put tuned values of the component `old` into its replacement."""
     info = None if old in runner.desired.left_out else await parameters.live_component(runner, old)
+    await _set_vector_sizes(runner.shared.catalog, spec, given_before, info)
     values = _values(runner, old, info, given_before)
     return await _keep(runner.shared.catalog, spec, given_before, values)
+
+
+async def _set_vector_sizes(
+    catalog: Catalog,
+    spec: graph_pb2.ComponentSpec,
+    given_before: graph_pb2.ComponentSpec,
+    info: graph_pb2.ComponentInfo | None,
+) -> None:
+    if not (spec.lists or given_before.lists):
+        return
+    library = await catalog.find(spec.package, spec.type)
+    library.set_vector_sizes(spec)
+    declared = library.parameters if info is None else info.parameters
+    with contextlib.suppress(RequestError):  # an earlier type had it otherwise
+        declared_values.set_vector_sizes("", given_before, declared)
 
 
 @dataclass

@@ -152,7 +152,11 @@ def test_an_output_that_was_not_written_is_named(mimo: Bench) -> None:
         ("rtcf_examples/Mimi", {}, "Mimi"),
         ("rtcf_examples/Wave", {"amplitude": None}, "amplitude: None is not a bool, int, float or"),
         ("rtcf_examples/Wave", {"amplitude": [1]}, "no parameter amplitude_0; it has amplitude"),
-        ("rtcf_examples/Wave", {"amplitude": []}, "amplitude is empty"),
+        (
+            "rtcf_examples/Wave",
+            {"amplitude": []},
+            "amplitude is an empty list: only a vector can be",
+        ),
         ("rtcf_examples/Wave", {"amplitude": -1.0}, "amplitude"),
         ("rtcf_examples/Wave", {"path": ["nowhere"]}, "nowhere: no such folder"),
         ("fig.yaml", {"kp": 1.0}, "fig.yaml: set parameters in the graph file"),

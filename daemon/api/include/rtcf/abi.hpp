@@ -133,8 +133,9 @@ struct AbiProbe {
              offsetof(Declaration, name), offsetof(Declaration, type),
              offsetof(Declaration, default_value), offsetof(Declaration, minimum),
              offsetof(Declaration, maximum), offsetof(Declaration, unit),
-             offsetof(Declaration, doc), offsetof(Declaration, choices), sizeof(Choice),
-             sizeof(DerivedBase), sizeof(StagedValue)});
+             offsetof(Declaration, doc), offsetof(Declaration, choices),
+             offsetof(Declaration, is_size), sizeof(Choice), sizeof(DerivedBase),
+             sizeof(StagedValue)});
         add({sizeof(StateDeclaration), offsetof(StateDeclaration, name),
              offsetof(StateDeclaration, type), offsetof(StateDeclaration, identity),
              offsetof(StateDeclaration, size), offsetof(StateDeclaration, value),

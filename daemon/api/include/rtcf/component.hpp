@@ -355,7 +355,7 @@ inline void detail::undeclareParameters(Component& owner, std::size_t count) noe
 }
 
 inline std::string ParameterBase::check(ParameterValue& value) const {
-    const auto& [name, type, initial, minimum, maximum, unit, doc, choices] = declaration_;
+    const auto& [name, type, initial, minimum, maximum, unit, doc, choices, is_size] = declaration_;
     if (type == "double" && std::holds_alternative<std::int64_t>(value)) {
         value = static_cast<double>(std::get<std::int64_t>(value));
     }

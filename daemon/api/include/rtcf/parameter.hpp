@@ -13,11 +13,13 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 #include <variant>
 #include <vector>
 
+#include "rtcf/bounded_vector.hpp"
 #include "rtcf/realtime.hpp"
 
 namespace rtcf {
@@ -73,6 +75,13 @@ struct ParameterDeclaration {
     std::string unit;
     std::string doc;
     std::vector<Choice> choices;
+    bool is_size = false;  ///< of a BoundedVector: `<vector>_size`
+
+    /// Name of the vector if this is its size, else empty. Not real-time safe.
+    std::string vectorName() const {
+        return is_size ? name.substr(0, name.size() - kSizeSuffix.size()) : std::string();
+    }
+    static constexpr std::string_view kSizeSuffix = "_size";
 };
 
 /// A value with a staged successor, which replaces it at a cycle boundary. The graph thread stages
@@ -170,7 +179,7 @@ template <typename T>
 class DeclarationOf {
     static_assert(std::is_arithmetic_v<T> || std::is_enum_v<T> || std::is_same_v<T, std::string>,
                   "a parameter is a bool, an integer, a floating-point number, a std::string, an "
-                  "enum, or a std::array of one of these");
+                  "enum, or a std::array or BoundedVector of one of these");
 
    public:
     template <typename... Options>
@@ -204,6 +213,24 @@ class DeclarationOf {
                    static_cast<double>(std::numeric_limits<T>::max()));
         }
         return declaration;
+    }
+
+    /// A value that the options permit, 0 if possible.
+    template <typename... Options>
+    static T anyValid(const Options&... options) {
+        const ParameterDeclaration declaration = make("any", T{}, options...);
+        if constexpr (std::is_enum_v<T>) {
+            const auto& choices = declaration.choices;
+            return choices.empty() ? T{} : static_cast<T>(choices.front().value);
+        } else if constexpr (std::is_arithmetic_v<T> && !std::is_same_v<T, bool>) {
+            double value = std::max(0.0, declaration.minimum.value_or(0.0));
+            if constexpr (std::is_integral_v<T>) value = std::ceil(value);
+            double highest = declaration.maximum.value_or(value);
+            if constexpr (std::is_integral_v<T>) highest = std::floor(highest);
+            return static_cast<T>(std::min(value, highest));
+        } else {
+            return T{};
+        }
     }
 
    private:
@@ -331,6 +358,82 @@ class Parameter<std::array<T, N>> final {
         Array proposed{};  // result of the last proposed()
     };
     Array value_;
+    const std::unique_ptr<Settings> settings_;
+};
+
+/// A vector parameter of at most N elements. Outside the component, each element is a parameter:
+/// `taps_0`, `taps_1`, and so is their number, `taps_size`. A list in a graph or launch file, or of
+/// a bench, sets elements and number. The elements behind the end keep their values.
+template <typename T, std::size_t N>
+class Parameter<BoundedVector<T, N>> final {
+   public:
+    using Vector = BoundedVector<T, N>;
+
+    /// @param owner the component, `this`
+    /// @param name  as of other parameters; `<name>_<index>` and `<name>_size` are unique
+    /// @param initial default values
+    /// @param options any of Min, Max, Unit, Doc, Choice; they hold for each element
+    template <typename... Options>
+    Parameter(Component* owner, const std::string& name, const Vector& initial,
+              const Options&... options)
+        : value_(initial), settings_(std::make_unique<Settings>()) {
+        // The elements behind the end must be valid, too.
+        std::fill(value_.elements_.begin() + value_.size_, value_.elements_.end(),
+                  initial.empty() ? detail::DeclarationOf<T>::anyValid(options...)
+                                  : value_.elements_[initial.size() - 1]);
+        auto& elements = settings_->elements;
+        try {
+            for (std::size_t i = 0; i < N; ++i) {
+                T& place = value_.elements_[i];
+                std::string element = name + '_' + std::to_string(i);
+                elements.emplace_back(
+                    owner, detail::DeclarationOf<T>::make(std::move(element), place, options...),
+                    place);
+            }
+            auto size = detail::DeclarationOf<std::int64_t>::make(
+                name + std::string(ParameterDeclaration::kSizeSuffix), value_.size_, Min(0.0),
+                Max(static_cast<double>(N)), Doc("number of elements of " + name));
+            size.is_size = true;
+            settings_->size.emplace(owner, std::move(size), value_.size_);
+        } catch (...) {
+            detail::undeclareParameters(*owner, elements.size());
+            throw;
+        }
+    }
+    Parameter(const Parameter&) = delete;
+    Parameter& operator=(const Parameter&) = delete;
+
+    /// The values; constant during a cycle. Real-time safe.
+    const Vector& value() const noexcept RTCF_NONBLOCKING { return value_; }
+    operator const Vector&() const noexcept RTCF_NONBLOCKING {
+        return value_;
+    }  // NOLINT(google-explicit-constructor)
+    /// One of the values. Real-time safe.
+    /// @param index below size()
+    const T& operator[](std::size_t index) const noexcept RTCF_NONBLOCKING { return value_[index]; }
+
+    auto begin() const noexcept RTCF_NONBLOCKING { return value_.begin(); }
+    auto end() const noexcept RTCF_NONBLOCKING { return value_.end(); }
+    std::size_t size() const noexcept RTCF_NONBLOCKING { return value_.size(); }
+    bool empty() const noexcept RTCF_NONBLOCKING { return value_.empty(); }
+
+    /// The staged values, and the present ones where none is staged. In prepare(); not real-time
+    /// safe.
+    const Vector& proposed() const {
+        std::transform(settings_->elements.begin(), settings_->elements.end(),
+                       settings_->proposed.elements_.begin(),
+                       [](const auto& element) { return element.proposed(); });
+        settings_->proposed.size_ = settings_->size->proposed();
+        return settings_->proposed;
+    }
+
+   private:
+    struct Settings {
+        std::deque<detail::ParameterSetting<T>> elements;
+        std::optional<detail::ParameterSetting<std::int64_t>> size;
+        Vector proposed{};  // result of the last proposed()
+    };
+    Vector value_;
     const std::unique_ptr<Settings> settings_;
 };
 

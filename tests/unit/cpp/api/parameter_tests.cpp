@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "support/bare_component.hpp"
 
@@ -244,6 +245,52 @@ TEST_F(ParameterTest, AnArrayIsDeclaredWholeOrNotAtAll) {
     EXPECT_THROW(declare(), std::logic_error);
     ASSERT_EQ(accessTo(component).parameters().size(), 1U);
     EXPECT_EQ(accessTo(component).parameters()[0]->declaration().name, "gains_2");
+}
+
+TEST_F(ParameterTest, AVectorHasItsElementsAndTheirNumber) {
+    const Parameter<BoundedVector<double, 4>> taps{&component, "taps", {1.0, 2.0}, Min(0.5)};
+    ASSERT_EQ(accessTo(component).parameters().size(), 5U);
+    EXPECT_EQ(std::vector<double>(taps.begin(), taps.end()), (std::vector<double>{1.0, 2.0}));
+    EXPECT_EQ(std::get<double>(named("taps_3").declaration().default_value), 2.0)
+        << "within the bounds";
+    EXPECT_EQ(named("taps_size").declaration().vectorName(), "taps");
+    EXPECT_EQ(named("taps_size").declaration().maximum, 4.0);
+    EXPECT_EQ(set("taps_size", Int{5}), "parameter taps_size = 5 is above its maximum 4 ");
+    EXPECT_EQ(set("taps_2", 7.0), "");
+    EXPECT_EQ(taps.size(), 2U);
+    EXPECT_EQ(set("taps_size", Int{3}), "");
+    EXPECT_EQ(std::vector<double>(taps.begin(), taps.end()), (std::vector<double>{1.0, 2.0, 7.0}));
+    named("taps_size").stage(Int{1});
+    named("taps_0").stage(3.0);
+    const BoundedVector<double, 4>& proposed = Values{}[taps];
+    EXPECT_EQ(std::vector<double>(proposed.begin(), proposed.end()), std::vector<double>{3.0});
+    EXPECT_EQ(taps.size(), 3U) << "not committed";
+}
+
+TEST_F(ParameterTest, AVectorIsDeclaredWholeOrNotAtAll) {
+    const Parameter<int> taken{&component, "taps_size", 1};
+    const auto declare = [this] {
+        const Parameter<BoundedVector<double, 3>> taps{&component, "taps", {1.0}};
+    };
+    EXPECT_THROW(declare(), std::logic_error);
+    EXPECT_EQ(accessTo(component).parameters().size(), 1U);
+    const auto many = [] { const BoundedVector<int, 2> vector{1, 2, 3}; };
+    EXPECT_THROW(many(), std::length_error);
+}
+
+TEST_F(ParameterTest, AnEmptyVectorTakesElementsLater) {
+    const Parameter<BoundedVector<std::string, 2>> names{&component, "names", {}};
+    EXPECT_TRUE(names.empty());
+    EXPECT_EQ(set("names_0", std::string("left")), "");
+    EXPECT_EQ(set("names_size", Int{1}), "");
+    EXPECT_EQ(names[0], "left");
+    const Parameter<BoundedVector<int, 2>> limits{&component, "limits", {}, Min(1.5), Max(9.0)};
+    EXPECT_EQ(set("limits_size", Int{1}), "");
+    EXPECT_EQ(limits[0], 2) << "valid";
+    enum class Mode { Idle = 3, Run };
+    const Parameter<BoundedVector<Mode, 2>> modes{
+        &component, "modes", {}, Choice("idle", Mode::Idle), Choice("run", Mode::Run)};
+    EXPECT_EQ(std::get<std::string>(named("modes_1").declaration().default_value), "idle");
 }
 
 TEST_F(ParameterTest, AnArrayIsARange) {

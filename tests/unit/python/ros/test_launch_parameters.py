@@ -294,6 +294,10 @@ GROUPED = {
     name: graph_pb2.ParameterInfo(name=name, type="double")
     for name in ("gains/p", "gains/filter/q", "k_0", "k_1", "m_0_0", "m_0_1", "text")
 }
+VECTOR = {
+    **{name: graph_pb2.ParameterInfo(name=name, type="double") for name in ("g/v_0", "g/v_1")},
+    "g/v_size": graph_pb2.ParameterInfo(name="g/v_size", type="int", vector="g/v"),
+}
 
 
 def test_mappings_are_groups_and_lists_are_arrays_where_these_are_declared() -> None:
@@ -338,6 +342,28 @@ def test_values_that_fit_no_group_or_array_cause_a_warning(
     assert len(slips) == (1 if warning else 0)
     assert not warning or warning in slips[0]
     assert all(each.value.int_value != 9 for each in settings)
+
+
+@pytest.mark.parametrize(
+    ("values", "expected", "warning"),
+    [
+        ({"v": [7]}, {"g/v_0": 7, "g/v_size": 1}, ""),
+        ({"v": [7, 8]}, {"g/v_0": 7, "g/v_1": 8, "g/v_size": 2}, ""),
+        ({"v": []}, {"g/v_size": 0}, ""),
+        ({"v_1": 8}, {"g/v_1": 8}, ""),
+        ({"v_1": 8, "v_size": 2}, {"g/v_1": 8, "g/v_size": 2}, ""),
+        ({"v": [7], "v_size": 2}, {"g/v_0": 7, "g/v_size": 1}, "~g/v_size is ignored"),
+        ({"v": [7, 8, 9]}, {"g/v_0": 7, "g/v_1": 8, "g/v_size": 2}, "the component takes 2"),
+        ({"v": 7}, {}, "~g/v is an array: set a list"),
+    ],
+)
+def test_a_list_sets_the_elements_and_the_size_of_a_vector(
+    values: dict[str, Any], expected: dict[str, int], warning: str
+) -> None:
+    settings, _, slips = component_parameters.settings({"g": values}, VECTOR)
+    assert {each.name: each.value.int_value for each in settings} == expected
+    assert len(slips) == (1 if warning else 0)
+    assert not warning or warning in slips[0]
 
 
 @pytest.mark.parametrize("wrong", [{"gains": {"p": []}}, {"gains": {"p": {}}}, {"k": [[1], 2]}])
