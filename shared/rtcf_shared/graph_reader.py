@@ -4,7 +4,7 @@ docs/graph-files.md describes the format.  Scalars have the types of YAML 1.2 (s
 spec.py), so that a graph file and the command line agree.
 """
 
-from collections.abc import Collection, Iterable, MutableSequence
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -118,10 +118,13 @@ class _Reader:
                     spec.remaps.append(graph_pb2.Remap(source=port, target=to))
             elif key == "parameters":
                 found: dict[str, graph_pb2.ParameterValue] = {}
+                lists: dict[str, int] = {}
                 for name, (_, content) in self._mapping(value, key).items():
-                    self._parameters(name, content, found, spec.lists)
+                    self._parameters(name, content, found, lists)
                 for name, each in found.items():
                     spec.parameters.add(name=name, value=each)
+                for name, length in lists.items():
+                    spec.lists.add(name=name, length=length)
             elif key == "breaks":
                 spec.breaks.extend(self._text(each, key) for each in self._list(value, key))
             else:
@@ -133,7 +136,7 @@ class _Reader:
         name: str,
         node: Any,
         found: dict[str, graph_pb2.ParameterValue],
-        lists: MutableSequence[graph_pb2.ListLength],
+        lists: dict[str, int],
         depth: int = 0,
     ) -> None:
         """Add the parameters that a value sets, as flat() of spec.py."""
@@ -153,7 +156,9 @@ class _Reader:
             for key, (_, member) in self._mapping(node, f"parameters.{name}").items():
                 self._parameters(f"{name}/{key}", member, found, lists, depth + 1)
         else:
-            lists.append(graph_pb2.ListLength(name=name, length=len(node.value)))
+            if name in lists:
+                raise self._error(node, f"parameters.{name} is set twice")
+            lists[name] = len(node.value)
             for index, element in enumerate(node.value):
                 self._parameters(f"{name}_{index}", element, found, lists, depth + 1)
 

@@ -98,6 +98,18 @@ def _settings(settings: runner_pb2.RunnerSettings | runner_pb2.RosSettings) -> d
     return result
 
 
+def _parameters(spec: graph_pb2.ComponentSpec) -> dict[str, Any]:
+    values: dict[str, Any] = {
+        setting.name: getattr(setting.value, setting.value.WhichOneof("kind"))
+        for setting in spec.parameters
+    }
+    for given in reversed(spec.lists):  # a list within a list comes behind it
+        elements = [f"{given.name}_{index}" for index in range(given.length)]
+        if all(name in values for name in elements):
+            values[given.name] = [values.pop(name) for name in elements]
+    return values
+
+
 def _component(spec: graph_pb2.ComponentSpec) -> dict[str, Any]:
     result: dict[str, Any] = {"name": spec.name or spec.type}
     if spec.ns not in ("", "/"):
@@ -105,11 +117,8 @@ def _component(spec: graph_pb2.ComponentSpec) -> dict[str, Any]:
     result |= {"package": spec.package, "type": spec.type}
     if spec.remaps:
         result["remaps"] = {remap.source: remap.target for remap in spec.remaps}
-    if spec.parameters:
-        result["parameters"] = {
-            setting.name: getattr(setting.value, setting.value.WhichOneof("kind"))
-            for setting in spec.parameters
-        }
+    if spec.parameters or spec.lists:
+        result["parameters"] = _parameters(spec)
     for flag in ("first", "optional"):
         if getattr(spec, flag):
             result[flag] = True

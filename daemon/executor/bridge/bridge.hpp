@@ -25,6 +25,7 @@ class SimulatedClock;
 struct ParameterView {
     ParameterDeclaration declaration;
     ParameterValue value;
+    bool given = false;  ///< the component was loaded with a value, perhaps the default
 };
 
 /// The parameters of a component. Immutable: a new value makes a new object.

@@ -24,7 +24,11 @@ std::shared_ptr<const ComponentView> viewOf(const GraphNode& node) {
     const auto& parameters = accessTo(instance.component()).parameters();
     result->parameters.reserve(parameters.size());
     for (std::size_t i = 0; i < parameters.size(); ++i) {
-        result->parameters.push_back({parameters[i]->declaration(), instance.parameterValues()[i]});
+        const ParameterDeclaration& declaration = parameters[i]->declaration();
+        const bool given = std::any_of(
+            result->definition->parameters.begin(), result->definition->parameters.end(),
+            [&](const auto& setting) { return setting.first == declaration.name; });
+        result->parameters.push_back({declaration, instance.parameterValues()[i], given});
     }
     result->states.reserve(accessTo(instance.component()).states().size());
     for (const StateDeclaration& state : accessTo(instance.component()).states()) {

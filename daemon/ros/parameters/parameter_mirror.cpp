@@ -203,7 +203,7 @@ bool ParameterMirror::take(XmlRpc::XmlRpcValue& values, const Component& compone
     const executor::ParameterSet& set = *component.set;
     Known& known = known_[set.full_name];
     executor::ParameterBatch batch;
-    for (const auto& [declaration, value] : set.parameters) {
+    for (const auto& [declaration, value, given] : set.parameters) {
         const std::string& name = declaration.name;
         XmlRpc::XmlRpcValue* const theirs = find(values, name);
         std::optional<ParameterValue> found;
@@ -220,7 +220,7 @@ bool ParameterMirror::take(XmlRpc::XmlRpcValue& values, const Component& compone
         }
         known.values[name] = *found;
         const bool was_given =
-            first && component.is_new && !sameValue(value, declaration.default_value);
+            first && component.is_new && (given || !sameValue(value, declaration.default_value));
         if (!sameValue(*found, value) && !was_given) batch.emplace_back(name, *std::move(found));
     }
     if (batch.empty() || !follows_) return false;

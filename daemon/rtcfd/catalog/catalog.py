@@ -65,9 +65,10 @@ class Library:
         declared_values.set_vector_sizes(full_name(spec), spec, self.parameters)
 
     def load(self, spec: graph_pb2.ComponentSpec) -> wire.Load:
-        """Return the request to load a component from this library; sets its `lists`."""
-        self.set_vector_sizes(spec)
-        return wire.Load(component=spec, library=self.path, owner=self.owner)
+        """Return the request to load a component from this library, with its vectors' sizes."""
+        load = wire.Load(component=spec, library=self.path, owner=self.owner)
+        self.set_vector_sizes(load.component)
+        return load
 
 
 @dataclass

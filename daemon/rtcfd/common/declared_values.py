@@ -71,9 +71,9 @@ def set_vector_sizes(
         elif length > size.maximum:
             why = f"a list of length {length}: it takes at most {size.maximum:g} elements"
         elif size.name not in values:
-            value = graph_pb2.ParameterValue(int_value=length)
-            given.parameters.append(graph_pb2.ParameterSetting(name=size.name, value=value))
-        elif values[size.name].int_value != length:
+            values[size.name] = graph_pb2.ParameterValue(int_value=length)
+            given.parameters.add(name=size.name, value=values[size.name])
+        elif (kept := values[size.name]).HasField("int_value") and kept.int_value != length:
             why = f"a list of length {length}, but {size.name} is set, too, to another number"
         if why:
             raise InvalidArgument(

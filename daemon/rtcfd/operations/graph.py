@@ -40,6 +40,7 @@ async def _load(
     runner: RunnerCore, spec: graph_pb2.ComponentSpec, progress: Progress
 ) -> control_pb2.ChangeResult:
     library = await runner.shared.catalog.find(spec.package, spec.type)
+    library.set_vector_sizes(spec)
     note = library.note(spec)
     acting = caller.current()
     desired, code = runner.desired, f"{spec.package}/{spec.type}"
@@ -142,6 +143,7 @@ async def replace(
 
     async def replace_request() -> wire.Request:
         nonlocal kept
+        await parameters.settle_lists(runner, old)
         spec.CopyFrom(replacement(runner.desired.components.get(old), given))
         library.set_vector_sizes(spec)
         if request.HasField("given_before"):
@@ -199,6 +201,8 @@ async def release(
 
     async def release_request() -> wire.Request:
         _check_known(runner, names)
+        for name in names:
+            await parameters.settle_lists(runner, name)
         marked = [name for name in names if name not in runner.desired.left_out]
         if marked:
             await _require_faulted(runner, marked)
@@ -302,6 +306,9 @@ async def _ask_to_apply(
     before = runner.settings()
     changes = runner_settings.differences(before, request.settings)
     apply = wire.Apply(components=await loads(runner.shared.catalog, specs), dry_run=True)
+    for spec, load in zip(specs, apply.components, strict=True):
+        if spec.lists:
+            spec.CopyFrom(load.component)
     rebuilt = await runner.code.changed()
     for load in apply.components:
         load.anew = request.rebuilt and full_name(load.component) in rebuilt

@@ -16,7 +16,7 @@ from rtcfd.access import caller
 from rtcfd.access.caller import Caller
 from rtcfd.access.rights import require_pace
 from rtcfd.common import declared_values, ros_value
-from rtcfd.common.errors import FailedPrecondition, InvalidArgument, NotFound
+from rtcfd.common.errors import FailedPrecondition, InvalidArgument, NotFound, RequestError
 from rtcfd.common.names import absolute
 from rtcfd.executor.link import Progress
 from rtcfd.operations.runner_core import Change, PendingParameters, RunnerCore
@@ -211,6 +211,7 @@ async def _set(
     progress: Progress,
     takes_back: int = 0,
 ) -> control_pb2.ChangeResult:
+    await settle_lists(runner, name)
     before = await _values(runner, name)
     if acting is not None and acting.tuning is not None:
         _require_tuning(runner, name, settings, before, acting)
@@ -305,6 +306,15 @@ def _require_tuning(
     runner.tuned = {
         name: at for name, at in runner.tuned.items() if name.rpartition(".")[0] in there
     } | tuned
+
+
+async def settle_lists(runner: RunnerCore, name: str) -> None:
+    """Set the sizes of vectors of a component that is left out, if its type is known by now."""
+    spec = runner.desired.components.get(name)
+    if spec is not None and spec.lists:
+        with contextlib.suppress(RequestError):
+            library = await runner.shared.catalog.find(spec.package, spec.type)
+            runner.desired.settle(name, library.load(spec).component)
 
 
 async def live_component(runner: RunnerCore, name: str) -> graph_pb2.ComponentInfo:

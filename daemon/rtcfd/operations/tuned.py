@@ -52,6 +52,7 @@ async def keep_all(
     for spec in specs:
         name = full_name(spec)
         if name in earlier and (name in live or name in runner.desired.left_out):
+            await parameters.settle_lists(runner, name)
             await _set_vector_sizes(runner.shared.catalog, spec, earlier[name], live.get(name))
             values = _values(runner, name, live.get(name), earlier[name])
             found[name] = await _keep(runner.shared.catalog, spec, earlier[name], values)
@@ -66,6 +67,7 @@ async def keep(
 ) -> Tuned:
     """Put tuned values of the component `old` into its replacement."""
     info = None if old in runner.desired.left_out else await parameters.live_component(runner, old)
+    await parameters.settle_lists(runner, old)
     await _set_vector_sizes(runner.shared.catalog, spec, given_before, info)
     values = _values(runner, old, info, given_before)
     return await _keep(runner.shared.catalog, spec, given_before, values)
@@ -82,7 +84,7 @@ async def _set_vector_sizes(
     library = await catalog.find(spec.package, spec.type)
     library.set_vector_sizes(spec)
     declared = library.parameters if info is None else info.parameters
-    with contextlib.suppress(RequestError):  # an earlier type had it otherwise
+    with contextlib.suppress(RequestError):  # an earlier type had other vectors
         declared_values.set_vector_sizes("", given_before, declared)
 
 

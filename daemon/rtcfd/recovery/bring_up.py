@@ -132,6 +132,8 @@ async def _restore(runner: RunnerCore) -> None:
         # All at once, for speed; one by one if that fails.
         every = await loads(runner.shared.catalog, [desired.components[name] for name in wanted])
         await runner.ask(wire.Request(apply=wire.Apply(components=every)))
+        for name, load in zip(wanted, every, strict=True):
+            desired.settle(name, load.component)
     except RequestError:
         if runner.up:
             await _load_each(runner, wanted)
@@ -218,6 +220,7 @@ async def _load_each(runner: RunnerCore, names: Iterable[str]) -> None:
             (load,) = await loads(runner.shared.catalog, [runner.desired.components[name]])
             await runner.ask(wire.Request(load=load))
             runner.desired.left_out.pop(name, None)
+            runner.desired.settle(name, load.component)
         except RequestError as error:
             if not runner.up:
                 return  # the executor died, and its recovery loads the rest

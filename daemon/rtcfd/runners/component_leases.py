@@ -91,6 +91,7 @@ class ComponentLeases:
         """Load a component for a holder."""
         runner, spec = self._runner, request.component
         library = await runner.shared.catalog.find(spec.package, spec.type)
+        library.set_vector_sizes(spec)
         note = library.note(spec)
         name = full_name(spec)
         if leaving := self._leaving.get(name):

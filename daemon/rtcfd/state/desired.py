@@ -94,6 +94,14 @@ class Desired:
         self._texts.pop(full_name, None)
         self.quarantined.pop(full_name, None)
 
+    def settle(self, full_name: str, spec: graph_pb2.ComponentSpec) -> None:
+        """Note a component's parameters with the sizes of its vectors, which rtcfd knows now."""
+        kept = self._components[full_name]
+        if kept.lists:
+            del kept.parameters[:], kept.lists[:]
+            kept.parameters.extend(spec.parameters)
+            self._texts.pop(full_name, None)
+
     def drop(self, full_names: Iterable[str]) -> None:
         """Remove components."""
         for name in full_names:
@@ -174,6 +182,7 @@ def replacement(
     if old is not None:
         result.CopyFrom(old)
         del result.parameters[:]  # the executor keeps those that fit
+        del result.lists[:]
     for field in ("remaps", "breaks"):
         if getattr(given, field):
             result.ClearField(field)

@@ -1,7 +1,9 @@
 """A bounded vector of parameters: elements and their number, on all ways in."""
 
 import os
+import shutil
 import signal
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +11,11 @@ import pytest
 import rtcf
 import yaml
 from block_bench import PATH
-from daemon_process import Daemon, wait_for
+from daemon_process import BUILD_TREE, Daemon, wait_for
 from launch_processes import Launching
 from rtcf.testing import Bench
 from rtcf.v1 import graph_pb2
+from rtcf_launch.master import Master
 from values import parameter_values, port_value
 
 GRAPH = """\
@@ -25,7 +28,7 @@ LAUNCH = """
     <rosparam>{mode: wait_for_components, num_components_expected: 1, frequency: 500.0}</rosparam>
   </node>
   <node name="w" pkg="rtcf" type="rt_launcher" args="rtcf_test Weights" output="screen">
-    <rosparam>{filter: {taps: [1.0, 2.0, 3.0, 4.0, 5.0], taps_size: 2}}</rosparam>
+    <rosparam>{filter: {taps: TAPS, taps_size: 2}}</rosparam>
   </node>
 </launch>
 """
@@ -125,6 +128,84 @@ def test_size_and_elements_change_in_the_same_cycle(daemon: Daemon, client: rtcf
     assert used(client) == (1, 0.75), "a successor has the size too"
 
 
+def test_a_replacement_has_its_list(client: rtcf.Client) -> None:
+    client.apply(graph("[1, 2]"), "rt_runner")
+    (spec,) = graph("[5, 6, 7]")
+    client.replace("w", spec)
+    assert used(client) == (3, 18.0)
+    (before,), (after,) = graph("[5, 6, 7]"), graph("[5, 6]")
+    client.set_parameters("w", [rtcf.parse_parameter("filter/taps_0:=1")])
+    client.replace("w", after, given_before=before)
+    assert used(client) == (2, 7.0)
+    client.replace("w", after, reset_parameters=True)
+    assert used(client) == (2, 11.0)
+
+
+def test_a_dry_run_and_a_new_runner_take_a_list(client: rtcf.Client) -> None:
+    components = graph("[1, 2]")
+    for _ in range(2):
+        (load,) = client.apply(components, "more", dry_run=True).differences
+        assert load.component == "/w"
+    client.apply(components, "more")
+    assert not client.apply(components, "more", dry_run=True).differences
+    assert parameter_values(client, "/w", "more")["filter/taps_size"] == 2
+
+
+@pytest.fixture
+def late(tmp_path: Path) -> Iterator[Daemon]:
+    """Start rtcfd with the list [1, 2] in graphs.d; its component is left out, as its package is
+    installed after the start."""
+    packages, graphs = tmp_path / "packages", tmp_path / "graphs.d"
+    graphs.mkdir()
+    text = GRAPH.replace("TAPS", "[1, 2]").replace("rtcf_test", "rtcf_late")
+    (graphs / "w.yaml").write_text(text)
+    daemon = Daemon(tmp_path, arguments=["--path", str(packages), "--graphs-dir", str(graphs)])
+    daemon.start()
+    try:
+        with rtcf.Client(daemon.socket) as client:
+            assert client.get_order() == []
+        library = packages / "rtcf_late" / "late.so"
+        library.parent.mkdir(parents=True)
+        shutil.copy(BUILD_TREE / "lib" / "rtcf" / "rtcf_test" / "rtcf_test_behaved.so", library)
+        yield daemon
+    finally:
+        daemon.end()
+
+
+def test_the_list_of_a_component_that_was_left_out_is_its_vector(late: Daemon) -> None:
+    (spec,) = rtcf.read_graphs(late.ctl("save").stdout, "saved")[0].components
+    assert {each.name: each.length for each in spec.lists} == {"filter/taps": 2}
+    assert late.ctl("release", "w").returncode == 0
+    with rtcf.Client(late.socket) as client:
+        assert used(client) == (2, 3.0)
+    late.end(signal.SIGKILL)
+    late.start()
+    assert "differs" not in late.log()
+    assert late.ctl("set", "w", "filter/taps_size:=1").returncode == 0
+    with rtcf.Client(late.socket) as client:
+        (status,) = client.get_status().runners
+        os.kill(status.pid, signal.SIGKILL)
+        wait_for(lambda: client.get_status().runners[0].pid not in (0, status.pid), "an executor")
+        wait_for(lambda: client.get_order() == ["/w"], "the component")
+        assert used(client) == (1, 1.0)
+
+
+def test_a_component_that_is_left_out_is_tuned_as_others(late: Daemon) -> None:
+    assert late.ctl("set", "w", "filter/taps_size:=1").returncode == 0
+    (change, *_) = late.ctl("history", "w").stdout.splitlines()[1:]
+    assert change.split()[-2:] == ["2", "1"], "before and after"
+    assert late.ctl("release", "w").returncode == 0
+    with rtcf.Client(late.socket) as client:
+        assert used(client) == (1, 1.0)
+
+
+def test_a_component_that_is_left_out_is_replaced_with_a_list(late: Daemon) -> None:
+    (spec,) = graph("[5, 6, 7]")
+    with rtcf.Client(late.socket) as client:
+        client.replace("w", spec)
+        assert used(client) == (3, 18.0)
+
+
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -181,6 +262,7 @@ def test_a_graph_file_has_a_list_of_any_length(
         ("[1, -11]", "filter/taps_1 = -11 is below its minimum -10"),
         ("[1, [2]]", "has no parameter filter/taps_1_0"),
         ("[1], taps_size: 2", "is a list of length 1, but filter/taps_size is set"),
+        ("[1], taps_size: 1.0", "filter/taps_size takes an int"),
         ("[1], tap: []", "filter/tap is an empty list: only a vector can be empty"),
     ],
 )
@@ -188,12 +270,13 @@ def test_an_invalid_list_changes_nothing(
     daemon: Daemon, client: rtcf.Client, tmp_path: Path, taps: str, words: str
 ) -> None:
     file = tmp_path / "graph.yaml"
+    file.write_text(GRAPH.replace("TAPS", taps))
     for present in ([], graph("[2, 2]")):
         client.apply(present, "rt_runner")
-        file.write_text(GRAPH.replace("TAPS", taps))
         done = daemon.ctl("apply", str(file))
         assert done.returncode != 0
         assert words in done.stderr
+        assert len(client.get_order()) == len(present)
     assert used(client) == (2, 4.0)
 
 
@@ -211,14 +294,21 @@ def test_a_bench_takes_a_list() -> None:
             bench.set(filter={"taps": []})
 
 
-def test_a_launch_file_has_a_list_which_overrides_a_size(
-    launching: Launching, tmp_path: Path
+@pytest.mark.parametrize("taps", [[1.0, 2.0, 3.0, 4.0, 5.0], [0.5, 0.25, 0.25]])
+def test_a_list_of_a_launch_file_overrides_a_size(
+    launching: Launching, tmp_path: Path, taps: list[float]
 ) -> None:
     file = tmp_path / "weights.launch"
-    file.write_text(LAUNCH)
+    file.write_text(LAUNCH.replace("TAPS", f"{taps}"))
     launching.roslaunch(str(file))
+    server = Master(launching.master.uri, "/test")
     with launching.client() as (client, runner):
         wait_for(lambda: client.get_order(runner) == ["/w"], "the component")
+        # The value of the parameter server, 2, would come a moment later.
+        wait_for(
+            lambda: server.parameter("/w/filter/taps_size") == len(taps),
+            "the size on the parameter server",
+        )
         found = parameter_values(client, "/w", runner)
-    assert found["filter/taps_size"] == 5
-    assert [found[f"filter/taps_{i}"] for i in range(5)] == [1.0, 2.0, 3.0, 4.0, 5.0]
+    assert found["filter/taps_size"] == len(taps)
+    assert [found[f"filter/taps_{i}"] for i in range(len(taps))] == taps

@@ -363,7 +363,7 @@ class Parameter<std::array<T, N>> final {
 
 /// A vector parameter of at most N elements. Outside the component, each element is a parameter:
 /// `taps_0`, `taps_1`, and so is their number, `taps_size`. A list in a graph or launch file, or of
-/// a bench, sets elements and number. The elements behind the end keep their values.
+/// a Python bench, sets elements and number. The elements behind the end keep their values.
 template <typename T, std::size_t N>
 class Parameter<BoundedVector<T, N>> final {
    public:

@@ -58,14 +58,21 @@ def test_every_key_is_read() -> None:
 
 
 def test_mappings_are_groups_of_parameters_and_lists_are_arrays() -> None:
-    written = "{gains: {p: 2, filter: {order: 4}, k: [1.5, 2]}, a: [[1, 2], [3, 4]], gains/i: 5}"
+    gains = "gains: {p: 2, filter: {order: 4}, k: [1.5, 2]}, gains/i: 5"
+    written = f"{{{gains}, a: [[1, 2], [3, 4]], none: []}}"
     text = f"components: [{{package: p, type: T, parameters: {written}}}]"
     (graph,) = rtcf.read_graphs(text, "x")
     names = ["gains/p:=2", "gains/filter/order:=4", "gains/k_0:=1.5", "gains/k_1:=2"]
-    names += ["a_0_0:=1", "a_0_1:=2", "a_1_0:=3", "a_1_1:=4", "gains/i:=5"]
-    assert graph.components == [rtcf.component("p", "T", parameters=names)]
+    names += ["gains/i:=5", "a_0_0:=1", "a_0_1:=2", "a_1_0:=3", "a_1_1:=4"]
+    (spec,) = graph.components
+    assert list(spec.parameters) == list(rtcf.component("p", "T", parameters=names).parameters)
+    lists = {each.name: each.length for each in spec.lists}
+    assert lists == {"gains/k": 2, "a": 2, "a_0": 2, "a_1": 2, "none": 0}
     (again,) = rtcf.read_graphs(rtcf.write_graphs([graph]), "y")
-    assert again.components[0].parameters == graph.components[0].parameters
+    assert {each.name: each.value for each in again.components[0].parameters} == {
+        each.name: each.value for each in spec.parameters
+    }
+    assert {each.name: each.length for each in again.components[0].lists} == lists
 
 
 def test_several_runners_are_read() -> None:
@@ -98,6 +105,8 @@ def test_several_runners_are_read() -> None:
         ("components:\n- package: p\n  type: T\n  parameters: {g: {a: {}}}\n", 4, "g/a is empty"),
         ("components:\n- package: p\n  type: T\n  parameters: {g: {a: }}\n", 4, "g/a has no value"),
         ("components:\n- package: p\n  type: T\n  parameters:\n    g/a: 1\n    g: {a: 2}\n", 6,
+         "parameters.g/a is set twice"),
+        ("components:\n- package: p\n  type: T\n  parameters:\n    g/a: []\n    g: {a: []}\n", 6,
          "parameters.g/a is set twice"),
         ("components:\n- package: p\n  type: T\n  parameters: {a: &x {b: *x}}\n", 4,
          "more than 100 mappings or lists in each other"),
