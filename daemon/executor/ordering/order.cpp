@@ -89,6 +89,10 @@ std::vector<Edge> cutFrom(const OrderProblem& problem, const Edge& start) {
 
 }  // namespace
 
+std::vector<std::size_t> orderUpToLoops(const OrderProblem& problem) {
+    return kahn(problem, problem.edges);
+}
+
 OrderResult findOrder(const OrderProblem& problem) {
     OrderResult result;
     result.order = kahn(problem, problem.edges);

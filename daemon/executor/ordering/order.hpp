@@ -34,6 +34,9 @@ struct OrderResult {
     bool orderable() const { return loop.empty(); }
 };
 
+/// Orders components as far as there are no loops, as findOrder(). O((V + E) log V).
+std::vector<std::size_t> orderUpToLoops(const OrderProblem& problem);
+
 /// Orders components. Among those that are ready, `first` ones run before the others, then the
 /// order is by name, so it is a function of the graph alone. O((V + E) log V); for a graph with
 /// loops, times the number of breaks needed and the length of the loop.

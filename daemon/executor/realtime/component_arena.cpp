@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
+#include <functional>
 #include <new>
+#include <vector>
 
 namespace rtcf::executor {
 
@@ -37,10 +39,11 @@ void* ComponentArena::allocate(std::size_t size, std::size_t alignment) {
     const Kind kind = kindOf(size, alignment);
     if (isLarge(kind)) return ::operator new(size, static_cast<std::align_val_t>(alignment));
     const std::lock_guard<std::mutex> lock(mutex_);
-    Free*& free = free_[kind];  // so that release() allocates nothing
-    if (free != nullptr) {
-        Free* const block = free;
-        free = block->next;
+    FreeBlocks& free = free_[kind];  // so that release() allocates nothing
+    if (free.first != nullptr) {
+        if (!free.sorted) sort(free);
+        Free* const block = free.first;
+        free.first = block->next;
         return block;
     }
     const auto aligned = [&] {
@@ -61,8 +64,22 @@ void ComponentArena::release(void* block, std::size_t size, std::size_t alignmen
         return;
     }
     const std::lock_guard<std::mutex> lock(mutex_);
-    Free*& free = free_.find(kind)->second;
-    free = ::new (block) Free{free};
+    FreeBlocks& free = free_.find(kind)->second;
+    Free* const next = free.first;
+    free.first = ::new (block) Free{next};
+    free.sorted = next == nullptr || (free.sorted && std::less<>()(free.first, next));
+}
+
+void ComponentArena::sort(FreeBlocks& free) {
+    std::vector<Free*> blocks;
+    for (Free* block = free.first; block != nullptr; block = block->next) blocks.push_back(block);
+    std::sort(blocks.begin(), blocks.end(), std::less<>());
+    free.first = nullptr;
+    for (auto block = blocks.rbegin(); block != blocks.rend(); ++block) {
+        (*block)->next = free.first;
+        free.first = *block;
+    }
+    free.sorted = true;
 }
 
 // The rest of the last chunk is lost.

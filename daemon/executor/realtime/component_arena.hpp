@@ -14,7 +14,9 @@
 namespace rtcf::executor {
 
 /// Takes blocks one after another from large chunks. A free block is used again for a block of the
-/// same size, and is never returned to the system: components of the same types come and go.
+/// same size, and is never returned to the system: components of the same types come and go. The
+/// free block with the lowest address comes first, so that blocks that are allocated one after
+/// another are side by side also in used memory.
 /// Without huge pages, because the kernel may stop the loop while it makes one of locked memory.
 class ComponentArena final : public ComponentMemory {
    public:
@@ -36,13 +38,18 @@ class ComponentArena final : public ComponentMemory {
     struct Free {
         Free* next;
     };
+    struct FreeBlocks {
+        Free* first = nullptr;
+        bool sorted = true;
+    };
     using Kind = std::pair<std::size_t, std::size_t>;  // size and alignment
     static Kind kindOf(std::size_t size, std::size_t alignment) noexcept;
     static bool isLarge(const Kind& kind) noexcept;
+    static void sort(FreeBlocks& free);
     void addChunk();
 
     std::mutex mutex_;  // protects all members below
-    std::map<Kind, Free*> free_;
+    std::map<Kind, FreeBlocks> free_;
     std::vector<void*> chunks_;
     std::byte* next_ = nullptr;  // of the last chunk
     std::byte* end_ = nullptr;

@@ -2,11 +2,13 @@
 
 #include <fmt/format.h>
 
+#include <map>
 #include <rtcf/design_period.hpp>
 
 #include "common/error.hpp"
 #include "logging/log_errors.hpp"
 #include "names/name_pattern.hpp"
+#include "ordering/construction.hpp"
 
 namespace rtcf::executor {
 
@@ -251,8 +253,9 @@ ChangeOutcome Transactions::apply(const std::vector<WantedComponent>& wanted, bo
     try {
         Change change;
         change.graph = plan_->graph;
-        for (const Difference& difference : differences)
-            addDifference(change, difference, progress, dry_run);
+        const auto made = makeComponents(differences, progress, dry_run);
+        for (std::size_t i = 0; i < differences.size(); ++i)
+            addDifference(change, differences[i], made[i]);
         if (dry_run) {
             (void)wire(change.graph, filter(), {});
             restoreParameters();
@@ -275,8 +278,37 @@ ChangeOutcome Transactions::apply(const std::vector<WantedComponent>& wanted, bo
     return result;
 }
 
+// The ports of a type are known when one of its components has been constructed. So the first of
+// each type comes first, and the others in the order of execution.
+std::vector<std::shared_ptr<Instance>> Transactions::makeComponents(
+    const std::vector<Difference>& differences, const Progress& progress, bool look) {
+    std::vector<std::shared_ptr<Instance>> made(differences.size());
+    std::vector<std::size_t> loading;
+    for (std::size_t i = 0; i < differences.size(); ++i) {
+        const Difference::Kind kind = differences[i].kind;
+        if (kind == Difference::Kind::Load || kind == Difference::Kind::Replace)
+            loading.push_back(i);
+    }
+    const auto make = [&](std::size_t i) {
+        if (made[i] != nullptr) return;
+        const WantedComponent& wanted = *differences[i].wanted;
+        made[i] = loader_.make(wanted.definition, wanted.library, progress, !look);
+    };
+    std::map<std::pair<std::string, std::string>, std::size_t> examples;  // by library and type
+    std::vector<Blueprint> blueprints;
+    for (const std::size_t i : loading) {
+        const WantedComponent& wanted = *differences[i].wanted;
+        const auto [example, first] =
+            examples.try_emplace({wanted.library, wanted.definition.type}, i);
+        if (first) make(i);
+        blueprints.push_back({&wanted.definition, made[example->second]->ports().get()});
+    }
+    for (const std::size_t next : constructionOrder(blueprints)) make(loading[next]);
+    return made;
+}
+
 void Transactions::addDifference(Change& change, const Difference& difference,
-                                 const Progress& progress, bool look) {
+                                 const std::shared_ptr<Instance>& made) {
     const std::string& name = difference.component;
     switch (difference.kind) {
         case Difference::Kind::Unload:
@@ -298,17 +330,15 @@ void Transactions::addDifference(Change& change, const Difference& difference,
             break;
     }
     const ComponentDefinition& definition = difference.wanted->definition;
-    const std::shared_ptr<Instance> instance =
-        loader_.make(definition, difference.wanted->library, progress, !look);
-    change.arriving.push_back(instance);
+    change.arriving.push_back(made);
     if (difference.kind == Difference::Kind::Load) {
-        change.graph.add({instance, definition.breaks});
+        change.graph.add({made, definition.breaks});
         return;
     }
     const std::shared_ptr<Instance> old = change.graph.get(name).instance;
-    change.graph.replace(name, {instance, definition.breaks});
+    change.graph.replace(name, {made, definition.breaks});
     change.leaving.push_back(old);
-    handOver(change, *old, *instance);
+    handOver(change, *old, *made);
 }
 
 void Transactions::renewComponents(const Progress& progress) {

@@ -106,10 +106,15 @@ class Transactions {
     /// @}
 
    private:
+    /// Makes the components to load, in the order of execution as far as it is known in advance.
+    /// @param look true = does not configure them
+    /// @return by difference; null for those that load none
+    std::vector<std::shared_ptr<Instance>> makeComponents(
+        const std::vector<Difference>& differences, const Progress& progress, bool look);
     /// Adds a difference to a change.
-    /// @param look true = does not configure new components
-    void addDifference(Change& change, const Difference& difference, const Progress& progress,
-                       bool look);
+    /// @param made the component to load; null if there is none
+    void addDifference(Change& change, const Difference& difference,
+                       const std::shared_ptr<Instance>& made);
     /// Plans the hand-over of state to a replacement.
     void handOver(Change& change, const Instance& previous, const Instance& successor) const;
     /// Publishes a change that the loop has adopted.

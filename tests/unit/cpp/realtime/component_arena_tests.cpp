@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <functional>
 #include <map>
 #include <memory>
 #include <new>
@@ -85,10 +86,25 @@ TEST(ComponentArena, LaysBlocksSideBySideAndUsesFreeOnesAgain) {
     // A component that is loaded again and again takes no further memory.
     for (int i = 0; i < 100'000; ++i) {
         void* const again = arena.allocate(160, 16);
-        ASSERT_EQ(again, third);
+        ASSERT_EQ(again, first);
         arena.release(again, 160, 16);
     }
     EXPECT_EQ(arena.allocate(16, 8), second);
+}
+
+TEST(ComponentArena, UsesFreeBlocksInTheOrderOfTheirAddresses) {
+    std::mt19937 draw(1);
+    ComponentArena arena;
+    std::vector<void*> blocks(100);
+    for (void*& block : blocks) block = arena.allocate(64, 64);
+    std::vector<void*> expected = blocks;
+    std::sort(expected.begin(), expected.end(), std::less<>());
+    for (int round = 0; round < 20; ++round) {
+        std::shuffle(blocks.begin(), blocks.end(), draw);
+        for (void* const block : blocks) arena.release(block, 64, 64);
+        for (void*& block : blocks) block = arena.allocate(64, 64);
+        ASSERT_EQ(blocks, expected);
+    }
 }
 
 class alignas(128) WideComponent final : public Component {

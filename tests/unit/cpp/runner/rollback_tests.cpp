@@ -2,7 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <functional>
 #include <new>
+#include <random>
+#include <string>
+#include <vector>
 
 #include "support/runner_fixture.hpp"
 
@@ -84,6 +88,35 @@ TEST_F(Rollback, ReplayOfAGraphWithInfiniteDefaultStarts) {
               }),
               "");
 }
+
+#if !defined(__SANITIZE_ADDRESS__)  // which has to see each block
+
+TEST_F(Rollback, AppliedComponentsLieInMemoryInTheOrderOfExecution) {
+    constexpr int kCount = 40;
+    std::vector<WantedComponent> chain;
+    for (int i = 0; i < kCount; ++i) {
+        chain.push_back(wanted("Recorder", "C" + std::to_string(kCount - i)));
+        chain.back().definition.remaps = {{"in", "c" + std::to_string(i)},
+                                          {"out", "c" + std::to_string(i + 1)}};
+    }
+    std::mt19937 random(3);
+    for (int round = 0; round < 5; ++round) {
+        SCOPED_TRACE(round);
+        std::shuffle(chain.begin(), chain.end(), random);
+        apply({});
+        apply(chain);
+        std::vector<const Component*> places;
+        for (const auto& component : runner().graph()->components)
+            places.push_back(&component->instance->component());
+        ASSERT_EQ(places.size(), static_cast<std::size_t>(kCount));
+        int backwards = 0;
+        for (int i = 1; i < kCount; ++i) backwards += std::less<>()(places[i], places[i - 1]);
+        // The first one to be constructed, at either side; a chunk of memory before the last one.
+        EXPECT_LE(backwards, 3);
+    }
+}
+
+#endif
 
 // For example memory that runs out during a change.
 TEST_F(Rollback, AnyExceptionUndoesTheWholeChange) {
