@@ -6,7 +6,7 @@ import os
 import signal
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING
@@ -107,7 +107,13 @@ def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None)
                 signal.setitimer(signal.ITIMER_REAL, 0.0)
                 signal.signal(signal.SIGINT, signal.SIG_DFL)
     except KeyboardInterrupt:
-        return _fail("interrupted; a change that had started continues", REFUSED)
+        code = _fail("interrupted; a change that had started continues", REFUSED)
+        if minds:
+            # Threads of gRPC that are in a call may crash while Python ends.
+            with suppress(OSError, ValueError):
+                sys.stdout.flush()
+            os._exit(code)
+        return code
 
 
 # Modules of Python's import system, to recognise their frames.
