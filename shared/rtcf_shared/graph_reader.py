@@ -146,7 +146,7 @@ class _Reader:
         if len(found) + len(lists) > _MOST_PARAMETERS:
             raise self._error(node, f"a component has more than {_MOST_PARAMETERS} parameters")
         if node.id == "scalar":
-            if name in found:
+            if name in found or name in lists:
                 raise self._error(node, f"parameters.{name} is set twice")
             found[name] = self._value(node, f"parameters.{name}")
             return
@@ -156,7 +156,7 @@ class _Reader:
             for key, (_, member) in self._mapping(node, f"parameters.{name}").items():
                 self._parameters(f"{name}/{key}", member, found, lists, depth + 1)
         else:
-            if name in lists:
+            if name in found or name in lists:
                 raise self._error(node, f"parameters.{name} is set twice")
             lists[name] = len(node.value)
             for index, element in enumerate(node.value):

@@ -2,6 +2,7 @@
 /// The changes that turn one graph into another. Pure functions; graph thread only.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,11 +12,18 @@
 
 namespace rtcf::executor {
 
+/// Names of the ports of a type.
+struct TypePorts {
+    std::vector<std::string> inputs;
+    std::vector<std::string> outputs;
+};
+
 /// A wanted component, and the library with its type.
 struct WantedComponent {
     ComponentDefinition definition;
     std::string library;
     bool anew = false;  ///< load from the present file, even if the component already comes from it
+    std::shared_ptr<const TypePorts> ports = nullptr;  ///< null = unknown
 };
 
 /// One difference between a component and the wanted one.

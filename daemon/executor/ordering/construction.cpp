@@ -11,28 +11,29 @@ namespace rtcf::executor {
 
 namespace {
 
-std::string mapped(const ComponentDefinition& definition, const MappedPort& port) {
-    return mappedName(port.name, definition.ns, definition.fullName(), definition.remaps);
+std::string mapped(const ComponentDefinition& definition, const std::string& port) {
+    return mappedName(port, definition.ns, definition.fullName(), definition.remaps);
 }
 
 }  // namespace
 
-std::vector<std::size_t> constructionOrder(const std::vector<Blueprint>& blueprints) {
+std::vector<std::size_t> constructionOrder(const std::vector<const WantedComponent*>& wanted) {
     OrderProblem problem;
     std::map<std::string, std::size_t> writers;  // by mapped name
-    for (std::size_t i = 0; i < blueprints.size(); ++i) {
-        const ComponentDefinition& definition = *blueprints[i].definition;
+    for (std::size_t i = 0; i < wanted.size(); ++i) {
+        const ComponentDefinition& definition = wanted[i]->definition;
         problem.names.push_back(definition.fullName());
         problem.first.push_back(definition.first);
-        for (const MappedPort& port : *blueprints[i].ports)
-            if (port.output) writers.emplace(mapped(definition, port), i);
+        if (wanted[i]->ports == nullptr) continue;
+        for (const std::string& port : wanted[i]->ports->outputs)
+            writers.emplace(mapped(definition, port), i);
     }
-    for (std::size_t i = 0; i < blueprints.size(); ++i) {
-        const ComponentDefinition& definition = *blueprints[i].definition;
-        if (definition.first) continue;
+    for (std::size_t i = 0; i < wanted.size(); ++i) {
+        const ComponentDefinition& definition = wanted[i]->definition;
+        if (definition.first || wanted[i]->ports == nullptr) continue;
         const NamePattern ignore("ignore of " + definition.fullName(), definition.ignore);
-        for (const MappedPort& port : *blueprints[i].ports) {
-            if (port.output || definition.breaks.count(port.name) != 0) continue;
+        for (const std::string& port : wanted[i]->ports->inputs) {
+            if (definition.breaks.count(port) != 0) continue;
             const std::string name = mapped(definition, port);
             const auto writer = writers.find(name);
             if (writer == writers.end() || ignore.matches(name)) continue;
@@ -40,9 +41,9 @@ std::vector<std::size_t> constructionOrder(const std::vector<Blueprint>& bluepri
         }
     }
     std::vector<std::size_t> order = orderUpToLoops(problem);
-    std::vector<bool> ordered(blueprints.size(), false);
+    std::vector<bool> ordered(wanted.size(), false);
     for (const std::size_t i : order) ordered[i] = true;
-    for (std::size_t i = 0; i < blueprints.size(); ++i)
+    for (std::size_t i = 0; i < wanted.size(); ++i)
         if (!ordered[i]) order.push_back(i);
     return order;
 }

@@ -6,20 +6,13 @@
 #include <cstddef>
 #include <vector>
 
-#include "graph/definition.hpp"
-#include "graph/instance.hpp"
+#include "graph/difference.hpp"
 
 namespace rtcf::executor {
 
-/// A component to construct.
-struct Blueprint {
-    const ComponentDefinition* definition = nullptr;
-    const std::vector<MappedPort>* ports = nullptr;  ///< of any component of its type
-};
-
-/// The order of execution of components if there were no others, as indices into `blueprints`;
+/// The order of execution of components if there were no others, as indices into `wanted`;
 /// components of a loop, and those behind it, come last.
 /// @throws Error for an invalid `ignore`
-std::vector<std::size_t> constructionOrder(const std::vector<Blueprint>& blueprints);
+std::vector<std::size_t> constructionOrder(const std::vector<const WantedComponent*>& wanted);
 
 }  // namespace rtcf::executor

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <map>
 #include <rtcf/design_period.hpp>
 
 #include "common/error.hpp"
@@ -278,32 +277,21 @@ ChangeOutcome Transactions::apply(const std::vector<WantedComponent>& wanted, bo
     return result;
 }
 
-// The ports of a type are known when one of its components has been constructed. So the first of
-// each type comes first, and the others in the order of execution.
 std::vector<std::shared_ptr<Instance>> Transactions::makeComponents(
     const std::vector<Difference>& differences, const Progress& progress, bool look) {
-    std::vector<std::shared_ptr<Instance>> made(differences.size());
     std::vector<std::size_t> loading;
+    std::vector<const WantedComponent*> wanted;
     for (std::size_t i = 0; i < differences.size(); ++i) {
         const Difference::Kind kind = differences[i].kind;
-        if (kind == Difference::Kind::Load || kind == Difference::Kind::Replace)
-            loading.push_back(i);
+        if (kind != Difference::Kind::Load && kind != Difference::Kind::Replace) continue;
+        loading.push_back(i);
+        wanted.push_back(differences[i].wanted);
     }
-    const auto make = [&](std::size_t i) {
-        if (made[i] != nullptr) return;
-        const WantedComponent& wanted = *differences[i].wanted;
-        made[i] = loader_.make(wanted.definition, wanted.library, progress, !look);
-    };
-    std::map<std::pair<std::string, std::string>, std::size_t> examples;  // by library and type
-    std::vector<Blueprint> blueprints;
-    for (const std::size_t i : loading) {
-        const WantedComponent& wanted = *differences[i].wanted;
-        const auto [example, first] =
-            examples.try_emplace({wanted.library, wanted.definition.type}, i);
-        if (first) make(i);
-        blueprints.push_back({&wanted.definition, made[example->second]->ports().get()});
+    std::vector<std::shared_ptr<Instance>> made(differences.size());
+    for (const std::size_t next : constructionOrder(wanted)) {
+        made[loading[next]] =
+            loader_.make(wanted[next]->definition, wanted[next]->library, progress, !look);
     }
-    for (const std::size_t next : constructionOrder(blueprints)) make(loading[next]);
     return made;
 }
 

@@ -106,7 +106,7 @@ class Transactions {
     /// @}
 
    private:
-    /// Makes the components to load, in the order of execution as far as it is known in advance.
+    /// Makes the components to load, in the order of execution: constructionOrder().
     /// @param look true = does not configure them
     /// @return by difference; null for those that load none
     std::vector<std::shared_ptr<Instance>> makeComponents(

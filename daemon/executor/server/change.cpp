@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <map>
+#include <memory>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -59,10 +62,18 @@ ChangeOutcome change(Runner& runner, const v1::Request& request, const Progress&
             throw Error(ErrorKind::NotFound, fmt::format("no component {} to replace", name));
         }
         case v1::Request::kApply: {
+            std::map<std::pair<std::string, std::string>, std::shared_ptr<const TypePorts>> ports;
+            for (const v1::TypePorts& type : request.apply().types()) {
+                ports[{type.library(), type.type()}] = std::make_shared<TypePorts>(
+                    TypePorts{{type.inputs().begin(), type.inputs().end()},
+                              {type.outputs().begin(), type.outputs().end()}});
+            }
             std::vector<WantedComponent> wanted;
             for (const v1::Load& load : request.apply().components()) {
                 trustOwnerOf(runner, load);
-                wanted.push_back({definitionFrom(load.component()), load.library(), load.anew()});
+                const auto type = ports.find({load.library(), load.component().type()});
+                wanted.push_back({definitionFrom(load.component()), load.library(), load.anew(),
+                                  type == ports.end() ? nullptr : type->second});
             }
             return runner.apply(wanted, request.apply().dry_run(), progress);
         }

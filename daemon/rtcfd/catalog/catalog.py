@@ -50,6 +50,7 @@ class Library:
     owner: int | None
     others: tuple[str, ...] = ()  # further libraries with the type, which are not used
     parameters: tuple[graph_pb2.ParameterInfo, ...] = ()  # declared by the type
+    ports: tuple[graph_pb2.PortInfo, ...] = ()  # of the type
 
     def note(self, spec: graph_pb2.ComponentSpec) -> str:
         """Return a note if several libraries provide the type, else an empty string."""
@@ -63,6 +64,16 @@ class Library:
     def set_vector_sizes(self, spec: graph_pb2.ComponentSpec) -> None:
         """Set the vectors of a component that are given as lists; see declared_values.py."""
         declared_values.set_vector_sizes(full_name(spec), spec, self.parameters)
+
+    def type_ports(self, type_name: str) -> wire.TypePorts:
+        """Return the ports of its type."""
+        output = graph_pb2.DIRECTION_OUTPUT
+        return wire.TypePorts(
+            library=self.path,
+            type=type_name,
+            inputs=[each.name for each in self.ports if each.direction != output],
+            outputs=[each.name for each in self.ports if each.direction == output],
+        )
 
     def load(self, spec: graph_pb2.ComponentSpec) -> wire.Load:
         """Return the request to load a component from this library, with its vectors' sizes."""
@@ -116,6 +127,7 @@ class Catalog:
                 self._owner(Path(found.library)),
                 tuple(contents.others.get(type_name, ())),
                 tuple(found.parameters),
+                tuple(found.ports),
             )
         if contents.problems:
             later = contents.hidden.get(type_name)
@@ -205,14 +217,22 @@ class Catalog:
 
 async def loads(catalog: Catalog, specs: Iterable[graph_pb2.ComponentSpec]) -> list[wire.Load]:
     """Return the requests to load components; each type is looked up once."""
+    return list((await whole_graph(catalog, specs)).components)
+
+
+async def whole_graph(
+    catalog: Catalog, specs: Iterable[graph_pb2.ComponentSpec], *, dry_run: bool = False
+) -> wire.Apply:
+    """Return the request to make a graph consist of components; each type is looked up once."""
     libraries: dict[tuple[str, str], Library] = {}
-    result = []
+    apply = wire.Apply(dry_run=dry_run)
     for spec in specs:
         key = (spec.package, spec.type)
         if key not in libraries:
             libraries[key] = await catalog.find(*key)
-        result.append(libraries[key].load(spec))
-    return result
+            apply.types.append(libraries[key].type_ports(spec.type))
+        apply.components.append(libraries[key].load(spec))
+    return apply
 
 
 def _one_problem(library: Path, problem: str) -> str:

@@ -14,7 +14,7 @@ from rtcf_shared.naming import closest, listing, suggestion
 
 from rtcfd.access import caller
 from rtcfd.access.caller import Caller
-from rtcfd.catalog.catalog import loads
+from rtcfd.catalog.catalog import loads, whole_graph
 from rtcfd.common import runner_settings
 from rtcfd.common.errors import InvalidArgument, NoMaster, NotFound, RequestError
 from rtcfd.common.names import absolute, check_graph, full_name
@@ -152,7 +152,11 @@ async def replace(
         if old in runner.desired.left_out:  # the executor does not have it
             load = library.load(spec)
             if not reset:
-                load.inherited.extend(runner.desired.components[old].parameters)
+                inherited = graph_pb2.ComponentSpec()
+                inherited.CopyFrom(runner.desired.components[old])
+                with contextlib.suppress(RequestError):  # the old type had other vectors
+                    library.set_vector_sizes(inherited)
+                load.inherited.extend(inherited.parameters)
             return wire.Request(load=load)
         return wire.Request(
             replace=wire.Replace(
@@ -212,7 +216,7 @@ async def release(
             return wire.Request(load=load)
         every = [spec for name, spec in runner.desired.components.items()
                  if name not in runner.desired.left_out or name in names]  # fmt: skip
-        apply = wire.Apply(components=await loads(runner.shared.catalog, every))
+        apply = await whole_graph(runner.shared.catalog, every)
         for load in apply.components:
             load.anew = full_name(load.component) in marked
         return wire.Request(apply=apply)
@@ -305,7 +309,7 @@ async def _ask_to_apply(
     """Make the executor apply a graph and settings, or neither."""
     before = runner.settings()
     changes = runner_settings.differences(before, request.settings)
-    apply = wire.Apply(components=await loads(runner.shared.catalog, specs), dry_run=True)
+    apply = await whole_graph(runner.shared.catalog, specs, dry_run=True)
     for spec, load in zip(specs, apply.components, strict=True):
         if spec.lists:
             spec.CopyFrom(load.component)
@@ -396,6 +400,7 @@ async def _note_parameters(
     """Note the parameters that a graph has changed."""
     for spec in specs:
         name = full_name(spec)
+        await parameters.settle_lists(runner, name)
         before = runner.desired.components.get(name)
         known = {} if before is None else {each.name: each.value for each in before.parameters}
         now = {each.name: each.value for each in spec.parameters}

@@ -12,7 +12,7 @@ from rtcf.v1 import control_pb2, errors_pb2, graph_pb2, runner_pb2
 from rtcf_shared.graph_writer import live_spec
 from rtcf_shared.naming import listing
 
-from rtcfd.catalog.catalog import loads
+from rtcfd.catalog.catalog import loads, whole_graph
 from rtcfd.common.errors import FailedPrecondition, InvalidArgument, RequestError
 from rtcfd.operations.loop import start_in_turn, stop_adopted
 from rtcfd.operations.runner_core import RunnerCore
@@ -130,9 +130,10 @@ async def _restore(runner: RunnerCore) -> None:
     runner.down_reason = restoring = f"its components are being restored: {len(wanted)}"
     try:
         # All at once, for speed; one by one if that fails.
-        every = await loads(runner.shared.catalog, [desired.components[name] for name in wanted])
-        await runner.ask(wire.Request(apply=wire.Apply(components=every)))
-        for name, load in zip(wanted, every, strict=True):
+        specs = [desired.components[name] for name in wanted]
+        apply = await whole_graph(runner.shared.catalog, specs)
+        await runner.ask(wire.Request(apply=apply))
+        for name, load in zip(wanted, apply.components, strict=True):
             desired.settle(name, load.component)
     except RequestError:
         if runner.up:

@@ -47,6 +47,8 @@ def follow_components(
         name = str(info.full_name)
         left_out.pop(name, None)
         present = live_spec(info)
+        if name in desired.components:
+            desired.settle(name, present)
         known = desired.components.get(name)
         if known is None:
             lines.append(f"{name} was not in the saved graph")

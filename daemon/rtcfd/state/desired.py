@@ -95,7 +95,7 @@ class Desired:
         self.quarantined.pop(full_name, None)
 
     def settle(self, full_name: str, spec: graph_pb2.ComponentSpec) -> None:
-        """Note a component's parameters with the sizes of its vectors, which rtcfd knows now."""
+        """If a component has lists, note its parameters with the sizes of its vectors instead."""
         kept = self._components[full_name]
         if kept.lists:
             del kept.parameters[:], kept.lists[:]

@@ -126,6 +126,20 @@ def test_the_graph_of_a_file_is_restored_after_a_crash(
     assert changes(daemon, str(file)) == set()
 
 
+def test_components_are_constructed_in_the_order_of_execution(
+    client: rtcf.Client,
+) -> None:
+    components = [
+        rtcf.component("rtcf_test", "Weights", name="a", remaps=["u:=mid"]),
+        rtcf.component("rtcf_test", "Polynomial", name="b", remaps=["y:=mid"]),
+        rtcf.component("rtcf_examples", "Wave", name="c", remaps=["out:=/b/start"]),
+    ]
+    lines: list[str] = []
+    client.apply(components, "rt_runner", on_progress=lines.append)
+    order = [line.split()[1] for line in lines if line.startswith("configuring")]
+    assert order == client.get_order() == ["/b", "/a", "/c"]
+
+
 def test_apply_loads_a_rebuilt_library_if_requested(tmp_path: Path) -> None:
     built = BUILD_TREE / "lib" / "rtcf" / "rtcf_examples" / "rtcf_examples.so"
     library = tmp_path / "packages" / "rtcf_mine" / "mine.so"

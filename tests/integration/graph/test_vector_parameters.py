@@ -199,6 +199,29 @@ def test_a_component_that_is_left_out_is_tuned_as_others(late: Daemon) -> None:
         assert used(client) == (1, 1.0)
 
 
+def test_the_state_of_an_adopted_executor_has_no_list(late: Daemon) -> None:
+    file = late.folder / "graphs.d" / "w.yaml"
+    file.write_text(file.read_text().replace("[1, 2]", "[1, 2, 3]"))  # as many as by default
+    late.end()
+    late.start()  # loads it, and saves nothing
+    late.end(signal.SIGKILL)
+    late.start()
+    assert "differs" not in late.log()
+    assert late.ctl("load", "rtcf_test", "Weights", "--name", "other").returncode == 0
+    (state,) = (each for each in (late.folder / "state").rglob("*.json") if "rtcf_late" in
+                each.read_text())  # fmt: skip
+    assert '"filter/taps_size"' in state.read_text()
+    assert '"lists"' not in state.read_text()
+
+
+def test_a_successor_of_another_package_has_the_whole_list(late: Daemon) -> None:
+    shutil.rmtree(late.folder / "packages" / "rtcf_late")
+    replaced = late.ctl("replace", "w", "rtcf_test", "Weights")
+    assert replaced.returncode == 0, replaced.stderr
+    with rtcf.Client(late.socket) as client:
+        assert used(client) == (2, 3.0)
+
+
 def test_a_component_that_is_left_out_is_replaced_with_a_list(late: Daemon) -> None:
     (spec,) = graph("[5, 6, 7]")
     with rtcf.Client(late.socket) as client:

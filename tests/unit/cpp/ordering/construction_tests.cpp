@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <memory>
 #include <random>
 #include <set>
 #include <string>
@@ -38,22 +39,24 @@ class ConstructionTest : public GraphFixture {
             const std::string ignored = one_of(4) == 0 ? "/o" + std::to_string(one_of(count)) : "";
             instances_.push_back(
                 mimo("C" + std::to_string(names[i]), std::move(remaps), one_of(8) == 0, ignored));
-            definitions_.push_back(instances_.back()->definition());
-            if (one_of(4) == 0) definitions_.back().breaks.insert("in1");
+            components_.push_back({instances_.back()->definition(), {}, false, ports_});
+            if (one_of(4) == 0) components_.back().definition.breaks.insert("in1");
         }
         std::vector<std::size_t> order(count);
         for (std::size_t i = 0; i < count; ++i) order[i] = i;
         std::shuffle(order.begin(), order.end(), random);
         for (const std::size_t i : order) {
-            graph_.add({instances_[i], definitions_[i].breaks});
-            blueprints_.push_back({&definitions_[i], instances_[0]->ports().get()});
+            graph_.add({instances_[i], components_[i].definition.breaks});
+            wanted_.push_back(&components_[i]);
         }
     }
 
     std::vector<std::shared_ptr<Instance>> instances_;
-    std::vector<ComponentDefinition> definitions_;
+    std::vector<WantedComponent> components_;
     Graph graph_;
-    std::vector<Blueprint> blueprints_;
+    std::vector<const WantedComponent*> wanted_;
+    const std::shared_ptr<const TypePorts> ports_ =
+        std::make_shared<TypePorts>(TypePorts{{"in1", "in2", "in3", "in4"}, {"out1", "out2"}});
 };
 
 TEST_F(ConstructionTest, IsInTheOrderOfExecution) {
@@ -63,12 +66,12 @@ TEST_F(ConstructionTest, IsInTheOrderOfExecution) {
     for (int round = 0; round < 200; ++round) {
         SCOPED_TRACE(round);
         instances_.clear();
-        definitions_.clear();
-        definitions_.reserve(12);
+        components_.clear();
+        components_.reserve(12);
         graph_ = {};
-        blueprints_.clear();
+        wanted_.clear();
         draw(random, 12);
-        const std::vector<std::size_t> order = constructionOrder(blueprints_);
+        const std::vector<std::size_t> order = constructionOrder(wanted_);
         if (errorOf(graph_).empty()) {
             EXPECT_EQ(order, wire(graph_, {}, {}).order);
             ++orderable;
@@ -82,13 +85,21 @@ TEST_F(ConstructionTest, IsInTheOrderOfExecution) {
     EXPECT_GT(loops, 20);
 }
 
-TEST_F(ConstructionTest, RejectsAnInvalidPattern) {
-    const std::vector<MappedPort> none;
-    ComponentDefinition definition;
-    definition.name = "A";
-    definition.ignore = "(";
-    EXPECT_THROW(constructionOrder({{&definition, &none}}), Error);
+TEST_F(ConstructionTest, OfComponentsOfUnknownPortsIsByName) {
+    WantedComponent b;
+    b.definition.name = "B";
+    WantedComponent a;
+    a.definition.name = "A";
+    EXPECT_EQ(constructionOrder({&b, &a}), (std::vector<std::size_t>{1, 0}));
     EXPECT_TRUE(constructionOrder({}).empty());
+}
+
+TEST_F(ConstructionTest, RejectsAnInvalidPattern) {
+    WantedComponent component;
+    component.definition.name = "A";
+    component.definition.ignore = "(";
+    component.ports = ports_;
+    EXPECT_THROW(constructionOrder({&component}), Error);
 }
 
 }  // namespace

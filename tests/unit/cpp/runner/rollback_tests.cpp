@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <memory>
 #include <new>
 #include <random>
 #include <string>
@@ -93,9 +94,11 @@ TEST_F(Rollback, ReplayOfAGraphWithInfiniteDefaultStarts) {
 
 TEST_F(Rollback, AppliedComponentsLieInMemoryInTheOrderOfExecution) {
     constexpr int kCount = 40;
+    const auto ports = std::make_shared<executor::TypePorts>(executor::TypePorts{{"in"}, {"out"}});
     std::vector<WantedComponent> chain;
     for (int i = 0; i < kCount; ++i) {
         chain.push_back(wanted("Recorder", "C" + std::to_string(kCount - i)));
+        chain.back().ports = ports;
         chain.back().definition.remaps = {{"in", "c" + std::to_string(i)},
                                           {"out", "c" + std::to_string(i + 1)}};
     }
@@ -111,8 +114,7 @@ TEST_F(Rollback, AppliedComponentsLieInMemoryInTheOrderOfExecution) {
         ASSERT_EQ(places.size(), static_cast<std::size_t>(kCount));
         int backwards = 0;
         for (int i = 1; i < kCount; ++i) backwards += std::less<>()(places[i], places[i - 1]);
-        // The first one to be constructed, at either side; a chunk of memory before the last one.
-        EXPECT_LE(backwards, 3);
+        EXPECT_LE(backwards, 2) << "a chunk of memory may lie before the last one";
     }
 }
 
