@@ -59,8 +59,10 @@ def set_parameters(client: rtcf.Client, args: argparse.Namespace, output: Output
     component, dot, what = args.component.partition(".")
     if dot and what != "state":
         raise ValueError(f"{args.component}: use a component's name, or {component}.state")
-    change = client.set_state if dot else client.set_parameters
-    result = change(component, parameters, args.runner, output.progress)
+    if dot:
+        result = client.set_state(component, parameters, args.runner, output.progress)
+    else:
+        result = client.set_parameters(component, parameters, args.runner, output.progress)
     output.changed(f"set {', '.join(args.parameters)} of {args.component}", result)
 
 
