@@ -376,6 +376,7 @@ void Server::handle(Connection& connection, const v1::Request& request) {
         hello.set_pid(::getpid());
         hello.set_flight_recorder_fd(runner_->recorder().fd());
         hello.set_frames_fd(runner_->frameMemory().fd());
+        hello.set_unconfigured(!configured_);
         if (const DirectStopReport report = direct_stop_->last(); report.count != 0)
             *hello.mutable_direct_stop() = directStopTo(report);
         connection.setGreeted();
@@ -510,6 +511,7 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
             };
             if (request.kind_case() == v1::Request::kConfigure) {
                 runner_->configure(settingsFrom(request.configure(), runner_->settings()));
+                configured_ = true;
                 *response.mutable_status() = status();
             } else if (request.kind_case() == v1::Request::kLimits) {
                 runner_->limitTaps(request.limits().taps());

@@ -86,6 +86,7 @@ class Server {
     bool exiting_ = false;
     bool had_daemon_ = false;
     std::int64_t alone_since_ns_ = 0;
+    std::atomic<bool> configured_{false};  // by rtcfd; set by the graph thread
     Runner* runner_ = nullptr;
     Log* log_ = nullptr;
     Access* access_ = nullptr;

@@ -71,6 +71,7 @@ class Executor:
         self.verdict = ""  # the cause of its end, or the reason for which rtcfd requested it
         self.safe = True  # see Verdict.safe
         self.version = ""  # of rtcf
+        self.unconfigured = False  # no rtcfd has sent it the runner's settings yet
         self.foreign = ""  # why it accepts only the requests stop and exit; empty = it accepts all
         self._protocol = 0
         self._runner = runner
@@ -317,6 +318,7 @@ class Executor:
             )
         self.version = hello.version or "?"
         self._protocol = hello.protocol
+        self.unconfigured = hello.unconfigured
         if abs(hello.protocol - PROTOCOL) > 1:
             self.foreign = (
                 f"{self._peer} is of rtcf {self.version} and speaks protocol {hello.protocol}, "

@@ -212,7 +212,7 @@ class RunnerCore(ABC):
     async def take_executor(self, only_left_over: bool = False) -> bool | None:
         """Adopt a left-over executor (returns True), or launch a new one (returns False).
 
-        With `only_left_over`, launches none (returns None).  Waits for an executor that is
+        One that an earlier rtcfd launched, but did not configure, is a new one.  With `only_left_over`, launches none (returns None).  Waits for an executor that is
         being ended.
         """
         self._settled.clear()
@@ -221,13 +221,15 @@ class RunnerCore(ABC):
         try:
             async with self._changing_executor:
                 executor = await Executor.adopt(self.name, command, self.take_unasked, self._ended)
-                adopted = executor is not None
-                if not adopted and only_left_over:
+                adopted = executor is not None and not executor.unconfigured
+                if executor is None and only_left_over:
                     self.down_reason = "it has no executor"
                     self.silent = None
                     return None
                 if executor is None and (self.leaving or not self.closing):
                     executor = await self._launch()
+                elif executor is not None and not adopted:
+                    await self._configure(executor)
                 if self.closing:
                     if executor:
                         await (executor.leave() if self.leaving else executor.shut_down())
@@ -368,12 +370,16 @@ class RunnerCore(ABC):
         executor = await Executor.launch(
             self.name, self.shared.command, self.take_unasked, self._ended
         )
+        await self._configure(executor)
+        return executor
+
+    async def _configure(self, executor: Executor) -> None:
+        """Send a new executor the settings; end it if that fails."""
         try:
             await executor.request(wire.Request(configure=self.settings()))
         except BaseException:
             await executor.shut_down()
             raise
-        return executor
 
     def _ended(self, executor: Executor, end: End) -> None:
         """Handle the end of an executor."""

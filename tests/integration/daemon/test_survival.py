@@ -37,6 +37,35 @@ def count(client: rtcf.Client) -> int:
     return int(ports["out"].value.removeprefix("data: "))
 
 
+def test_an_executor_that_no_rtcfd_has_configured_gets_settings_and_graph(daemon: Daemon) -> None:
+    with rtcf.Client(daemon.socket) as client:
+        client.set_runner(runner_pb2.RunnerSettings(frequency_hz=250.0))
+        client.load(rtcf.component("rtcf_test", "Counter", name="steady"))
+        pid = state(client).pid
+    command = Path(f"/proc/{pid}/cmdline").read_text().split("\0")[:-1]
+    daemon.end()
+    wait_for(lambda: is_gone(pid), "the end of the executor")
+    # As if rtcfd had died between the start of its executor and the first request.
+    socket = Path(next(word for word in command if word.endswith(".sock")))
+    for word in command:
+        if word.startswith(f"{daemon.folder}/"):
+            Path(word).parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    with subprocess.Popen(command) as executor:
+        try:
+            wait_for(socket.exists, "the socket")
+            daemon.start()
+            with rtcf.Client(daemon.socket) as client:
+                after = state(client)
+                assert after.pid == executor.pid
+                assert after.settings.frequency_hz == 250.0
+                assert client.get_order() == ["/steady"]
+            assert "is kept" not in daemon.log()
+            assert "left out" not in daemon.log()
+            daemon.end()
+        finally:
+            executor.kill()
+
+
 def test_a_loop_continues_without_rtcfd_and_is_adopted_unchanged(daemon: Daemon) -> None:
     with rtcf.Client(daemon.socket) as client:
         client.load(rtcf.component("rtcf_test", "Counter", name="steady"))
