@@ -212,8 +212,8 @@ class RunnerCore(ABC):
     async def take_executor(self, only_left_over: bool = False) -> bool | None:
         """Adopt a left-over executor (returns True), or launch a new one (returns False).
 
-        One that an earlier rtcfd launched, but did not configure, is a new one.  With `only_left_over`, launches none (returns None).  Waits for an executor that is
-        being ended.
+        One that an earlier rtcfd launched, but did not configure, is a new one.  With
+        `only_left_over`, launches none (returns None).  Waits for an executor that is being ended.
         """
         self._settled.clear()
         self.down_reason = "its executor is starting"
