@@ -145,9 +145,9 @@ class _Reader:
             raise self._error(node, f"more than {_DEEPEST} mappings or lists in each other")
         if len(found) + len(lists) > _MOST_PARAMETERS:
             raise self._error(node, f"a component has more than {_MOST_PARAMETERS} parameters")
+        if node.id != "mapping" and (name in found or name in lists):
+            raise self._error(node, f"parameters.{name} is set twice")
         if node.id == "scalar":
-            if name in found or name in lists:
-                raise self._error(node, f"parameters.{name} is set twice")
             found[name] = self._value(node, f"parameters.{name}")
             return
         if node.id == "mapping":
@@ -156,8 +156,6 @@ class _Reader:
             for key, (_, member) in self._mapping(node, f"parameters.{name}").items():
                 self._parameters(f"{name}/{key}", member, found, lists, depth + 1)
         else:
-            if name in found or name in lists:
-                raise self._error(node, f"parameters.{name} is set twice")
             lists[name] = len(node.value)
             for index, element in enumerate(node.value):
                 self._parameters(f"{name}_{index}", element, found, lists, depth + 1)

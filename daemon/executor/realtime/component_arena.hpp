@@ -16,7 +16,7 @@ namespace rtcf::executor {
 /// Takes blocks one after another from large chunks. A free block is used again for a block of the
 /// same size, and is never returned to the system: components of the same types come and go. The
 /// free block with the lowest address comes first, so that blocks that are allocated one after
-/// another are side by side also in used memory.
+/// another lie in the order of their addresses also where others were before.
 /// Without huge pages, because the kernel may stop the loop while it makes one of locked memory.
 class ComponentArena final : public ComponentMemory {
    public:

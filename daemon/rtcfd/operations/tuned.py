@@ -65,9 +65,8 @@ async def keep(
     spec: graph_pb2.ComponentSpec,
     given_before: graph_pb2.ComponentSpec,
 ) -> Tuned:
-    """Put tuned values of the component `old` into its replacement."""
+    """Put tuned values of the component `old`, whose lists are settled, into its replacement."""
     info = None if old in runner.desired.left_out else await parameters.live_component(runner, old)
-    await parameters.settle_lists(runner, old)
     await _set_vector_sizes(runner.shared.catalog, spec, given_before, info)
     values = _values(runner, old, info, given_before)
     return await _keep(runner.shared.catalog, spec, given_before, values)
@@ -79,6 +78,7 @@ async def _set_vector_sizes(
     given_before: graph_pb2.ComponentSpec,
     info: graph_pb2.ComponentInfo | None,
 ) -> None:
+    """Set the vectors that a component and its earlier specification have as lists."""
     if not (spec.lists or given_before.lists):
         return
     library = await catalog.find(spec.package, spec.type)

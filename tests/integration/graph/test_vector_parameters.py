@@ -16,7 +16,7 @@ from launch_processes import Launching
 from rtcf.testing import Bench
 from rtcf.v1 import graph_pb2
 from rtcf_launch.master import Master
-from values import parameter_values, port_value
+from values import parameter_values, port_value, state
 
 GRAPH = """\
 components:
@@ -51,6 +51,14 @@ def apply(daemon: Daemon, file: Path, taps: str) -> None:
     assert applied.returncode == 0, applied.stderr
 
 
+def kill_executor(client: rtcf.Client) -> None:
+    """Kill the executor, and wait until the next one has the component."""
+    pid = state(client).pid
+    os.kill(pid, signal.SIGKILL)
+    wait_for(lambda: state(client).pid not in (0, pid), "an executor")
+    wait_for(lambda: client.get_order() == ["/w"], "the component")
+
+
 def test_an_element_does_not_change_the_size(daemon: Daemon, client: rtcf.Client) -> None:
     taps = ("--param", "filter/taps_0:=4", "--param", "filter/taps_1:=2")
     load = ("load", "rtcf_test", "Weights", "--name", "w")
@@ -80,10 +88,7 @@ def test_a_tuned_element_is_saved_and_restored_alone(
     assert daemon.ctl("apply", str(file)).returncode == 0
     assert used(client) == (3, 2.5)
     assert "nothing to change" in daemon.ctl("apply", str(file)).stdout
-    (status,) = client.get_status().runners
-    os.kill(status.pid, signal.SIGKILL)
-    wait_for(lambda: client.get_status().runners[0].pid not in (0, status.pid), "an executor")
-    wait_for(lambda: client.get_order() == ["/w"], "the component")
+    kill_executor(client)
     assert used(client) == (3, 2.5)
 
 
@@ -183,10 +188,7 @@ def test_the_list_of_a_component_that_was_left_out_is_its_vector(late: Daemon) -
     assert "differs" not in late.log()
     assert late.ctl("set", "w", "filter/taps_size:=1").returncode == 0
     with rtcf.Client(late.socket) as client:
-        (status,) = client.get_status().runners
-        os.kill(status.pid, signal.SIGKILL)
-        wait_for(lambda: client.get_status().runners[0].pid not in (0, status.pid), "an executor")
-        wait_for(lambda: client.get_order() == ["/w"], "the component")
+        kill_executor(client)
         assert used(client) == (1, 1.0)
 
 
@@ -208,10 +210,10 @@ def test_the_state_of_an_adopted_executor_has_no_list(late: Daemon) -> None:
     late.start()
     assert "differs" not in late.log()
     assert late.ctl("load", "rtcf_test", "Weights", "--name", "other").returncode == 0
-    (state,) = (each for each in (late.folder / "state").rglob("*.json") if "rtcf_late" in
-                each.read_text())  # fmt: skip
-    assert '"filter/taps_size"' in state.read_text()
-    assert '"lists"' not in state.read_text()
+    saved = [each.read_text() for each in (late.folder / "state").rglob("*.json")]
+    (text,) = (each for each in saved if "rtcf_late" in each)
+    assert '"filter/taps_size"' in text
+    assert '"lists"' not in text
 
 
 def test_a_successor_of_another_package_has_the_whole_list(late: Daemon) -> None:
@@ -318,12 +320,8 @@ def test_a_bench_takes_a_list() -> None:
 
 
 @pytest.mark.parametrize("taps", [[1.0, 2.0, 3.0, 4.0, 5.0], [0.5, 0.25, 0.25]])
-def test_a_list_of_a_launch_file_overrides_a_size(
-    launching: Launching, tmp_path: Path, taps: list[float]
-) -> None:
-    file = tmp_path / "weights.launch"
-    file.write_text(LAUNCH.replace("TAPS", f"{taps}"))
-    launching.roslaunch(str(file))
+def test_a_list_of_a_launch_file_overrides_a_size(launching: Launching, taps: list[float]) -> None:
+    launching.launch_text(LAUNCH.replace("TAPS", f"{taps}"))
     server = Master(launching.master.uri, "/test")
     with launching.client() as (client, runner):
         wait_for(lambda: client.get_order(runner) == ["/w"], "the component")
