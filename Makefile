@@ -3,7 +3,9 @@
 # bookworm) on a machine of the other release, it is done in a Debian of that one.
 BUILD := build
 # Compilers are called by way of ccache where it is installed.
-export CMAKE_CXX_COMPILER_LAUNCHER = $(wildcard /usr/bin/ccache)
+export CMAKE_CXX_COMPILER_LAUNCHER = $(shell command -v ccache)
+# One cache for this tree and the packages, which are built in another folder.
+export CCACHE_BASEDIR = $(CURDIR)
 export CMAKE_BUILD_PARALLEL_LEVEL ?= $(shell nproc)
 # Progress: share of the steps done, seconds since the start.
 export NINJA_STATUS ?= [%p, %e s] 
@@ -24,48 +26,46 @@ all: dependencies build ## build everything into build/ (default)
 dependencies:
 	@tools/install-dependencies build run
 
+# Before the build, which uses the compiler cache that the tests need.
+dependencies-%:
+	@tools/install-dependencies build run $*
+
 build:
-	@cmake -S . -B $(BUILD) -G Ninja
+	@tools/configure $(BUILD)
 	@cmake --build $(BUILD)
 
 demo: dependencies ## run Fig. 1 of the paper at 2 kHz for 10 s, with ROS nodes talking to it
-	@cmake -S . -B $(BUILD) -G Ninja
+	@tools/configure $(BUILD)
 	@echo "building what the demo needs: some minutes the first time"
 	@cmake --build $(BUILD) --target rtcf_demo
 	@components/rtcf_examples/demo/demo
 
 robot: dependencies ## run a simulated arm until Ctrl-C, and show it in the browser
-	@cmake -S . -B $(BUILD) -G Ninja
+	@tools/configure $(BUILD)
 	@echo "building the arm and its controllers: some minutes the first time"
 	@cmake --build $(BUILD) --target rtcf_robot
 	@components/rtcf_arm/show
 
 checker: dependencies ## build the executor that `build/bin/rtcfctl check` runs components in
-	@cmake -S . -B $(BUILD)-rtsan -G Ninja -DRTCF_SANITIZE=realtime \
-	  -DCMAKE_CXX_COMPILER=clang++-22 -DRTCF_UNITY=OFF
+	@tools/configure $(BUILD)-rtsan -DRTCF_SANITIZE=realtime
 	@cmake --build $(BUILD)-rtsan --target rtcf-executor
 
-test: all ## all checks: lint, unit, sanitizers, integration, packages
-	@tools/install-dependencies test
-	@tests/run
+test: dependencies-test all ## all checks; ONLY=changed (or files): those that a change may have broken
+	@tests/run $(if $(ONLY),--only $(ONLY))
 
-test-long: all ## the same with soaks, reproducible builds, PREEMPT_RT and the other Debian
-	@tools/install-dependencies test-long
+test-long: dependencies-test-long all ## the same with soaks, reproducible builds, PREEMPT_RT and the other Debian
 	@tests/run --long
 
-bench: all ## measure against HAL, cyclictest and direct calls; HOURS=3: a long run
-	@tools/install-dependencies bench
+bench: dependencies-bench all ## measure against HAL, cyclictest and direct calls; HOURS=3: a long run
 	@tests/bench/run
 
-bench-rt: all ## measure in a PREEMPT_RT machine with instruction-counted time
-	@tools/install-dependencies bench-rt
+bench-rt: dependencies-bench-rt all ## measure in a PREEMPT_RT machine with instruction-counted time
 	@tests/bench/run-rt
 
 deb: dependencies ## build the Debian packages into build/deb/
 	@tools/build-packages $(BUILD)/deb
 
-lint: all ## format, static checks and types; LINT_ALL=1: clang-tidy on every file
-	@tools/install-dependencies test
+lint: dependencies-test all ## format, static checks and types; LINT_ALL=1: clang-tidy on every file
 	@tools/lint
 
 endif

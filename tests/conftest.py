@@ -1,14 +1,19 @@
-"""Property tests: no time limits, and no repetition of a test with a counterexample.
+"""Property tests: no time limits, one budget, and no repetition of a test with a counterexample.
 
 A counterexample is kept in build/hypothesis/; the next run tries it first. Its test is also listed
 in build/test/counterexamples: tests/run does not repeat it, since other draws may pass.
+
+The times of all tests are in build/test/times.tsv.
 """
 
+import os
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, errors, settings
 from hypothesis.database import DirectoryBasedExampleDatabase
+from random_share import RandomShares
+from time_table import TimeTable
 
 _BUILD = Path(__file__).resolve().parents[1] / "build"
 _NOTED = _BUILD / "test" / "counterexamples"
@@ -21,6 +26,16 @@ settings.register_profile(
     suppress_health_check=[HealthCheck.too_slow],
 )
 settings.load_profile("any pace")
+
+# Processor time of all property tests of a run.
+_RANDOM_S = float(os.environ.get("RTCF_RANDOM_S", "60"))
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.pluginmanager.register(RandomShares(_RANDOM_S))
+    # Not in the process that starts those of pytest-xdist.
+    if hasattr(config, "workerinput") or not config.getoption("numprocesses", None):
+        config.pluginmanager.register(TimeTable(_BUILD / "test" / "times.tsv"))
 
 
 def pytest_exception_interact(

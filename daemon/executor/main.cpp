@@ -243,9 +243,9 @@ int run(const Options& options) {
                       recorder, options.cpu_claims);
         // Constructed after the runner, so that it can stop the runner until the end.
         DirectStop direct_stop(options.stop_socket, options.resume_mark, access);
-        direct_stop.serve({[&](const DirectStopReport& report) {
+        direct_stop.serve({[&] {
                                runner.requestStop();
-                               server.publish(report);
+                               server.wakeUp();
                                runner.post([&runner] {
                                    try {
                                        runner.stop([](const std::string&) {});

@@ -11,7 +11,7 @@ import re
 import typing
 import unicodedata
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, ClassVar
 
 import numpy as np
@@ -454,6 +454,7 @@ def _first_line(doc: str | None) -> str:
     return (doc or "").strip().partition("\n")[0].rstrip(".")
 
 
+@lru_cache(maxsize=256)  # reading the source would take most of the time of describe()
 def _lines(cls: type) -> dict[str, int]:
     """Return the source line of each name in a class; empty if there is no source."""
     try:

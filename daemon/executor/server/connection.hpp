@@ -26,6 +26,9 @@ class Connection {
     std::uint64_t id() const noexcept { return id_; }
     bool greeted() const noexcept { return greeted_; }
     void setGreeted() noexcept { greeted_ = true; }
+    /// Number of direct stops that the peer has been told of.
+    std::uint64_t toldStops() const noexcept { return told_stops_; }
+    void setToldStops(std::uint64_t count) noexcept { told_stops_ = count; }
     bool wantsWrite() const noexcept { return waiting() != 0; }
     /// Number of bytes that the peer has not read.
     std::size_t waiting() const noexcept { return out_.size() - written_; }
@@ -45,6 +48,7 @@ class Connection {
     int fd_;
     std::uint64_t id_;
     bool greeted_ = false;
+    std::uint64_t told_stops_ = 0;
     std::string in_;
     std::string out_;
     std::size_t written_ = 0;

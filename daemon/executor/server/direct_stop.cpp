@@ -183,13 +183,11 @@ bool DirectStop::answerStopped(const Client& client) const {
 }
 
 void DirectStop::stop(const Client& client) {
-    DirectStopReport report;
     {
         const std::lock_guard<std::mutex> lock(mutex_);
         last_ = {last_.count + 1, client.user, client.pid, monotonicNow()};
-        report = last_;
     }
-    what_.stop(report);
+    what_.stop();
     mark_.remove();
 }
 

@@ -36,7 +36,7 @@ v1::DirectStop directStopTo(const DirectStopReport& report);
 /// The loop to stop. The socket's thread calls both functions.
 struct Stoppable {
     /// Stops the loop at the next boundary, and voids earlier start requests.
-    std::function<void(const DirectStopReport&)> stop;
+    std::function<void()> stop;
     std::function<bool()> running;
 };
 

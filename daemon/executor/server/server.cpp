@@ -153,10 +153,26 @@ void Server::handOn(const v1::Response& call) {
     calls_.answer(number, {false, "no rtcfd is connected to this executor: is it running?"});
 }
 
-void Server::publish(const DirectStopReport& report) {
+// Tells all rtcfd of a direct stop.
+void Server::tellStops() {
+    std::vector<std::uint64_t> gone;
+    for (const auto& [id, connection] : connections_) {
+        if (!tellStop(*connection)) gone.push_back(id);
+    }
+    for (const std::uint64_t id : gone) drop(id);
+}
+
+// Called before each message, since a message may show a state after the stop: rtcfd then takes
+// requests that the executor would reject as older than the stop.
+// @return false if the peer has disconnected
+bool Server::tellStop(Connection& connection) {
+    if (exiting_ || !connection.greeted()) return true;
+    const DirectStopReport report = direct_stop_->last();
+    if (connection.toldStops() == report.count) return true;
+    connection.setToldStops(report.count);
     v1::Response response;
     *response.mutable_direct_stop() = directStopTo(report);
-    post(0, std::move(response), false);
+    return connection.send(serialized(response));
 }
 
 void Server::serve(Runner& runner, Log& log, Access& access, const DirectStop& direct_stop) {
@@ -272,7 +288,8 @@ void Server::respond(std::uint64_t connection, const v1::Response& response) {
         return;
     }
     const auto found = connections_.find(connection);
-    if (found != connections_.end() && !found->second->send(message)) drop(connection);
+    if (found == connections_.end()) return;
+    if (!tellStop(*found->second) || !found->second->send(message)) drop(connection);
 }
 
 // Sends messages from other threads. Unsolicited messages wait for a connection.
@@ -318,6 +335,7 @@ void Server::deliver() {
         }
         for (const std::uint64_t id : ids) respond(id, message.response);
     }
+    tellStops();
 }
 
 void Server::expire() {
@@ -377,8 +395,10 @@ void Server::handle(Connection& connection, const v1::Request& request) {
         hello.set_flight_recorder_fd(runner_->recorder().fd());
         hello.set_frames_fd(runner_->frameMemory().fd());
         hello.set_unconfigured(!configured_);
-        if (const DirectStopReport report = direct_stop_->last(); report.count != 0)
+        if (const DirectStopReport report = direct_stop_->last(); report.count != 0) {
             *hello.mutable_direct_stop() = directStopTo(report);
+            connection.setToldStops(report.count);
+        }
         connection.setGreeted();
         respond(id, response);
         return;

@@ -37,8 +37,9 @@ class Server {
     /// @{
     void publish(const LogEntry& entry);
     void publish(const RunnerEvent& event);
-    void publish(const DirectStopReport& report);
     /// @}
+    /// Makes serve() look for messages and direct stops. Any thread.
+    void wakeUp() const;
 
     /// Sends a request of a peer outside to rtcfd and waits for the answer. Any thread but that of
     /// serve(); returns soon after `cancel` becomes true.
@@ -60,7 +61,8 @@ class Server {
     };
 
     void post(std::uint64_t connection, v1::Response response, bool last);
-    void wakeUp() const;
+    void tellStops();
+    bool tellStop(Connection& connection);
     void handOn(const v1::Response& call);
     void accept();
     void receive(Connection& connection);

@@ -41,6 +41,14 @@ XmlRpc::XmlRpcValue* find(XmlRpc::XmlRpcValue& values, const std::string& name) 
     return found;
 }
 
+// True for the size of a vector that the master has as a list: when the component was loaded, the
+// list counted, and the launcher ignored the size.
+bool listOverrides(XmlRpc::XmlRpcValue& values, const ParameterDeclaration& declaration) {
+    if (!declaration.is_size) return false;
+    XmlRpc::XmlRpcValue* const list = find(values, declaration.vectorName());
+    return list != nullptr && list->getType() == XmlRpc::XmlRpcValue::TypeArray;
+}
+
 // Converts a value; unset if a parameter cannot have this type. The loop checks the declared type.
 std::optional<ParameterValue> fromXmlRpc(XmlRpc::XmlRpcValue& value, const std::string& type) {
     switch (value.getType()) {
@@ -221,7 +229,8 @@ bool ParameterMirror::take(XmlRpc::XmlRpcValue& values, const Component& compone
         known.values[name] = *found;
         const bool was_given =
             first && component.is_new && (given || !sameValue(value, declaration.default_value));
-        if (!sameValue(*found, value) && !was_given) batch.emplace_back(name, *std::move(found));
+        const bool keeps = was_given || (first && listOverrides(values, declaration));
+        if (!sameValue(*found, value) && !keeps) batch.emplace_back(name, *std::move(found));
     }
     if (batch.empty() || !follows_) return false;
     ask(set.full_name, std::move(batch));

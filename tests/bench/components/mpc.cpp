@@ -10,7 +10,7 @@ constexpr int kHorizon = 10;
 constexpr int kInputs = 3;
 constexpr int kStates = 6;
 constexpr int kSize = kHorizon * kInputs;
-constexpr double kPeriod = 0.01;
+constexpr double kStep = 0.01;
 
 using StateVector = Eigen::Matrix<double, kStates, 1>;
 using StateMatrix = Eigen::Matrix<double, kStates, kStates>;
@@ -39,10 +39,10 @@ class Mpc final : public rtcf::Component {
     bool prepare(const rtcf::Values& proposed) override {
         constexpr int kRows = kHorizon * kStates;
         StateMatrix a = StateMatrix::Identity();
-        a.topRightCorner<3, 3>() = Eigen::Matrix3d::Identity() * kPeriod;
+        a.topRightCorner<3, 3>() = Eigen::Matrix3d::Identity() * kStep;
         InputMatrix b;
-        b << Eigen::Matrix3d::Identity() * (kPeriod * kPeriod) / 2.0,
-            Eigen::Matrix3d::Identity() * kPeriod;
+        b << Eigen::Matrix3d::Identity() * (kStep * kStep) / 2.0,
+            Eigen::Matrix3d::Identity() * kStep;
         StateVector weights;
         weights << Eigen::Vector3d::Constant(proposed[position_weight]),
             Eigen::Vector3d::Constant(proposed[velocity_weight]);

@@ -8,10 +8,10 @@
 
 namespace {
 
-constexpr int kSize = 100;
+constexpr int kValues = 100;
 constexpr int kTaps = 8;
 
-using Values = Eigen::Matrix<double, kSize, 1>;
+using Values = Eigen::Matrix<double, kValues, 1>;
 using Taps = Eigen::Matrix<double, kTaps, 1>;
 
 // The inner part of a Hann window with sum one.
@@ -37,20 +37,20 @@ class RingBuffer final : public rtcf::Component {
 
     void update() override {
         if (u.read() != rtcf::DataStatus::New) return;
-        values.value()[count % kSize] = u.value();
+        values.value()[count % kValues] = u.value();
         count += 1;
         Taps& lately = taps.value();
         for (int i = kTaps - 1; i > 0; --i) lately[i] = lately[i - 1];
         lately[0] = u.value();
 
-        const Eigen::Index size = std::min<Eigen::Index>(count, kSize);
+        const Eigen::Index size = std::min<Eigen::Index>(count, kValues);
         const auto known = values.value().head(size);
         const double average = known.mean();
         mean.write(average);
         deviation.write(
             std::sqrt((known.array() - average).square().sum() / static_cast<double>(size)));
         span.write(Eigen::Vector2d(known.minCoeff(), known.maxCoeff()));
-        std::array<double, kSize> ordered;
+        std::array<double, kValues> ordered;
         std::copy(known.begin(), known.end(), ordered.begin());
         std::sort(ordered.begin(), ordered.begin() + size);
         const auto half = static_cast<std::size_t>(size / 2);

@@ -85,11 +85,11 @@ def test_a_share_is_compensated_within_the_largest_effort(blocks: Blocks, share:
 def test_a_joint_with_friction_coasts_as_if_it_had_none(
     stepped: Bench, share: float, kept: float | None
 ) -> None:
-    inertia, speed = 0.5, 0.6
+    inertia, speed = 0.25, 0.6
     block = Stepped(stepped, TYPE, share=share, max_effort=50.0, **LAW)
     try:
         block.step(velocity=speed)
-        for _ in range(1500):
+        for _ in range(400):
             effort = port_value(stepped.client, "/stepped/block", "effort")
             resisted = friction(speed, 2.0, 3.5, 0.8, 0.05)
             speed += DT / inertia * (effort - resisted)

@@ -4,6 +4,7 @@ import random
 import re
 import socket
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import runner_pb2
 
 MIB = 1024 * 1024
+STOPPED = runner_pb2.RUNNER_STATE_STOPPED
 TIMES = [300, pytest.param(10_000, marks=pytest.mark.long)]
 
 
@@ -69,13 +71,19 @@ def test_invalid_bytes_change_nothing(daemon: Daemon, client: rtcf.Client, times
     wait_for(lambda: client.get_status().runners[0].iteration > after.iteration, "cycles")
 
 
-def _answer(peer: socket.socket) -> wire.Response:
-    """Read the next answer; skip unsolicited messages."""
+def _messages(peer: socket.socket) -> Iterator[wire.Response]:
+    """Yield messages up to the next answer, which is the last."""
     while True:
         size = int.from_bytes(_read(peer, 4), "little")
         response: wire.Response = wire.Response.FromString(_read(peer, size))
+        yield response
         if response.id:
-            return response
+            return
+
+
+def _answer(peer: socket.socket) -> wire.Response:
+    """Read the next answer; skip unsolicited messages."""
+    return list(_messages(peer))[-1]
 
 
 def _read(peer: socket.socket, size: int) -> bytes:
@@ -112,6 +120,34 @@ def test_a_slow_peer_costs_only_its_unread_answers(daemon: Daemon, client: rtcf.
             assert _answer(peer).id == 2
             peer.sendall(ask)
         assert _resident_bytes(pid) - before < 64 * MIB
+
+
+def test_no_answer_shows_a_direct_stop_before_it_is_told(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    client.load(rtcf.component("rtcf_test", "Counter", name="steady"))
+    ask = frame(wire.Request(id=2, get_status=wire.GetStatus()).SerializeToString())
+    with socket.socket(socket.AF_UNIX) as peer:
+        peer.settimeout(60)
+        peer.connect(f"{daemon.socket}.d/executors/rt_runner.sock")
+        peer.sendall(hello())
+        _answer(peer)
+        for count in range(1, 101):
+            client.start()
+            with socket.socket(socket.AF_UNIX) as stopping:
+                stopping.connect(f"{daemon.socket}.d/stop/rt_runner")
+                stopping.sendall(b"stop\n")
+                told = 0
+                stopped = False
+                while not stopped:
+                    peer.sendall(ask)
+                    for response in _messages(peer):
+                        if response.HasField("direct_stop"):
+                            told = response.direct_stop.count
+                        elif response.HasField("status"):
+                            stopped = response.status.state == runner_pb2.RUNNER_STATE_STOPPED
+                assert told == count
+            wait_for(lambda: client.get_status().runners[0].state == STOPPED, "the stop at rtcfd")
 
 
 def _unknown() -> Any:

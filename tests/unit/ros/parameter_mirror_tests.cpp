@@ -114,6 +114,42 @@ TEST_F(ParameterMirrorTest, FindsAParameterInItsGroup) {
     EXPECT_FALSE(ask("getParam", texts({"/test", "/C/gains/filter/p"}))[0]) << "it was the loop's";
 }
 
+// A component of a launch file may be loaded before the node has met the master, so it is not new.
+TEST_F(ParameterMirrorTest, TakesNoSizeFromBesideItsListUntilItIsWrittenAgain) {
+    std::vector<std::int64_t> taken;
+    ParameterMirror mirror;
+    mirror.serve([&](const std::string&, const rtcf::executor::ParameterBatch& batch, BatchPolicy,
+                     const std::function<void(const std::string&)>& done) {
+        taken.push_back(std::get<std::int64_t>(batch.at(0).second));
+        done({});
+    });
+    const auto size_on_master = [&] {
+        auto answers = ask("getParam", texts({"/test", "/C/filter/taps_size"}));
+        return static_cast<int>(answers[0].value);
+    };
+    XmlRpc::XmlRpcValue list = texts({"/test", "/C/filter"});
+    for (int i = 0; i < 5; ++i) list[2]["taps"][i] = 1.0;
+    list[2]["taps_size"] = 2;
+    ASSERT_TRUE(ask("setParam", list)[0]);
+    auto set = std::make_shared<ParameterSet>();
+    set->full_name = "/C";
+    rtcf::ParameterDeclaration declaration;
+    declaration.name = "filter/taps_size";
+    declaration.type = "int";
+    declaration.default_value = std::int64_t{3};
+    declaration.is_size = true;
+    set->parameters.push_back({declaration, std::int64_t{5}});
+    mirror.reconcile(calls(), caller_, {{set, false}});
+    EXPECT_TRUE(taken.empty()) << "the list counts";
+    EXPECT_EQ(size_on_master(), 5);
+    XmlRpc::XmlRpcValue size = texts({"/test", "/C/filter/taps_size"});
+    size[2] = 4;
+    ASSERT_TRUE(ask("setParam", size)[0]);
+    mirror.noteWritten("/C/filter/taps_size/");
+    mirror.reconcile(calls(), caller_, {{set, false}});
+    EXPECT_EQ(taken, std::vector<std::int64_t>{4});
+}
+
 // The loop may answer during a turn, which still has the old values.
 TEST_F(ParameterMirrorTest, OverwritesNoNewValueOfTheLoopWithAnOldOne) {
     std::vector<double> taken;

@@ -30,8 +30,9 @@ def test_property(x):
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """Return a source tree without tests."""
-    (tmp_path / "tests").mkdir()
-    shutil.copy(TREE / "tests" / "conftest.py", tmp_path / "tests")
+    (tmp_path / "tests" / "support").mkdir(parents=True)
+    for name in ("conftest.py", "support/random_share.py", "support/time_table.py"):
+        shutil.copy(TREE / "tests" / name, tmp_path / "tests" / name)
     shutil.copy(TREE / "pyproject.toml", tmp_path)
     return tmp_path
 
