@@ -7,10 +7,7 @@ from rtcf.checking import sanitizer_options
 from rtcf.sanitizer import Violation, violations
 
 EXECUTOR = BUILD_TREE.with_name(f"{BUILD_TREE.name}-rtsan") / "bin" / "rtcf-executor"
-HOW_TO_BUILD = (
-    f"there is no {EXECUTOR}: cmake -S . -B {EXECUTOR.parents[1].name} -G Ninja "
-    "-DRTCF_SANITIZE=realtime -DCMAKE_CXX_COMPILER=clang++-22, and build rtcf-executor there"
-)
+HOW_TO_BUILD = f"there is no {EXECUTOR}: `make checker` builds it"
 # All reports: stopping at the first one would hide the others. Names are resolved by the tool
 # that this machine has.
 ENVIRONMENT = {"RTSAN_OPTIONS": sanitizer_options()}

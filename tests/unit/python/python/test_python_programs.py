@@ -35,25 +35,27 @@ def compiled(programs: dict[int, Program], file: Path) -> tuple[Any, Any]:
             file = file.with_stem(f"{file.stem}_")  # modules are loaded once
 
 
-def same(seed: int, folder: Path) -> int:
+def same(seed: int, folder: Path, together: int = TOGETHER) -> int:
     """Compile the programs of a seed and run them both ways. Return the number compiled."""
     draw = random.Random(seed)
-    programs = {number: Program(draw) for number in range(TOGETHER)}
+    programs = {number: Program(draw) for number in range(together)}
     cls, code = compiled(programs, folder / f"programs_{seed}.py")
-    assert len(programs) >= TOGETHER - 2, f"seed {seed}: {TOGETHER - len(programs)} rejected"
-    found = verify.compare(cls, code, TOGETHER * TIMES, seed)
-    assert found.cycles == TOGETHER * TIMES
+    assert len(programs) >= together - 2, f"seed {seed}: {together - len(programs)} rejected"
+    found = verify.compare(cls, code, together * TIMES, seed)
+    assert found.cycles == together * TIMES
     assert found.differences == [], f"seed {seed}: {found}"
     return len(programs)
 
 
 # A seed cannot be shrunk.
-@settings(max_examples=3, phases=[Phase.explicit, Phase.reuse, Phase.generate])
+@pytest.mark.random(8)
+@settings(max_examples=9, phases=[Phase.explicit, Phase.reuse, Phase.generate])
 @given(seed=st.integers(0, 2**32 - 1))
 def test_random_programs_give_the_same_results_compiled_and_interpreted(
     tmp_path_factory: pytest.TempPathFactory, seed: int
 ) -> None:
-    same(seed, tmp_path_factory.mktemp("programs"))
+    # Few programs an example, so that a share has several.
+    same(seed, tmp_path_factory.mktemp("programs"), together=8)
 
 
 @pytest.mark.long

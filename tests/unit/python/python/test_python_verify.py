@@ -46,9 +46,9 @@ def compared(
 def test_machine_code_and_interpreter_agree(
     name: str, compiled: dict[str, object_file.Compiled]
 ) -> None:
-    found = compared(name, compiled, 10_000)
+    found = compared(name, compiled, 3_000)
     assert found.differences == []
-    assert found.cycles == 10_000
+    assert found.cycles == 3_000
     assert (found.raised > 0) == (name == "Raiser")
 
 
