@@ -4,8 +4,9 @@
 BUILD := build
 # Compilers are called by way of ccache where it is installed.
 export CMAKE_CXX_COMPILER_LAUNCHER = $(shell command -v ccache)
-# One cache for this tree and the packages, which are built in another folder.
+# One cache for this tree and the packages, which are built in another folder and locale.
 export CCACHE_BASEDIR = $(CURDIR)
+export CCACHE_SLOPPINESS = locale
 export CMAKE_BUILD_PARALLEL_LEVEL ?= $(shell nproc)
 # Progress: share of the steps done, seconds since the start.
 export NINJA_STATUS ?= [%p, %e s] 
