@@ -7,6 +7,12 @@ if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT RTCF_SANITIZE)
   target_compile_options(rtcf_compiler_settings INTERFACE -Werror)
 endif()
 
+# The flags of dpkg remove the tree's folder from the paths of sources. Those of the build folder are then
+# relative to the same one, so that gdb finds the sources if it is called there.
+if(CMAKE_CXX_FLAGS MATCHES "-ffile-prefix-map=")
+  add_compile_options(-ffile-prefix-map=${CMAKE_BINARY_DIR}=.)
+endif()
+
 if(RTCF_SANITIZE)
   set(known thread address,undefined realtime)
   if(NOT RTCF_SANITIZE IN_LIST known)
