@@ -25,10 +25,8 @@ class RandomShares:
         self._budget_s = budget_s
         self._unit_s = _MOST_S
 
-    # After the plugin of hypothesis has marked them.
-    @pytest.hookimpl(trylast=True)
-    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
-        total = sum(_weight(item) for item in items if _is_random(item))
+    def pytest_collection_finish(self, session: pytest.Session) -> None:
+        total = sum(_weight(item) for item in session.items if _is_random(item))
         self._unit_s = min(_MOST_S, self._budget_s / max(total, 1.0))
 
     def pytest_runtest_setup(self, item: pytest.Item) -> None:

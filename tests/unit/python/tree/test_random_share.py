@@ -1,4 +1,4 @@
-"""The budget of random tests, and the table of times: pytest with our conftest on a tree of its own."""
+"""The budget of random tests, and the table of times: pytest with our conftest on other tests."""
 
 import os
 import re
