@@ -51,22 +51,22 @@ checker: dependencies ## build the executor that `build/bin/rtcfctl check` runs 
 	@tools/configure $(BUILD)-rtsan -DRTCF_SANITIZE=realtime
 	@cmake --build $(BUILD)-rtsan --target rtcf-executor
 
-test: dependencies-test all ## all checks; ONLY=changed (or files): those that a change may have broken
+test: dependencies-test build ## all checks; ONLY=changed (or files): those that a change may have broken
 	@tests/run $(if $(ONLY),--only $(ONLY))
 
-test-long: dependencies-test-long all ## the same with soaks, reproducible builds, PREEMPT_RT and the other Debian
+test-long: dependencies-test-long build ## the same with soaks, reproducible builds, PREEMPT_RT and the other Debian
 	@tests/run --long
 
-bench: dependencies-bench all ## measure against HAL, cyclictest and direct calls; HOURS=3: a long run
+bench: dependencies-bench build ## measure against HAL, cyclictest and direct calls; HOURS=3: a long run
 	@tests/bench/run
 
-bench-rt: dependencies-bench-rt all ## measure in a PREEMPT_RT machine with instruction-counted time
+bench-rt: dependencies-bench-rt build ## measure in a PREEMPT_RT machine with instruction-counted time
 	@tests/bench/run-rt
 
 deb: dependencies ## build the Debian packages into build/deb/
 	@tools/build-packages $(BUILD)/deb
 
-lint: dependencies-test all ## format, static checks and types; LINT_ALL=1: clang-tidy on every file
+lint: dependencies-test build ## format, static checks and types; LINT_ALL=1: clang-tidy on every file
 	@tools/lint
 
 endif
