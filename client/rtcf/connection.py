@@ -1,6 +1,7 @@
 """A connection to rtcfd: calls, their timeouts, retries and paging."""
 
 import os
+import threading
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
@@ -19,6 +20,7 @@ QUERY_TIMEOUT_S = 20.0
 CHANGE_TIMEOUT_S = 120.0
 _CROWDED_S = 15.0  # for a place in the listen queue of rtcfd's socket
 _RETRY_S = 0.05
+_CLOSE_S = 2.0
 _LONGEST_PATH = 107  # unix(7)
 
 _OPTIONS = (
@@ -82,7 +84,10 @@ class Connection(Closing):
 
     def close(self) -> None:
         """Close the connection."""
-        self._channel.close()
+        # gRPC would wait for ever for a call whose start was cut off by KeyboardInterrupt.
+        closing = threading.Thread(target=self._channel.close, daemon=True)
+        closing.start()
+        closing.join(_CLOSE_S)
 
     def ask(self, method: Any, request: Any, timeout_s: float | None = QUERY_TIMEOUT_S) -> Any:
         """Make a call with one response; return it."""

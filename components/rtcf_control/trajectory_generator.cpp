@@ -69,6 +69,8 @@ class TrajectoryGenerator final : public rtcf::Component {
         Numbers velocity_limit{};
         Numbers acceleration_limit{};
         Numbers jerk_limit{};
+        Numbers lower_limit{};
+        Numbers upper_limit{};
 
         Motion begin(std::size_t i) const { return {position[i], velocity[i], acceleration[i]}; }
         MotionTarget target(std::size_t i) const {
@@ -77,15 +79,18 @@ class TrajectoryGenerator final : public rtcf::Component {
         MotionLimits limits(std::size_t i) const {
             return {velocity_limit[i], acceleration_limit[i], jerk_limit[i]};
         }
+        PositionRange allowed(std::size_t i) const { return {lower_limit[i], upper_limit[i]}; }
         void setBegin(std::size_t i, const Motion& motion) {
             position[i] = motion.position;
             velocity[i] = motion.velocity;
             acceleration[i] = motion.acceleration;
         }
-        void setLimits(std::size_t i, const MotionLimits& limits) {
-            velocity_limit[i] = limits.velocity;
-            acceleration_limit[i] = limits.acceleration;
-            jerk_limit[i] = limits.jerk;
+        void setLimits(std::size_t i, const Setup& setup) {
+            velocity_limit[i] = setup.limits[i].velocity;
+            acceleration_limit[i] = setup.limits[i].acceleration;
+            jerk_limit[i] = setup.limits[i].jerk;
+            lower_limit[i] = setup.lower[i];
+            upper_limit[i] = setup.upper[i];
         }
         bool operator!=(const Task& other) const {
             if (kind != other.kind || joints != other.joints || begin_ns != other.begin_ns)
@@ -97,7 +102,9 @@ class TrajectoryGenerator final : public rtcf::Component {
                     target_velocity[i] != other.target_velocity[i] ||
                     velocity_limit[i] != other.velocity_limit[i] ||
                     acceleration_limit[i] != other.acceleration_limit[i] ||
-                    jerk_limit[i] != other.jerk_limit[i])
+                    jerk_limit[i] != other.jerk_limit[i] ||
+                    lower_limit[i] != other.lower_limit[i] ||
+                    upper_limit[i] != other.upper_limit[i])
                     return true;
             }
             return false;
@@ -115,6 +122,8 @@ class TrajectoryGenerator final : public rtcf::Component {
             visit("velocity_limit", velocity_limit);
             visit("acceleration_limit", acceleration_limit);
             visit("jerk_limit", jerk_limit);
+            visit("lower_limit", lower_limit);
+            visit("upper_limit", upper_limit);
         }
     };
 
@@ -142,11 +151,13 @@ class TrajectoryGenerator final : public rtcf::Component {
             }
             double longest = 0.0;
             for (std::size_t i = 0; i < count; ++i) {
-                const MotionTarget target = task.target(i);
-                const Motion begin = task.kind == Kind::Target
-                                         ? Motion{target.position, target.velocity, 0.0}
-                                         : task.begin(i);
-                stops[i] = StopMotion(begin, task.limits(i));
+                if (task.kind == Kind::Target) {
+                    // Within the limits of position as well, or the target is rejected.
+                    const MotionTarget target = task.target(i);
+                    stops[i] = StopMotion({target.position, target.velocity, 0.0}, task.limits(i));
+                } else {
+                    stops[i] = StopMotion(task.begin(i), task.limits(i), task.allowed(i));
+                }
                 longest = std::max(longest, stops[i].duration());
             }
             end_ns = target_ns + nanoseconds(longest);
@@ -355,8 +366,7 @@ class TrajectoryGenerator final : public rtcf::Component {
     void safe() noexcept override {
         if (!begun_) return;
         for (std::size_t i = 0; i < count(); ++i) {
-            if (safe_position == SafePosition::Stop)
-                position_.value()[i] = StopMotion(present(i), setup_->limits[i]).end();
+            if (safe_position == SafePosition::Stop) position_.value()[i] = stopOf(i).end();
             standAt(i, position_.value()[i]);
         }
         points_id_ = 0;
@@ -399,6 +409,9 @@ class TrajectoryGenerator final : public rtcf::Component {
         position_.value()[i] = motion.position;
         velocity_.value()[i] = motion.velocity;
         acceleration_.value()[i] = motion.acceleration;
+    }
+    StopMotion stopOf(std::size_t i) const noexcept {
+        return {present(i), setup_->limits[i], {setup_->lower[i], setup_->upper[i]}};
     }
     void standAt(std::size_t i, double position) noexcept { setPresent(i, {position, 0.0, 0.0}); }
     const Plan& plan() const noexcept { return memory_->plans[memory_->current]; }
@@ -485,7 +498,7 @@ class TrajectoryGenerator final : public rtcf::Component {
         task.begin_ns = time;
         for (std::size_t i = 0; i < count(); ++i) {
             task.setBegin(i, present(i));
-            task.setLimits(i, setup_->limits[i]);
+            task.setLimits(i, *setup_);
         }
         task_ = task;
         clearPoints();
@@ -528,7 +541,7 @@ class TrajectoryGenerator final : public rtcf::Component {
         if (followsTrajectory(last)) {
             // The task only shows the limits, which the next cycles check.
             Task task = task_;
-            for (std::size_t i = 0; i < count(); ++i) task.setLimits(i, setup_->limits[i]);
+            for (std::size_t i = 0; i < count(); ++i) task.setLimits(i, *setup_);
             task.kind = Kind::Stop;
             task_ = task;
             makePlan();
@@ -566,7 +579,8 @@ class TrajectoryGenerator final : public rtcf::Component {
         }
         for (std::size_t i = 0; i < count(); ++i) {
             const PositionRange range = next.range(i);
-            PositionRange allowed = StopMotion(task.begin(i), task.limits(i)).range();
+            PositionRange allowed =
+                StopMotion(task.begin(i), task.limits(i), task.allowed(i)).range();
             allowed.add(setup_->lower[i]);
             allowed.add(setup_->upper[i]);
             const double tolerance =
@@ -610,8 +624,8 @@ class TrajectoryGenerator final : public rtcf::Component {
                 reject("target", i, "the velocity at the target is above its limit");
                 return;
             }
-            task.setBegin(i, present(i));
-            task.setLimits(i, limits);
+            task.setBegin(i, withAllowedAcceleration(present(i), limits));
+            task.setLimits(i, *setup_);
             setTarget(task, i, message.position[at], speed);
             same = same && task.target_position[i] == task_->target_position[i] &&
                    task.target_velocity[i] == task_->target_velocity[i];

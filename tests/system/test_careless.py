@@ -69,7 +69,9 @@ def test_an_interrupted_verb_ends_and_leaves_nothing(service: Service) -> None:
             done = machine.shell(line, check=False)
             # timeout(1): 124 = interrupted; 137 = still running after 30 s.
             assert done.returncode in (0, 124), f"{line}: {done.returncode}\n{done.stderr}"
-            assert "Traceback" not in done.stderr, f"{line}: {done.stderr}"
+            # Python itself is not yet ready for Ctrl-C in its first milliseconds.
+            if not done.stderr.startswith("Fatal Python error: init"):
+                assert "Traceback" not in done.stderr, f"{line}: {done.stderr}"
 
     for verb in _LOOKING:
         interrupt(verb.format(port=port))

@@ -63,6 +63,10 @@ class _FailedError(Exception):
         self.code = code
 
 
+class _ReplacedError(_FailedError):
+    """Another sender's trajectory has replaced that of the goal, and moves the joints now."""
+
+
 class _PreemptedError(Exception):
     """The goal was cancelled, or another one has replaced it."""
 
@@ -81,6 +85,7 @@ class Server:
         self._goal_time_s = goal_time_s
         self._messages = control_messages.classes()
         self._measured: dict[str, float] = {}
+        self._moves = False  # a trajectory of this node may move the joints
         self._server: Any = None
 
     def serve(self, joint_states: str) -> None:
@@ -116,17 +121,40 @@ class Server:
         result = self._messages["FollowJointTrajectoryResult"]()
         try:
             self._follow(goal)
+            self._moves = False
         except _PreemptedError:
+            # The next goal replaces the trajectory.
+            if not self._server.is_new_goal_available():
+                self._stop()
             self._server.set_preempted(result, "another goal, or a cancel")
             return
         except _FailedError as error:
-            result.error_code, result.error_string = getattr(result, error.code), str(error)
+            self._moves = self._moves and not isinstance(error, _ReplacedError)
+            text = str(error) + self._stop()
+            result.error_code, result.error_string = getattr(result, error.code), text
         except (rtcf.RtcfError, ValueError) as error:
-            result.error_code, result.error_string = result.INVALID_GOAL, str(error)
+            text = str(error) + self._stop()
+            result.error_code, result.error_string = result.INVALID_GOAL, text
         if result.error_code == result.SUCCESSFUL:
             self._server.set_succeeded(result)
         else:
             self._server.set_aborted(result, result.error_string)
+
+    def _stop(self) -> str:
+        """Stop the joints if a trajectory of this node may move them, also that of an earlier goal.
+
+        Returns what to add to the text of an error if that fails.
+        """
+        if not self._moves:
+            return ""
+        try:
+            # A trajectory without points stops the joints as fast as possible.
+            stop = {"joint_names": self._joints, "points": []}
+            self._client.write(f"{self._generator}.trajectory", stop, self._runner)
+        except rtcf.RtcfError as error:
+            return f"; the joints may move on: {error}"
+        self._moves = False
+        return ""
 
     def _follow(self, goal: Any) -> None:
         """Send a trajectory, and return when the joints have followed it.
@@ -151,6 +179,7 @@ class Server:
         ) as stream:
             samples = self._samples(stream)
             before = next(samples)
+            self._moves = True
             self._client.write(
                 f"{self._generator}.trajectory", _as_dict(goal.trajectory), self._runner
             )
@@ -191,13 +220,9 @@ class Server:
         sent = rospy.Time(0)
         for sample in samples:
             if self._server.is_preempt_requested():
-                if not self._server.is_new_goal_available():
-                    # A trajectory without points stops the joints as fast as possible.
-                    stop = {"joint_names": self._joints, "points": []}
-                    self._client.write(f"{self._generator}.trajectory", stop, self._runner)
                 raise _PreemptedError
             if sample.accepted > before.accepted + 1:
-                raise _FailedError("INVALID_GOAL", "another trajectory has replaced it")
+                raise _ReplacedError("INVALID_GOAL", "another trajectory has replaced it")
             if sample.halted:
                 raise _FailedError("INVALID_GOAL", f"{self._generator} is halted")
             if sample.rejected > before.rejected:

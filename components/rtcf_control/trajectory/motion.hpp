@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 
 #include <rtcf/realtime.hpp>
 
@@ -41,10 +42,15 @@ struct Motion {
     }
 };
 
-/// The positions that a motion passes.
+/// The positions that a motion passes, or may pass.
 struct PositionRange {
     double lower = 0.0;  ///< unit
     double upper = 0.0;  ///< unit
+
+    /// All positions.
+    static constexpr PositionRange unlimited() noexcept {
+        return {-std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
+    }
 
     /// Adds a position. Real-time safe.
     void add(double position) noexcept RTCF_NONBLOCKING {
@@ -82,6 +88,27 @@ struct MotionLimits {
     double acceleration = 1.0;  ///< unit/s²
     double jerk = 1.0;          ///< unit/s³
 };
+
+/// The motion with the acceleration nearest to its own that is within the limits, and from which
+/// the velocity stays within its limit if the jerk does; a velocity beyond its limit does not grow.
+/// An acceleration that is within already, except for rounding errors, does not change. Real-time
+/// safe.
+[[nodiscard]] inline Motion withAllowedAcceleration(Motion motion,
+                                                    const MotionLimits& limits) noexcept
+    RTCF_NONBLOCKING {
+    constexpr double kTolerance = 1.0 + 1e-9;
+    double& a = motion.acceleration;
+    const double speed_then = std::copysign(1.0, a) * motion.easedVelocity(limits.jerk);
+    if (std::abs(a) <= limits.acceleration * kTolerance &&
+        (a == 0.0 || speed_then <= limits.velocity * kTolerance))
+        return motion;
+    // The velocity rises by a² / (2 jerk) while the acceleration is brought to zero.
+    const double room = limits.velocity - std::copysign(1.0, a) * motion.velocity;
+    const double largest =
+        std::min(limits.acceleration, std::sqrt(2.0 * limits.jerk * std::max(room, 0.0)));
+    a = std::clamp(a, -largest, largest);
+    return motion;
+}
 
 /// A time of constant jerk.
 struct Phase {

@@ -2,12 +2,14 @@
 
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 import rtcf
 from bystander import Bystander
 from daemon_process import Daemon, wait_for
+from rtcf.reasons import ExecutorDownError
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 from values import iteration
 
@@ -112,9 +114,9 @@ def life_of_a_runner(client: rtcf.Client, name: str, cpu: int) -> None:
         client.replace("b", _mixer("c"), name)
         client.set_runner(runner_pb2.RunnerSettings(frequency_hz=500.0 + number), name)
         client.unload(["c"], name)
-    client.load(
-        rtcf.component("rtcf_faults", "NullDereference", name="bad", parameters=["after:=5"]), name
-    )
+    bad = rtcf.component("rtcf_faults", "NullDereference", name="bad", parameters=["after:=5"])
+    with suppress(ExecutorDownError):  # it may die before it answers
+        client.load(bad, name)
     wait_for(
         lambda: client.get_status(name).runners[0].state == runner_pb2.RUNNER_STATE_FAULTED,
         "its crash and recovery",

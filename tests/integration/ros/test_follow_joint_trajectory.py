@@ -142,6 +142,29 @@ def test_a_goal_that_is_not_reached_says_why(
     assert "\n" not in result["text"]
 
 
+def test_a_goal_that_is_aborted_stops_the_arm(launching: Launching, peer: Peer) -> None:
+    peer.send([[1.5, READY, STANDS]])
+    far = [[5.0, [2.0, *READY[1:]], STANDS]]
+    result = peer.send(far, path={"joint1": 1e-9})
+    assert result["state"] == GoalStatus.ABORTED
+    wait_for(lambda: abs(measured(launching, "joint1_velocity")) < 1e-3, "the arm to stand")
+    assert measured(launching, "joint1_position") < 1.5
+
+
+@pytest.mark.parametrize(
+    ("position", "joints"), [(9.0, JOINTS), (0.5, [*JOINTS[:5], "elbow"])], ids=["far", "elbow"]
+)
+def test_an_invalid_goal_in_place_of_another_one_stops_the_arm(
+    launching: Launching, peer: Peer, position: float, joints: Any
+) -> None:
+    peer.send([[1.5, READY, STANDS]])
+    peer.send([[5.0, [2.0, *READY[1:]], STANDS]], replace=1.0)
+    result = peer.send([[1.0, [position, *READY[1:]], STANDS]], joints)
+    assert result["state"] == GoalStatus.ABORTED
+    wait_for(lambda: abs(measured(launching, "joint1_velocity")) < 1e-3, "the arm to stand")
+    assert measured(launching, "joint1_position") < 1.5
+
+
 def test_a_component_that_is_no_generator_is_rejected(launching: Launching) -> None:
     node = launching.node("follow_joint_trajectory", "__name:=other", "_generator:=robot")
     assert node.wait(60.0) == 1

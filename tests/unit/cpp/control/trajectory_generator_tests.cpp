@@ -5,10 +5,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdlib>
 #include <cstring>
+#include <iomanip>
+#include <iostream>
 #include <limits>
 #include <random>
 #include <rtcf/test.hpp>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -670,6 +674,110 @@ TEST(TrajectoryGenerator, RejectsParametersWithOneLine) {
     }
     Generator generator({0.0, 0.0});
     EXPECT_THROW(generator.bench.set({{"joints", std::string("a b")}}), std::exception);
+}
+
+std::string exactly(double value) {
+    std::ostringstream text;
+    text << std::setprecision(17) << value;
+    return text.str();
+}
+
+// Random trajectories, legal or not, chunks, targets and stops of 1 to 7 joints: from each state
+// that they lead to, velocity and position stay within their limits, and a stop ends. RTCF_STOPS:
+// number of stops.
+TEST(TrajectoryGenerator, EveryStopStaysWithinTheLimitsOfVelocityAndPosition) {
+    const char* const wanted = std::getenv("RTCF_STOPS");
+    const int stops = wanted != nullptr ? std::atoi(wanted) : 2 * kTargets;
+    std::mt19937_64 random(49);
+    const auto between = [&](double low, double high) {
+        return std::uniform_real_distribution<double>(low, high)(random);
+    };
+    double over_velocity = 0.0;  // largest excess, relative to the limit
+    double over_position = 0.0;
+    double longest = 0.0;  // stop, relative to V/A + A/J
+    for (int done = 0; done < stops;) {
+        const auto joints = static_cast<std::size_t>(between(1.0, 8.0));
+        const double v = std::pow(10.0, between(-1.0, 1.0));
+        const double a = v * std::pow(10.0, between(0.0, 1.5));
+        const double j = a * std::pow(10.0, between(0.0, 2.0));
+        const double lower = between(-1.0, -0.1);
+        const double upper = between(0.1, 1.0);
+        Generator generator(Vector(joints, 0.0), {{"velocity", exactly(v)},
+                                                  {"acceleration", exactly(a)},
+                                                  {"jerk", exactly(j)},
+                                                  {"lower", exactly(lower)},
+                                                  {"upper", exactly(upper)}});
+        const auto run = [&](int most) {
+            for (int cycle = 0; cycle < most; ++cycle) {
+                const Sample now = generator.next();
+                for (std::size_t i = 0; i < joints; ++i) {
+                    over_velocity = std::max(over_velocity, std::abs(now.velocity[i]) / v - 1.0);
+                    over_position =
+                        std::max({over_position, lower - now.position[i], now.position[i] - upper});
+                }
+                if (over_velocity > 1e-5 || over_position > 1e-5 || generator.done()) return cycle;
+            }
+            return most;
+        };
+        const auto values = [&](double low, double high) {
+            Vector all(joints);
+            for (double& each : all) each = between(low, high);
+            return all;
+        };
+        const auto follow = [&] {
+            // Steps that take about the time that the velocity needs, and values of any size.
+            std::vector<trajectory_msgs::JointTrajectoryPoint> points;
+            Vector at = generator.now().position;
+            double time = 0.0;
+            const int kind = static_cast<int>(between(0.0, 3.0));
+            const double reach = std::pow(10.0, between(-3.0, 0.0));
+            for (int count = static_cast<int>(between(1.0, 8.0)); count > 0; --count) {
+                double farthest = 0.0;
+                for (double& each : at) {
+                    const double to = std::clamp(each + reach * between(-1.0, 1.0), lower, upper);
+                    farthest = std::max(farthest, std::abs(to - each));
+                    each = to;
+                }
+                time += std::max(farthest / v * between(1.0, 2.0), 0.002);
+                points.push_back(pointAt(time, at, kind > 0 ? values(-v, v) : Vector{},
+                                         kind > 1 ? values(-30.0 * a, 30.0 * a) : Vector{}));
+            }
+            generator.trajectory(points);
+        };
+        for (int event = 0; event < 20; ++event) {
+            const double choice = between(0.0, 1.0);
+            if (choice < 0.6) {
+                follow();
+            } else if (choice < 0.8) {
+                generator.target(values(lower, upper), values(-v, v));
+            } else {
+                generator.target(values(lower, upper));
+            }
+            run(static_cast<int>(between(1.0, 120.0)));
+            if (between(0.0, 1.0) < 0.4) continue;  // the next one comes in the middle
+            const bool halts = between(0.0, 1.0) < 0.5;
+            if (halts) {
+                generator.bench.write("halt", true);
+            } else {
+                generator.trajectory({});
+            }
+            const int most = static_cast<int>((4.0 * v / a + 8.0 * a / j) / kPeriod) + 100;
+            const int cycles = run(most);
+            ASSERT_TRUE(generator.done()) << "stop " << done << " runs away";
+            longest = std::max(longest, cycles * kPeriod / (v / a + a / j));
+            if (halts) generator.bench.write("halt", false);
+            ++done;
+            ASSERT_LE(over_velocity, 1e-8) << "before stop " << done;
+            ASSERT_LE(over_position, 1e-9) << "before stop " << done;
+            for (std::size_t i = 0; i < joints; ++i) {
+                ASSERT_EQ(generator.now().velocity[i], 0.0);
+                ASSERT_EQ(generator.now().acceleration[i], 0.0);
+            }
+        }
+    }
+    RecordProperty("stops", stops);
+    std::cout << stops << " stops: velocity " << over_velocity << " over its limit, position "
+              << over_position << ", longest " << longest << " (V/A + A/J)\n";
 }
 
 TEST(TrajectoryGenerator, RejectsMessagesOfAnySizeThatItCannotUse) {
