@@ -696,6 +696,8 @@ class TrajectoryGenerator final : public rtcf::Component {
         Motions joined;
         for (std::size_t i = 0; i < count(); ++i) joined[i] = expected(i, join);
         std::int64_t before = join;
+        Motions from = joined;
+        PointKind kind = PointKind::PositionVelocityAcceleration;
         for (std::size_t k = first; k < message.points.size(); before = timeOf(k), ++k) {
             const auto& each = message.points[k];
             if (each.positions.size() != size ||
@@ -708,16 +710,17 @@ class TrajectoryGenerator final : public rtcf::Component {
                 reject(kWhat, "the times of the points do not rise");
                 return;
             }
+            kind = commonKind(kind, kindOf(each));
             for (std::size_t i = 0; i < count(); ++i) {
-                const std::size_t at = memory_->order[i];
-                const double from =
-                    k == first ? joined[i].position : message.points[k - 1].positions[at];
+                const Motion to = motionAt(each, memory_->order[i]);
                 if (const char* const why =
-                        violation(i, motionAt(each, at), from, seconds(timeOf(k) - before))) {
+                        violation(i, from[i], to, kind, seconds(timeOf(k) - before))) {
                     reject(kWhat, i, why);
                     return;
                 }
+                from[i] = to;
             }
+            kind = kindOf(each);
         }
 
         const PointKind tail = points().empty() ? PointKind::Position : points().kindAt(join);
@@ -725,7 +728,7 @@ class TrajectoryGenerator final : public rtcf::Component {
         points().truncate(join);
         if (waits) points_begin_ = join;
         std::copy_n(joined.begin(), count(), points().append(join, tail));
-        PointKind kind = PointKind::PositionVelocityAcceleration;
+        kind = PointKind::PositionVelocityAcceleration;
         for (std::size_t k = first; k < message.points.size(); ++k) {
             const auto& each = message.points[k];
             Motion* const to = points().append(timeOf(k), commonKind(kind, kindOf(each)));
@@ -745,9 +748,9 @@ class TrajectoryGenerator final : public rtcf::Component {
         return false;
     }
 
-    // Why a joint cannot get to a point, or null. Polynomials between points may exceed the limits,
-    // which advance() checks.
-    const char* violation(std::size_t i, const Motion& to, double from, double duration) const {
+    // Why a joint cannot get to a point, or null.
+    const char* violation(std::size_t i, const Motion& from, const Motion& to, PointKind kind,
+                          double duration) const {
         if (!std::isfinite(to.position) || !std::isfinite(to.velocity) ||
             !std::isfinite(to.acceleration))
             return "a point is not finite";
@@ -755,8 +758,17 @@ class TrajectoryGenerator final : public rtcf::Component {
             return "a point is beyond the limits of position";
         const double limit = setup_->limits[i].velocity * (1.0 + kLimitTolerance);
         if (std::abs(to.velocity) > limit) return "the velocity of a point is above its limit";
-        if (std::abs(to.position - from) > limit * duration)
+        if (std::abs(to.position - from.position) > limit * duration)
             return "a segment needs a velocity above the limit";
+        // Where it begins beyond a limit, it has to come back.
+        PositionRange positions{setup_->lower[i], setup_->upper[i]};
+        positions.add(from.position);
+        const double tolerance = kLimitTolerance * (1.0 + std::abs(from.position));
+        positions.lower -= tolerance;
+        positions.upper += tolerance;
+        const double speed = std::max(limit, std::abs(from.velocity) * (1.0 + kLimitTolerance));
+        if (!PolynomialSegment(from, to, kind, duration).staysWithin(positions, speed))
+            return "a segment exceeds the limits of position or velocity between its points";
         return nullptr;
     }
 

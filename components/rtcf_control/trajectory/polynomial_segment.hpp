@@ -34,6 +34,14 @@ class PolynomialSegment {
     /// The motion at some time after the start, s. Before the start and after the end, the motion
     /// at the start or the end. At the end, its position is exactly that of the point.
     [[nodiscard]] Motion at(double time) const noexcept RTCF_NONBLOCKING;
+    /// True if positions and velocities stay within limits between start and end, up to about a
+    /// millionth of their change. Exact at both ends. The number of steps is bounded.
+    ///
+    /// Source: a polynomial stays within the range of its Bernstein coefficients, which de
+    /// Casteljau's subdivision narrows; e.g. Farin, Curves and Surfaces for CAGD, 2002, chapter 6.
+    /// @param speed largest velocity in both directions, unit/s
+    [[nodiscard]] bool staysWithin(const PositionRange& positions, double speed) const noexcept
+        RTCF_NONBLOCKING;
 
    private:
     [[nodiscard]] Motion evaluate(double x) const noexcept;

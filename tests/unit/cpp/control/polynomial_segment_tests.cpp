@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <random>
+
 namespace rtcf::test {
 namespace {
 
@@ -82,6 +86,43 @@ TEST(PolynomialSegment, UsesWhatBothPointsGive) {
               PointKind::Position);
     EXPECT_EQ(commonKind(PointKind::PositionVelocityAcceleration, PointKind::PositionVelocity),
               PointKind::PositionVelocity);
+}
+
+TEST(PolynomialSegment, KnowsWhetherItStaysWithinLimits) {
+    std::mt19937_64 random(5);
+    const auto between = [&](double low, double high) {
+        return std::uniform_real_distribution<double>(low, high)(random);
+    };
+    int within = 0;
+    for (int n = 0; n < 3000; ++n) {
+        const double duration = std::pow(10.0, between(-2.0, 1.0));
+        const auto motion = [&] {
+            return Motion{between(-1.0, 1.0), between(-2.0, 2.0) / duration,
+                          between(-5.0, 5.0) / (duration * duration)};
+        };
+        const auto kind = static_cast<PointKind>(n % 3);
+        const PolynomialSegment segment(motion(), motion(), kind, duration);
+        PositionRange range{segment.at(0.0).position, segment.at(0.0).position};
+        double fastest = 0.0;
+        constexpr int kSamples = 2000;
+        for (int i = 0; i <= kSamples; ++i) {
+            const Motion now = segment.at(i * duration / kSamples);
+            range.add(now.position);
+            fastest = std::max(fastest, std::abs(now.velocity));
+        }
+        // Samples miss an extreme by less than a millionth of the change.
+        const double size = 1e-5 * (1.0 + fastest * duration);
+        const PositionRange wide{range.lower - size, range.upper + size};
+        ASSERT_TRUE(segment.staysWithin(wide, fastest + size / duration));
+        ASSERT_FALSE(segment.staysWithin({range.lower + size, wide.upper}, 2.0 * fastest));
+        ASSERT_FALSE(segment.staysWithin({wide.lower, range.upper - size}, 2.0 * fastest));
+        ASSERT_FALSE(segment.staysWithin(wide, fastest - size / duration));
+        const PositionRange any{between(-1.5, 0.0), between(0.0, 1.5)};
+        within += segment.staysWithin(any, between(0.0, 5.0) / duration) ? 1 : 0;
+    }
+    EXPECT_GT(within, 100);
+    EXPECT_TRUE(PolynomialSegment(kBegin, kEnd, PointKind::PositionVelocity, 0.0)
+                    .staysWithin({kEnd.position, kEnd.position}, 0.0));
 }
 
 }  // namespace
