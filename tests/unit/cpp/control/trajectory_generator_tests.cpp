@@ -701,7 +701,7 @@ std::string exactly(double value) {
 // number of stops.
 TEST(TrajectoryGenerator, EveryStopStaysWithinTheLimitsOfVelocityAndPosition) {
     const char* const wanted = std::getenv("RTCF_STOPS");
-    const int stops = wanted != nullptr ? std::atoi(wanted) : 2 * kTargets;
+    const int stops = wanted != nullptr ? std::stoi(wanted) : 2 * kTargets;
     std::mt19937_64 random(49);
     const auto between = [&](double low, double high) {
         return std::uniform_real_distribution<double>(low, high)(random);
