@@ -18,6 +18,7 @@
 #include "check/check.hpp"
 #include "check/check_settings.hpp"
 #include "check/describe.hpp"
+#include "common/c_locale.hpp"
 #include "faults/crash_handler.hpp"
 #include "faults/flight_recorder.hpp"
 #include "logging/log.hpp"
@@ -266,6 +267,7 @@ int run(const Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
+    useCLocale();
     Options options;
     if (const int status = parse(argc, argv, options); status >= 0) return status;
     try {

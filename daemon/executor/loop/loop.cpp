@@ -11,6 +11,7 @@
 #include <optional>
 #include <utility>
 
+#include "common/c_locale.hpp"
 #include "common/error.hpp"
 #include "common/time_units.hpp"
 #include "faults/crash_handler.hpp"
@@ -246,6 +247,7 @@ void Loop::run() noexcept {
     Log::setRealtimeThread(true);
     const CrashContext crash_context(ThreadRole::Realtime);
     pthread_setname_np(pthread_self(), "rtcf-loop");
+    useCLocale();
     thread_id_.store(static_cast<int>(syscall(SYS_gettid)), std::memory_order_relaxed);
     setFloatingPointDefaults();
     prefaultStack(stack_bytes_);

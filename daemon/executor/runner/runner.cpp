@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "common/c_locale.hpp"
 #include "common/error.hpp"
 #include "faults/crash_handler.hpp"
 #include "logging/log_errors.hpp"
@@ -89,6 +90,7 @@ void Runner::post(std::function<void()> job) {
 void Runner::threadMain() {
     const CrashContext crash_context(ThreadRole::Graph);
     pthread_setname_np(pthread_self(), "rtcf-graph");
+    useCLocale();
     std::unique_lock<std::mutex> lock(jobs_mutex_);
     while (!ending_) {  // jobs that still wait at the end are discarded
         jobs_changed_.wait_for(lock, kTick, [this] { return ending_ || !jobs_.empty(); });
