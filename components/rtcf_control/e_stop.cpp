@@ -15,6 +15,8 @@ namespace {
 class EStop final : public rtcf::Component {
     static constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
+    enum class Mode { SafeValue, Standstill };
+
     rtcf::Input<double> in{this, "in"};
     rtcf::Input<bool> stop1{this, "stop1"};
     rtcf::Input<bool> stop2{this, "stop2"};
@@ -24,6 +26,7 @@ class EStop final : public rtcf::Component {
     rtcf::Output<double> out{this, "out", "", rtcf::Finite()};
     rtcf::Output<bool> stopped{this, "stopped"};
     rtcf::Output<std::int32_t> state{this, "state"};
+    rtcf::Output<bool> torque_off{this, "torque_off"};
 
     rtcf::Parameter<bool> engaged{this, "engaged", false, rtcf::Doc("stop, as an input would")};
     rtcf::Parameter<bool> start_stopped{this, "start_stopped", true,
@@ -36,6 +39,14 @@ class EStop final : public rtcf::Component {
         rtcf::Max(4.0),
         rtcf::Doc(
             "number of inputs stop1, stop2 … that stop without a value, or if their writer ends")};
+    rtcf::Parameter<Mode> mode{
+        this,
+        "mode",
+        Mode::SafeValue,
+        rtcf::Choice("safe_value", Mode::SafeValue),
+        rtcf::Choice("standstill", Mode::Standstill),
+        rtcf::Doc("a stop moves the output to safe_value; or, for a command of position, to a "
+                  "standstill where it is")};
     rtcf::Parameter<double> safe_value{this, "safe_value", 0.0,
                                        rtcf::Doc("output during a stop and in the last cycle")};
     rtcf::Parameter<double> stop_rate{
@@ -45,6 +56,15 @@ class EStop final : public rtcf::Component {
         rtcf::Min(1e-9),
         rtcf::Unit("1/s"),
         rtcf::Doc("rate of change to safe_value; infinite = at once (stop category 0)")};
+    rtcf::Parameter<double> deceleration{
+        this,
+        "deceleration",
+        kInfinity,
+        rtcf::Min(1e-9),
+        rtcf::Unit("1/s^2"),
+        rtcf::Doc("deceleration to the standstill; infinite = at once")};
+    rtcf::Parameter<bool> keep_torque{this, "keep_torque", false,
+                                      rtcf::Doc("torque_off stays false (stop category 2)")};
     rtcf::Parameter<double> resume_rate{this,
                                         "resume_rate",
                                         kInfinity,
@@ -56,6 +76,11 @@ class EStop final : public rtcf::Component {
     rtcf::State<std::array<bool, 4>> wired_{
         this, "wired", {}, rtcf::Doc("stop1 to stop4 have had a writer")};
     rtcf::State<double> last_{this, "last", 0.0, rtcf::Doc("the last output")};
+    rtcf::State<double> speed_{this, "speed", 0.0, rtcf::Unit("1/s"),
+                               rtcf::Doc("rate of change of the last output")};
+    rtcf::State<bool> known_{
+        this, "known", false,
+        rtcf::Doc("there is a last output; a standstill needs a first command")};
     rtcf::State<bool> resumes_{this, "resumes", false,
                                rtcf::Doc("the output moves to the command at resume_rate")};
 
@@ -64,14 +89,22 @@ class EStop final : public rtcf::Component {
         if (start_stopped) latch_.value().stop();
         wired_ = std::array<bool, 4>{};
         last_ = safe_value.value();
+        speed_ = 0.0;
+        known_ = false;
         resumes_ = true;
         return true;
     }
 
     void safe() noexcept override {
         latch_.value().stop();
-        last_ = safe_value.value();
-        publish();
+        if (mode == Mode::SafeValue) {
+            last_ = safe_value.value();
+        } else if (!known_) {
+            publishState(false);
+            return;
+        }
+        speed_ = 0.0;
+        publish(true);
     }
 
     void update() override {
@@ -91,32 +124,56 @@ class EStop final : public rtcf::Component {
         const bool wanted = reset.read() != rtcf::DataStatus::None && reset.value();
         if (latch_.value().update(condition, usable && command == rtcf::DataStatus::New, wanted))
             resumes_ = true;
-        if (latch_.value().stopped()) {
-            move(safe_value, stop_rate);
-        } else if (!usable) {
-            if (command != rtcf::DataStatus::None) out.write(in.value());  // rejected as not finite
-            publishState();
-            return;
-        } else {
-            move(in.value(), resumes_ ? resume_rate.value() : kInfinity);
-            if (last_ == in.value()) resumes_ = false;
+        if (mode == Mode::Standstill && !known_) {
+            // The position at which the first command begins.
+            if (!usable) {
+                publishState(false);
+                return;
+            }
+            last_ = in.value();
         }
-        publish();
+        known_ = true;
+        if (latch_.value().stopped()) {
+            const bool stands = mode == Mode::Standstill ? brake() : move(safe_value, stop_rate);
+            publish(stands);
+            return;
+        }
+        if (!usable) {
+            if (command != rtcf::DataStatus::None) out.write(in.value());  // rejected as not finite
+            speed_ = 0.0;
+            publishState(false);
+            return;
+        }
+        if (move(in.value(), resumes_ ? resume_rate.value() : kInfinity)) resumes_ = false;
+        publish(false);
     }
 
-    void move(double target, double rate) {
+    // Returns true if the output is at the target.
+    bool move(double target, double rate) {
+        const double before = last_;
         const double largest = rate * dt();
-        last_ = std::clamp(target, last_ - largest, last_ + largest);
+        last_ = std::clamp(target, before - largest, before + largest);
+        speed_ = dt() > 0.0 ? (last_ - before) / dt() : 0.0;
+        return last_ == target;
     }
 
-    void publish() noexcept {
+    // Slows down; returns true if the output stands.
+    bool brake() {
+        const double largest = deceleration * dt();
+        speed_ = std::clamp(0.0, speed_ - largest, speed_ + largest);
+        last_ += speed_ * dt();
+        return speed_ == 0.0;
+    }
+
+    void publish(bool stands) noexcept {
         out.write(last_);
-        publishState();
+        publishState(stands);
     }
 
-    void publishState() noexcept {
+    void publishState(bool stands) noexcept {
         stopped.write(latch_.value().stopped());
         state.write(latch_.value().state());
+        torque_off.write(stands && latch_.value().stopped() && !keep_torque);
     }
 };
 

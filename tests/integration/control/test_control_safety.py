@@ -149,6 +149,47 @@ def test_a_latch_survives_replacement_and_snapshot(stepped: Bench) -> None:
         block.unload()
 
 
+def test_a_stop_of_a_position_comes_to_a_standstill(blocks: Blocks) -> None:
+    time = DT * np.arange(2000)
+    wanted = 0.5 + np.clip(time, 0.0, 1.0) * 2.0  # 2 per second
+    stop, reset = levels(2000, (500, 510)), levels(2000, (1500, 1501))
+    inputs = {"in": wanted, "stop1": stop, "reset": reset}
+    values = blocks.run("EStop", inputs, start_stopped=False, mode="standstill",
+                        deceleration=10.0, resume_rate=4.0)  # fmt: skip
+    out = values["out"]
+    assert np.allclose(out[:500], wanted[:500], rtol=0, atol=ROUNDING)
+    # 2 / 10 s, 200 cycles, and half of the velocity on average.
+    slower = -np.diff(np.diff(out[498:720])) / DT**2
+    assert slower.max() <= 10.0 + 1e-6
+    assert out[499] + 0.2 - 0.002 <= out[700] <= out[499] + 0.2
+    assert (out[700:1500] == out[700]).all()
+    off = values["torque_off"].astype(bool)
+    assert not off[:698].any()
+    assert off[700:1500].all()
+    assert not off[1500:].any()
+    assert np.diff(out[1499:]).max() == pytest.approx(0.004, abs=ROUNDING)
+    assert out[-1] == wanted[-1]
+    at_once = blocks.out("EStop", inputs, start_stopped=False, mode="standstill")
+    assert (at_once[500:1500] == at_once[499]).all()
+
+
+def test_a_standstill_begins_with_the_first_command(blocks: Blocks) -> None:
+    wanted = MASKED.array(np.linspace(0.8, 1.8, 100), mask=np.arange(100) < 20)
+    values = blocks.run("EStop", {"in": wanted, "stop1": False, "reset": levels(100, (60, 61))},
+                        mode="standstill")  # fmt: skip
+    assert np.isnan(values["out"][:20]).all()
+    assert (values["out"][20:60] == wanted[20]).all()
+    assert values["out"][60:].tolist() == wanted[60:].tolist()
+
+
+def test_torque_stays_on_in_stop_category_2(blocks: Blocks) -> None:
+    inputs = {"in": 3.0, "stop1": levels(100, (20, 30))}
+    values = blocks.run("EStop", inputs, start_stopped=False, stop_rate=100.0, keep_torque=True)
+    assert not values["torque_off"].any()
+    values = blocks.run("EStop", inputs, start_stopped=False, stop_rate=100.0)
+    assert values["torque_off"].astype(bool).tolist() == levels(100, (49, 100)).tolist()
+
+
 # CommandTimeout.
 
 
