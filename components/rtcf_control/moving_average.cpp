@@ -24,12 +24,17 @@ class MovingAverage final : public rtcf::Component {
                                          rtcf::Unit("cycles"),
                                          rtcf::Doc("length of the window")};
 
-    rtcf::State<std::array<double, kLongest>> window_{this, "window", {}};
+    // Values are added only: a large one would leave rounding errors behind when it is subtracted.
+    rtcf::State<std::array<double, kLongest>> window_{
+        this,
+        "window",
+        {},
+        rtcf::Doc("before next: values of this round; from there on: sums of the last round's "
+                  "values from each place to the end")};
     rtcf::State<std::int32_t> count_{this, "count", 0, rtcf::Doc("values in the window")};
     rtcf::State<std::int32_t> next_{this, "next", 0, rtcf::Doc("place of the next value")};
     rtcf::State<std::int32_t> ring_{this, "ring", 0, rtcf::Doc("number of places in use")};
-    rtcf::State<double> sum_{this, "sum", 0.0, rtcf::Doc("sum of the window")};
-    rtcf::State<double> round_{this, "round", 0.0, rtcf::Doc("sum of the places before next")};
+    rtcf::State<double> round_{this, "round", 0.0, rtcf::Doc("sum of this round's values")};
 
     bool start() override {
         count_ = 0;
@@ -51,47 +56,50 @@ class MovingAverage final : public rtcf::Component {
         } else if (ring_ != length) {
             resize();
         }
-        auto& window = window_.value();
-        const auto place = static_cast<std::size_t>(next_.value());
-        if (count_ == ring_) {
-            sum_ -= window[place];
-        } else {
-            count_ += 1;
-        }
-        window[place] = value;
-        sum_ += value;
+        window_.value()[static_cast<std::size_t>(next_.value())] = value;
         round_ += value;
         next_ += 1;
-        if (next_ == ring_) {
-            // The running sum collects rounding errors: replace it by the sum of this round.
-            sum_ = round_.value();
-            round_ = 0.0;
-            next_ = 0;
-        }
-        out.write(sum_ / count_);
+        count_ = std::min(count_ + 1, ring_.value());
+        const double sum = this->sum();
+        if (next_ == ring_) endRound();
+        out.write(sum / count_);
     }
 
     // Runs in the last cycle, too, to pass on the safe command of an upstream component.
     void safe() noexcept override { update(); }
 
+    // Of the values in the window.
+    double sum() const {
+        const bool has_rest = count_ == ring_ && next_ < ring_;
+        return has_rest ? round_ + window_.value()[static_cast<std::size_t>(next_.value())]
+                        : round_.value();
+    }
+
+    void endRound() {
+        auto& window = window_.value();
+        for (auto i = static_cast<std::size_t>(ring_.value()) - 1; i > 0; --i)
+            window[i - 1] += window[i];
+        round_ = 0.0;
+        next_ = 0;
+    }
+
     void restart() {
         ring_ = length.value();
         count_ = 0;
         next_ = 0;
-        sum_ = 0.0;
         round_ = 0.0;
     }
 
     // Another length: the window keeps its mean, so that the output does not jump.
     void resize() {
-        const double mean = sum_ / count_;
+        const double mean = sum() / count_;
         const std::int32_t kept = std::min(count_.value(), length.value());
         restart();
         std::fill_n(window_.value().begin(), kept, mean);
         count_ = kept;
-        sum_ = mean * kept;
-        next_ = kept == ring_ ? 0 : kept;
-        round_ = next_ == 0 ? 0.0 : sum_.value();
+        next_ = kept;
+        round_ = mean * kept;
+        if (next_ == ring_) endRound();
     }
 };
 

@@ -116,12 +116,14 @@ class MovingAverage(_Block):
     u: Input[float]
     y: Output[float] = Output(finite=True)
     length: Parameter[int] = Parameter(10, min=1, max=LONGEST, unit="cycles", doc="of the window")
+    # Before next: values of this round; from there on: sums of the last round's values from each
+    # place to the end. Values are added only: a large one would leave rounding errors behind when it
+    # is subtracted.
     window: State[np.float64, LONGEST]
     count: State[int] = State(0, doc="values in the window")
     next: State[int] = State(0, doc="place of the next value")
     ring: State[int] = State(0, doc="number of places in use")
-    sum: State[float] = State(0.0, doc="sum of the window")
-    round: State[float] = State(0.0, doc="sum of the places before next")
+    round: State[float] = State(0.0, doc="sum of this round's values")
 
     def start(self):
         self.ring = 0
@@ -137,19 +139,17 @@ class MovingAverage(_Block):
             self.ring = self.length
             self.count = 0
             self.next = 0
-            self.sum = 0.0
             self.round = 0.0
-        if self.count == self.ring:
-            self.sum -= self.window[self.next]
-        else:
-            self.count += 1
         self.window[self.next] = value
-        self.sum += value
         self.round += value
         self.next += 1
+        self.count = min(self.count + 1, self.ring)
+        total = self.round
         if self.next == self.ring:
-            # The running sum collects rounding errors: replace it by the sum of this round.
-            self.sum = self.round
+            for i in range(self.ring - 1, 0, -1):
+                self.window[i - 1] += self.window[i]
             self.round = 0.0
             self.next = 0
-        self.y.write(self.sum / self.count)
+        elif self.count == self.ring:
+            total += self.window[self.next]
+        self.y.write(total / self.count)
