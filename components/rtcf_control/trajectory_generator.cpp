@@ -437,7 +437,7 @@ class TrajectoryGenerator final : public rtcf::Component {
     }
 
     // Finds the index of each joint in a message. Without names, joints have the order of the
-    // parameter. Returns the first joint that the message lacks, or count().
+    // parameter. Returns the first joint that the message lacks or has twice, or count().
     std::size_t firstMissing(const Strings& names) noexcept {
         auto& order = memory_->order;
         const auto end =
@@ -446,10 +446,17 @@ class TrajectoryGenerator final : public rtcf::Component {
             order[i] = i;
             if (names.empty()) continue;
             const auto found = std::find(names.begin(), end, setup_->joints[i]);
-            if (found == end) return i;
+            if (found == end || std::find(found + 1, end, *found) != end) return i;
             order[i] = static_cast<std::size_t>(found - names.begin());
         }
         return count();
+    }
+    const char* whyMissing(const Strings& names, std::size_t joint) const noexcept {
+        const auto end =
+            names.begin() + static_cast<std::ptrdiff_t>(std::min(names.size(), kMostNames));
+        return std::find(names.begin(), end, setup_->joints[joint]) == end
+                   ? "it is not in the message"
+                   : "it is twice in the message";
     }
 
     // Reads the start position. Returns false if it is not there yet.
@@ -598,7 +605,7 @@ class TrajectoryGenerator final : public rtcf::Component {
 
     void follow(const sensor_msgs::JointState& message, std::int64_t last) {
         if (const std::size_t missing = firstMissing(message.name); missing < count()) {
-            reject("target", missing, "it is not in the message");
+            reject("target", missing, whyMissing(message.name, missing));
             return;
         }
         const std::size_t size = message.name.empty() ? count() : message.name.size();
@@ -664,7 +671,7 @@ class TrajectoryGenerator final : public rtcf::Component {
             return;
         }
         if (const std::size_t missing = firstMissing(message.joint_names); missing < count()) {
-            reject(kWhat, missing, "it is not in the message");
+            reject(kWhat, missing, whyMissing(message.joint_names, missing));
             return;
         }
         const std::size_t size = message.joint_names.empty() ? count() : message.joint_names.size();

@@ -794,6 +794,21 @@ TEST(TrajectoryGenerator, EveryStopStaysWithinTheLimitsOfVelocityAndPosition) {
               << over_position << ", longest " << longest << " (V/A + A/J)\n";
 }
 
+TEST(TrajectoryGenerator, RejectsAJointThatIsTwiceInAMessage) {
+    Generator generator({0.0, 0.0});
+    generator.bench.write("target", jointState({1.0, 2.0, 3.0}, {}, {"j0", "j1", "j0"}));
+    generator.next();
+    EXPECT_EQ(generator.bench.log().back(),
+              "target rejected: joint j0: it is twice in the message");
+    trajectory_msgs::JointTrajectory message;
+    message.joint_names = {"j1", "j1"};
+    message.points = {pointAt(1.0, {0.1, 0.2})};
+    generator.bench.write("trajectory", message);
+    generator.next();
+    EXPECT_EQ(generator.rejected(), 2U);
+    EXPECT_TRUE(generator.done());
+}
+
 TEST(TrajectoryGenerator, RejectsMessagesOfAnySizeThatItCannotUse) {
     Generator generator({0.0});
     std::vector<trajectory_msgs::JointTrajectoryPoint> points;
