@@ -153,8 +153,8 @@ class TrajectoryGenerator final : public rtcf::Component {
             for (std::size_t i = 0; i < count; ++i) {
                 if (task.kind == Kind::Target) {
                     // Within the limits of position as well, or the target is rejected.
-                    const MotionTarget target = task.target(i);
-                    stops[i] = StopMotion({target.position, target.velocity, 0.0}, task.limits(i));
+                    const MotionTarget at = task.target(i);
+                    stops[i] = StopMotion({at.position, at.velocity, 0.0}, task.limits(i));
                 } else {
                     stops[i] = StopMotion(task.begin(i), task.limits(i), task.allowed(i));
                 }
