@@ -117,8 +117,8 @@ class MovingAverage(_Block):
     y: Output[float] = Output(finite=True)
     length: Parameter[int] = Parameter(10, min=1, max=LONGEST, unit="cycles", doc="of the window")
     # Before next: values of this round; from there on: sums of the last round's values from each
-    # place to the end. Values are added only: a large one would leave rounding errors behind when it
-    # is subtracted.
+    # place to the end. Values are added only: a large one would leave rounding errors behind when
+    # it is subtracted.
     window: State[np.float64, LONGEST]
     count: State[int] = State(0, doc="values in the window")
     next: State[int] = State(0, doc="place of the next value")
