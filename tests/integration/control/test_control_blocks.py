@@ -355,6 +355,13 @@ def test_moving_average_is_the_mean_of_the_window(blocks: Blocks, walk: Any, len
     assert np.allclose(out, expected, rtol=0, atol=1e3 * ROUNDING)
 
 
+def test_moving_average_forgets_the_rounding_of_a_large_value(blocks: Blocks) -> None:
+    values = np.full(100, 0.1)
+    values[5] = 1e15
+    out = blocks.out("MovingAverage", {"in": values}, length=10)
+    assert np.allclose(out[15:], 0.1, rtol=0, atol=1e-15)
+
+
 @pytest.mark.parametrize("place", [0, 5, 57, 99])
 def test_moving_average_forgets_a_large_value_that_has_left(blocks: Blocks, place: int) -> None:
     values = np.full(400, 0.1)
