@@ -336,6 +336,7 @@ GAINS = [
 ]  # fmt: skip
 JOINTS = [f"joint{i}" for i in range(1, 7)]
 NAMES = " ".join(JOINTS)
+ACCELERATIONS = [6.0, 6.0, 8.0, 12.0, 12.0, 15.0]  # of trajectories, rad/s^2
 
 
 def graph(all_links: Sequence[Link], folder: Path) -> str:
@@ -359,7 +360,7 @@ def graph(all_links: Sequence[Link], folder: Path) -> str:
         ),
         _component(
             "/trajectory", "rtcf_control/TrajectoryGenerator",
-            {"joints": NAMES, "acceleration": "6 6 8 12 12 15", "jerk": "60 60 80 120 120 150"}
+            {"joints": NAMES, "acceleration": " ".join(f"{each:g}" for each in ACCELERATIONS), "jerk": "60 60 80 120 120 150"}
             | {name: " ".join(f"{getattr(link, name):g}" for link in arm)
                for name in ("velocity", "lower", "upper")},
             {"measured": "/joint_states", "target": "/target", "command": "/command",
@@ -443,7 +444,10 @@ def _controllers(link: Link, gains: Gains) -> list[dict[str, Any]]:
         _component(
             f"/{joint}/limiter", "rtcf_control/JointLimiter",
             {"command": "effort", "lower": link.lower, "upper": link.upper,
-             "max_velocity": round(1.2 * link.velocity, 3), "max_effort": float(link.effort)},
+             "max_velocity": round(1.2 * link.velocity, 3), "max_effort": float(link.effort),
+             # Above the trajectory's, which therefore meets no limit.
+             "deceleration": 1.5 * ACCELERATIONS[JOINTS.index(joint)],
+             "k_velocity": gains.velocity},
             {"in": "torque", "position": position, "velocity": velocity, "out": "limited_torque"},
         ),
         # The arm's brakes and its trajectory follow the stop of the first joint.

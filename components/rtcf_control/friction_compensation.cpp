@@ -4,6 +4,8 @@
 
 #include <rtcf/component.hpp>
 
+#include "measurement_watch.hpp"
+
 namespace rtcf_control {
 namespace {
 
@@ -59,6 +61,8 @@ class FrictionCompensation final : public rtcf::Component {
                                  rtcf::Doc("time of the transition after a change of parameters; "
                                            "0 = at once")};
 
+    MeasurementWatch<1> watch_{this, {"velocity"}, "effort = 0"};
+
     struct Law {
         double coulomb = 0.0;
         double breakaway = 0.0;
@@ -107,15 +111,20 @@ class FrictionCompensation final : public rtcf::Component {
 
     bool start() override {
         begun_ = false;
+        watch_.begin();
         return true;
     }
 
     void update() override {
-        if (velocity.read() == rtcf::DataStatus::None) return;
+        const rtcf::DataStatus status = velocity.read();
+        if (status == rtcf::DataStatus::None) return;
         const double v = velocity.value();
-        if (!std::isfinite(v)) {
-            effort.write(v);  // rejected as not finite: readers keep the last output
-            return;
+        const char* const fault =
+            watch_.note(0, v, status == rtcf::DataStatus::New, elapsed());
+        if (fault != nullptr) {
+            reportFault(fault);
+            if (watch_.lost(0)) safe();
+            return;  // else readers keep the last effort
         }
         if (begun_ && rest_ > 0.0) rest_ = fade > 0.0 ? std::max(0.0, rest_ - dt() / fade) : 0.0;
         const Law law{coulomb,           breakaway, viscous, stribeck_velocity,

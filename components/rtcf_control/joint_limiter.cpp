@@ -4,6 +4,8 @@
 
 #include <rtcf/component.hpp>
 
+#include "measurement_watch.hpp"
+
 namespace rtcf_control {
 namespace {
 
@@ -62,7 +64,8 @@ class JointLimiter final : public rtcf::Component {
         kInfinity,
         rtcf::Min(1e-9),
         rtcf::Unit("rad/s^2"),
-        rtcf::Doc("deceleration for the braking distance before lower and upper")};
+        rtcf::Doc("largest acceleration of a position or velocity command, either way, and that of "
+                  "the braking distance before lower and upper")};
     rtcf::Parameter<double> max_effort{
         this,           "max_effort",      kInfinity,
         rtcf::Min(0.0), rtcf::Unit("N m"), rtcf::Doc("largest effort, either way")};
@@ -75,9 +78,14 @@ class JointLimiter final : public rtcf::Component {
         0.0,
         rtcf::Min(0.0),
         rtcf::Unit("N m s/rad"),
-        rtcf::Doc("effort by excess velocity; 0 = no effort towards excess velocity")};
+        rtcf::Doc("effort by excess velocity; needed for limits of position or velocity")};
+    MeasurementWatch<2> watch_{
+        this, {"position", "velocity"}, "a velocity slows down to 0, an effort is 0"};
 
     rtcf::State<double> last_{this, "last", 0.0, rtcf::Doc("the last output")};
+    rtcf::State<double> pace_{this, "pace", 0.0, rtcf::Unit("rad/s"),
+                              rtcf::Doc("velocity of the last position or velocity command")};
+    rtcf::State<double> wanted_{this, "last_wanted", 0.0, rtcf::Doc("last wanted position")};
     rtcf::State<bool> begun_{this, "begun", false, rtcf::Doc("the last output is valid")};
 
     bool prepare(const rtcf::Values& proposed) override {
@@ -91,43 +99,65 @@ class JointLimiter final : public rtcf::Component {
             std::isfinite(proposed[soft_lower]) || std::isfinite(proposed[soft_upper]);
         if (soft && proposed[k_position] == 0.0)
             return fail("soft limits need a k_position above 0");
+        if (proposed[command] != Command::Effort) return true;
+        const bool hard = std::isfinite(proposed[lower]) || std::isfinite(proposed[upper]);
+        if (hard && std::isinf(proposed[deceleration]))
+            return fail(
+                "command = effort with limits of the position needs a deceleration (rad/s^2) that "
+                "the joint reaches with max_effort: it brakes by it before the limit");
+        if ((hard || soft || std::isfinite(proposed[max_velocity])) && proposed[k_velocity] == 0.0)
+            return fail(
+                "command = effort with limits of position or velocity needs a k_velocity (N m "
+                "s/rad) above 0: the braking effort by excess velocity");
         return true;
     }
 
     bool start() override {
         begun_ = false;
+        pace_ = 0.0;
+        watch_.begin();
         return true;
     }
 
     void update() override {
-        const bool has_position = position.read() != rtcf::DataStatus::None;
-        velocity.read();
+        const bool has_position =
+            note(position, 0, command != Command::Position && needsPosition());
+        const bool has_velocity = note(velocity, 1, command == Command::Effort && needsVelocity());
         if (in.read() == rtcf::DataStatus::None) return;
         const double wanted = in.value();
+        if (!std::isfinite(wanted)) {
+            out.write(wanted);  // rejected as not finite: readers keep the last output
+            return;
+        }
         switch (command.value()) {
             case Command::Position:
-                // Begins at the measured position, so that the joint does not jump.
-                if (!begun_ && has_position && !std::isfinite(position.value())) {
-                    out.write(position.value());  // rejected as not finite
-                    return;
+                if (!begun_) {
+                    // Begins at the measured position, so that the joint does not jump.
+                    if (has_position && !std::isfinite(position.value())) {
+                        reportFault("position is not finite: out begins at the measured position");
+                        return;
+                    }
+                    last_ =
+                        has_position ? position.value() : Range{lower, upper}.limit(wanted);
+                    wanted_ = Range{lower, upper}.limit(wanted);
                 }
-                if (begun_) {
-                    write(wanted, followed(wanted, last_));
-                } else {
-                    write(wanted,
-                          followed(wanted, has_position ? position.value()
-                                                        : Range{lower, upper}.limit(wanted)));
-                }
+                write(wanted, followed(wanted, last_));
                 return;
             case Command::Velocity:
-                if (!usable(position, needsPosition())) return;
-                write(wanted, velocities(position.value()).limit(wanted));
+                if (needsPosition() && !has_position) return;
+                write(wanted, needsPosition() && watch_.lost(0)
+                                  ? slower()
+                                  : velocities(watch_.last(0)).limit(wanted));
+                pace_ = last_.value();
                 return;
-            case Command::Effort:
-                if (!usable(position, needsPosition()) || !usable(velocity, needsVelocity()))
+            case Command::Effort: {
+                if ((needsPosition() && !has_position) || (needsVelocity() && !has_velocity))
                     return;
-                write(wanted, efforts(position.value(), velocity.value()).limit(wanted));
+                const bool lost =
+                    (needsPosition() && watch_.lost(0)) || (needsVelocity() && watch_.lost(1));
+                write(wanted, lost ? 0.0 : efforts(watch_.last(0), watch_.last(1)).limit(wanted));
                 return;
+            }
         }
     }
 
@@ -146,59 +176,112 @@ class JointLimiter final : public rtcf::Component {
     }
     bool needsVelocity() const { return needsPosition() || std::isfinite(max_velocity); }
 
-    // False without a value that is needed. A value that is not finite is reported as a fault.
-    bool usable(const rtcf::Input<double>& measured, bool needed) {
-        if (std::isfinite(measured.value())) return !needed || measured.hasValue();
-        out.write(measured.value());  // rejected as not finite: readers keep the last output
-        return false;
+    // Reads a measured input; watches it if it is needed.
+    // @return it has a value; a needed one: it has had a finite value
+    bool note(rtcf::Input<double>& measured, std::size_t i, bool needed) {
+        const rtcf::DataStatus status = measured.read();
+        if (status == rtcf::DataStatus::None) return false;
+        if (!needed) return true;
+        const char* const fault =
+            watch_.note(i, measured.value(), status == rtcf::DataStatus::New, elapsed());
+        if (fault != nullptr) reportFault(fault);
+        return watch_.valid(i);
     }
 
     void write(double wanted, double value) {
-        if (!std::isfinite(wanted)) {
-            out.write(wanted);  // rejected, as above
-            return;
-        }
         out.write(value);
         limited.write(value != wanted);
         last_ = value;
         begun_ = true;
     }
 
-    // Position of this cycle on the way from the last one.
-    double followed(double wanted, double from) const {
-        const Range allowed = velocities(from);
-        const double target = Range{lower, upper}.limit(wanted);
-        const double step = Range{allowed.low * dt(), allowed.high * dt()}.limit(target - from);
-        // Exactly there if only rounding is left.
-        const double rest = std::abs(target - from - step);
-        const double next = rest <= 1e-12 * std::abs(target - from) ? target : from + step;
-        // Rounding must not cross a limit that has not been crossed before.
-        return Range{std::min(lower.value(), from), std::max(upper.value(), from)}.limit(next);
+    // A velocity on the way to 0.
+    double slower() const {
+        const double step = deceleration * dt();
+        return Range{-std::max(0.0, -pace_ - step), std::max(0.0, pace_ - step)}.limit(pace_);
     }
 
-    // Range of the velocity at a position. Braking comes before soft limits, where both disagree.
+    // Position of this cycle on the way from the last one. `wanted` may move itself: the way slows
+    // down before it relative to its velocity.
+    double followed(double wanted, double from) {
+        const double h = dt();
+        const double target = Range{lower, upper}.limit(wanted);
+        const double drift = (target - wanted_) / h;
+        const double distance = wanted_ - from;
+        wanted_ = target;
+        double speed = (target - from) / h;
+        if (std::isfinite(deceleration)) {
+            const double approach = brakingVelocity(std::abs(distance), deceleration, periodOf());
+            speed = drift + std::copysign(approach, distance);
+        }
+        const double v = velocities(from).limit(speed);
+        // Exactly there if only rounding is left.
+        const double rest = std::abs(target - from - v * h);
+        const double next = rest <= 1e-12 * std::abs(target - from) ? target : from + v * h;
+        // Rounding must not cross a limit that has not been crossed before.
+        const double reached = Range{from < lower ? -kInfinity : lower,
+                                     from > upper ? kInfinity : upper}.limit(next);
+        pace_ = (reached - from) / h;
+        return reached;
+    }
+
+    double periodOf() const { return std::max(1e-9 * static_cast<double>(period()), dt()); }
+
+    // Range of the velocity of a command at a position. Where limits disagree, braking before lower
+    // and upper comes first, then the acceleration, then soft limits and max_velocity.
     Range velocities(double x) const {
-        const double period_s = std::max(1e-9 * static_cast<double>(period()), dt());
-        const double up = brakingVelocity(std::max(upper - x, 0.0), deceleration, period_s);
-        const double down = brakingVelocity(std::max(x - lower, 0.0), deceleration, period_s);
+        const double step = deceleration * dt();
+        const Range reachable{pace_ - step, pace_ + step};
+        const Range wanted = softened(x);
+        const Range braking{-towards(x - lower, -pace_), towards(upper - x, pace_)};
+        return {braking.limit(reachable.limit(wanted.low)),
+                braking.limit(reachable.limit(wanted.high))};
+    }
+
+    // Largest velocity towards a limit.
+    // @param distance to the limit; negative beyond it
+    // @param pace     velocity of the last command towards it
+    double towards(double distance, double pace) const {
+        const double h = periodOf();
+        const double allowed = brakingVelocity(std::max(distance, 0.0), deceleration, h);
+        const double slower = pace - deceleration * h;
+        if (slower <= allowed) return allowed;
+        // Too fast, e.g. after a change of the limit. Beyond it, brakes by `deceleration`, before
+        // it by as much as is needed.
+        if (distance <= 0.0) return slower;
+        return std::max(allowed, pace - 0.5 * pace * pace * h / distance);
+    }
+
+    // Range of the velocity within max_velocity and the soft limits.
+    Range softened(double x) const {
+        const double h = periodOf();
         // A larger factor would cross the soft limit in one period.
-        const double factor = std::min(k_position.value(), 1.0 / period_s);
-        const Range braking{-down, up};
-        const Range fastest{-max_velocity, max_velocity};
-        const auto softened = [&](double limit) {
-            return fastest.limit(braking.limit(std::isinf(limit) ? limit : factor * (limit - x)));
+        const double factor = std::min(k_position.value(), 1.0 / h);
+        const auto towardsSoft = [&](double limit) {
+            const double distance = limit - x;
+            if (std::isinf(limit)) return limit;
+            // Slows down by at most `deceleration`: proportional near the limit, before it along
+            // the braking parabola that continues this line.
+            const double line = deceleration / (factor * factor);
+            const double size = std::abs(distance);
+            const double speed = size <= line ? factor * size
+                                              : std::sqrt(deceleration * (2.0 * size - line));
+            return std::copysign(speed, distance);
         };
-        return {softened(soft_lower), softened(soft_upper)};
+        const Range fastest{-max_velocity, max_velocity};
+        return {fastest.limit(towardsSoft(soft_lower)), fastest.limit(towardsSoft(soft_upper))};
     }
 
     // Range of the effort: it drives the velocity back into its range.
     Range efforts(double x, double v) const {
-        const Range allowed = velocities(x);
         const double largest = max_effort;
-        if (k_velocity == 0.0)
-            return {v <= allowed.low ? 0.0 : -largest, v >= allowed.high ? 0.0 : largest};
-        return {std::clamp(-k_velocity * (v - allowed.low), -largest, largest),
-                std::clamp(-k_velocity * (v - allowed.high), -largest, largest)};
+        if (k_velocity == 0.0) return {-largest, largest};
+        const Range wanted = softened(x);
+        const double h = periodOf();
+        const Range braking{-brakingVelocity(std::max(x - lower, 0.0), deceleration, h),
+                            brakingVelocity(std::max(upper - x, 0.0), deceleration, h)};
+        return {std::clamp(-k_velocity * (v - braking.limit(wanted.low)), -largest, largest),
+                std::clamp(-k_velocity * (v - braking.limit(wanted.high)), -largest, largest)};
     }
 };
 

@@ -94,6 +94,13 @@ class KalmanFilter final : public rtcf::Component {
         rtcf::Choice("previous", InputTime::Previous),
         rtcf::Doc("in acts from this cycle on, or has acted since the last one (in is a loop "
                   "break)")};
+    rtcf::Parameter<double> measurement_timeout{
+        this,
+        "measurement_timeout",
+        std::numeric_limits<double>::infinity(),
+        rtcf::Min(0.0),
+        rtcf::Unit("s"),
+        rtcf::Doc("longest time without any new finite measured value; then out has no new value")};
 
     rtcf::Derived<Design> design_{this};
     rtcf::DesignPeriod design_period_{this};
@@ -212,7 +219,12 @@ class KalmanFilter final : public rtcf::Component {
             return;
         }
         age_ = present != 0 ? 0.0 : age_ + dt();
-        write(x, covariance, correction, usable);
+        if (age_ > measurement_timeout) {
+            reportFault("no measured value within measurement_timeout: out has no new value");
+            age.write(age_);
+        } else {
+            write(x, covariance, correction, usable);
+        }
         keep(u, x, covariance);
     }
 

@@ -4,6 +4,8 @@
 
 #include <rtcf/component.hpp>
 
+#include "measurement_watch.hpp"
+
 namespace rtcf_control {
 namespace {
 
@@ -88,7 +90,9 @@ class Pid final : public rtcf::Component {
         rtcf::Doc("in manual mode, set the followed setpoint to the measured value")};
     rtcf::Parameter<double> safe_effort{
         this, "safe_effort", 0.0,
-        rtcf::Doc("effort before the first cycle and in the last one, within the limits")};
+        rtcf::Doc("effort before the first cycle, in the last one, and while measured is lost; "
+                  "within the limits")};
+    MeasurementWatch<1> watch_{this, {"measured"}, "effort moves to safe_effort"};
 
     // Everything by which the terms of the present error are multiplied.
     struct Gains {
@@ -130,6 +134,8 @@ class Pid final : public rtcf::Component {
     rtcf::State<double> gap_{
         this, "gap", 0.0, rtcf::Unit("s"),
         rtcf::Doc("time without finite inputs, since the last cycle with them")};
+    rtcf::State<double> interval_{this, "interval", 0.0, rtcf::Unit("s"),
+                                  rtcf::Doc("time between the last two new measured values")};
     rtcf::State<bool> begun_{this, "begun", false, rtcf::Doc("the followed values are valid")};
     rtcf::State<bool> resume_{this, "resume", false,
                               rtcf::Doc("set the integral to continue from the last effort")};
@@ -153,6 +159,8 @@ class Pid final : public rtcf::Component {
         effort_ = std::clamp(safe_effort.value(), lower.value(), upper.value());
         begun_ = false;
         resume_ = false;
+        gap_ = 0.0;
+        watch_.begin();
         return true;
     }
 
@@ -172,7 +180,7 @@ class Pid final : public rtcf::Component {
 
     void update() override {
         const bool has_setpoint = setpoint.read() != rtcf::DataStatus::None;
-        const bool has_measured = measured.read() != rtcf::DataStatus::None;
+        const rtcf::DataStatus measurement = measured.read();
         const double forward = valueOr(feedforward, 0.0);
         const double schedule = valueOr(gain, 1.0);
         const bool by_hand = valueOr(manual, in_manual.value());
@@ -181,19 +189,26 @@ class Pid final : public rtcf::Component {
                                 std::isfinite(actual.value());
         const double r = setpoint.value();
         const double y = measured.value();
-        const bool complete = has_setpoint && has_measured;
-        if (!complete || !std::isfinite(r + y + forward + schedule)) {
+        const double silence = watch_.silence(0);
+        const bool is_new = measurement == rtcf::DataStatus::New && std::isfinite(y);
+        const char* fault = measurement != rtcf::DataStatus::None ? watch_.note(0, y, is_new, elapsed()) : nullptr;
+        if (fault == nullptr && !std::isfinite(r + y + forward + schedule))
+            fault = !std::isfinite(r)         ? "setpoint is not finite"
+                    : !std::isfinite(forward) ? "feedforward is not finite"
+                                              : "gain is not finite";
+        const bool complete = has_setpoint && watch_.valid(0);
+        if (!complete || fault != nullptr) {
+            if (fault != nullptr) reportFault(fault);
+            if (complete) gap_ += dt();
             if (by_hand) {
                 driveBlind(by_hand_effort);
-            } else if (complete) {
-                // Rejected as not finite: readers keep the last effort. The state stays as it is.
-                effort.write(std::numeric_limits<double>::quiet_NaN());
-                gap_ += dt();
-            }
+            } else if (complete && (watch_.lost(0) || gap_ > watch_.timeout())) {
+                driveBlind(safe_effort);
+            }  // else readers keep the last effort, and the state stays as it is
             return;
         }
         const double step = dt();
-        follow(r, y, by_hand && setpoint_tracking, step);
+        follow(r, y, is_new ? silence + step : 0.0, by_hand && setpoint_tracking, step);
         adoptGains(schedule);
         const double rest = terms(gains_) + forward;
         if (!std::isfinite(rest)) {
@@ -232,8 +247,8 @@ class Pid final : public rtcf::Component {
         return input.read() != rtcf::DataStatus::None ? input.value() : otherwise;
     }
 
-    // Manual mode without usable inputs, e.g. without a sensor. Automatic mode then resumes from
-    // this effort.
+    // An effort without usable inputs, e.g. without a sensor. Automatic mode then resumes from this
+    // effort.
     void driveBlind(double wanted) {
         begun_ = false;
         resume_ = true;
@@ -247,7 +262,8 @@ class Pid final : public rtcf::Component {
     }
 
     // Moves the followed setpoint and the filtered slopes by one cycle.
-    void follow(double r, double y, bool track, double elapsed) {
+    // since: time since the last new measured value, s; 0 = this one is not new
+    void follow(double r, double y, double since, bool track, double elapsed) {
         if (!begun_) {
             setpoint_ = track ? y : r;
             measured_ = y;
@@ -255,16 +271,24 @@ class Pid final : public rtcf::Component {
             measured_slope_ = 0.0;
             gains_ = Gains{};
             gap_ = 0.0;
+            interval_ = 0.0;
             return;
         }
         const double before = setpoint_;
         const double largest = setpoint_rate * elapsed;
         setpoint_ = track ? y : std::clamp(r, before - largest, before + largest);
-        const double inverse = 1.0 / (filter_time + gap_ + elapsed);
-        setpoint_slope_ = (filter_time * setpoint_slope_ + setpoint_ - before) * inverse;
-        measured_slope_ = (filter_time * measured_slope_ + y - measured_) * inverse;
-        measured_ = y;
+        setpoint_slope_ = (filter_time * setpoint_slope_ + setpoint_ - before) /
+                          (filter_time + gap_ + elapsed);
         gap_ = 0.0;
+        // The sensor may be slower than the loop: its slope holds until its next value is due.
+        if (since > 0.0) {
+            measured_slope_ =
+                (filter_time * measured_slope_ + y - measured_) / (filter_time + since);
+            measured_ = y;
+            interval_ = since;
+        } else if (watch_.silence(0) > 2.0 * interval_) {
+            measured_slope_ *= filter_time / (filter_time + elapsed);
+        }
     }
 
     // The integral absorbs the jump of the other terms after a change of gains, so that effort does

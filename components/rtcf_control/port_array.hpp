@@ -25,4 +25,12 @@ Ports<Port, Size> makePorts(rtcf::Component* owner, const std::string& name,
     return ports;
 }
 
+/// "NAME1" to "NAME<Size>".
+template <std::size_t Size>
+std::array<std::string, Size> numberedNames(const std::string& name) {
+    std::array<std::string, Size> names;
+    for (std::size_t i = 0; i < Size; ++i) names[i] = name + std::to_string(i + 1);
+    return names;
+}
+
 }  // namespace rtcf_control

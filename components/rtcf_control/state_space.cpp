@@ -24,6 +24,7 @@
 #include "linear/riccati.hpp"
 #include "linear/small_matrix.hpp"
 #include "linear/steady_filter.hpp"
+#include "measurement_watch.hpp"
 #include "port_array.hpp"
 
 namespace rtcf_control {
@@ -139,11 +140,13 @@ class StateSpace final : public rtcf::Component {
         rtcf::Doc("LQR: upper limit of out: one number for all, or one for each")};
     rtcf::Parameter<std::string> safe_value{
         this, "safe_value", "0",
-        rtcf::Doc("LQR: out in the last cycle, within the limits: one number for all, or one for "
-                  "each")};
+        rtcf::Doc("LQR: out in the last cycle, and while a measured value is lost, within the "
+                  "limits: one number for all, or one for each")};
     rtcf::Parameter<double> fade{
         this,           "fade",          0.1,
         rtcf::Min(0.0), rtcf::Unit("s"), rtcf::Doc("time of the transition to other matrices")};
+    MeasurementWatch<kPorts> watch_{this, numberedNames<kPorts>("measured"),
+                                    "out = safe_value, an observer writes nothing"};
 
     rtcf::Derived<Design> design_{this};
     rtcf::DesignPeriod design_period_{this};
@@ -159,6 +162,8 @@ class StateSpace final : public rtcf::Component {
                                  rtcf::Doc("differences that a transition adds to out")};
     rtcf::State<double> fading_{this, "fading", 0.0, rtcf::Unit("s"),
                                 rtcf::Doc("time left of the transition")};
+    rtcf::State<double> blind_{this, "blind", 0.0, rtcf::Unit("s"),
+                               rtcf::Doc("time since all inputs were finite")};
     rtcf::State<std::int64_t> period_{this, "predicted_period", 0, rtcf::Unit("ns"),
                                       rtcf::Doc("time by which the states are predicted")};
     rtcf::State<std::uint64_t> identity_{this, "design_identity", 0,
@@ -439,18 +444,29 @@ class StateSpace final : public rtcf::Component {
 
     bool start() override {
         begun_ = false;
+        blind_ = 0.0;
+        watch_.begin();
         return true;
     }
 
     void update() override {
         const Design& design = *design_;
         const SmallVector in = read(in_, design.inputs);
-        const SmallVector measured = read(measured_, design.measured);
-        if (!begun_ && !complete(measured_, design.measured)) return;
-        if (!in.allFinite() || !measured.allFinite()) {
-            reject();
-            if (begun_ && design.role != Role::System && design.role != Role::Regulator)
-                coast(design, in);
+        bool lost = false;
+        const SmallVector measured = readMeasured(design.measured, lost);
+        if (!begun_ && !complete(design.measured)) return;
+        const bool finite = in.allFinite() && measured.allFinite();
+        blind_ = finite ? 0.0 : blind_ + dt();
+        if (!finite || lost) {
+            const bool regulates = design.role == Role::Regulator || design.role == Role::Lqg;
+            const bool stops = regulates && (lost || blind_ > watch_.timeout());
+            if (stops) {
+                writeSafe(design);
+            } else if (!finite) {
+                reject();
+            }
+            if (begun_ && (design.role == Role::Observer || design.role == Role::Lqg))
+                coast(design, in, stops);
             return;
         }
         if (!begun_) begin(design);
@@ -502,6 +518,10 @@ class StateSpace final : public rtcf::Component {
             update();
             return;
         }
+        writeSafe(design);
+    }
+
+    void writeSafe(const Design& design) noexcept {
         for (int i = 0; i < design.outputs; ++i)
             out_[static_cast<std::size_t>(i)]->write(design.safe[i]);
     }
@@ -517,8 +537,24 @@ class StateSpace final : public rtcf::Component {
         return values;
     }
 
-    static bool complete(const Ports<rtcf::Input<double>, kPorts>& ports, int count) {
-        return std::all_of(ports.begin(), ports.begin() + count,
+    SmallVector readMeasured(int count, bool& lost) {
+        SmallVector values(count);
+        for (int i = 0; i < count; ++i) {
+            const auto at = static_cast<std::size_t>(i);
+            rtcf::Input<double>& port = *measured_[at];
+            const rtcf::DataStatus status = port.read();
+            values[i] = port.value();
+            if (status == rtcf::DataStatus::None) continue;
+            const char* const fault =
+                watch_.note(at, port.value(), status == rtcf::DataStatus::New, elapsed());
+            if (fault != nullptr) reportFault(fault);
+            lost = lost || watch_.lost(at);
+        }
+        return values;
+    }
+
+    bool complete(int count) const {
+        return std::all_of(measured_.begin(), measured_.begin() + count,
                            [](const auto& port) { return port->hasValue(); });
     }
 
@@ -588,9 +624,10 @@ class StateSpace final : public rtcf::Component {
     }
 
     // A cycle without usable measurements: the states move on with the last input.
-    void coast(const Design& design, const SmallVector& in) {
+    void coast(const Design& design, const SmallVector& in, bool stops) {
         SmallVector u = input_->head(design.b.cols());
         if (design.role == Role::Observer && in.allFinite()) u = in;
+        if (stops) u = design.safe;
         const SmallVector x = moved(design, u);
         keep(design, x, u);
     }

@@ -53,6 +53,18 @@ class FrictionCompensation(Component):
         unit="s",
         doc="time of the transition after a change of parameters; 0 = at once",
     )
+    measurement_timeout: Parameter[float] = Parameter(
+        0.2,
+        min=0.0,
+        unit="s",
+        doc="longest time without a new finite measured value, then: effort = 0",
+    )
+    frozen_timeout: Parameter[float] = Parameter(
+        math.inf, min=0.0, unit="s", doc="the same for a measured value that does not change"
+    )
+    silence: State[int] = State(0, unit="ns", doc="time since the last new finite velocity")
+    unchanged: State[int] = State(0, unit="ns", doc="time since the last change of the velocity")
+    last_finite: State[float] = State(math.nan, doc="last finite velocity; NaN = none")
     law: State[np.float64, 7] = State(doc="parameters of the last cycle")
     offset: State[float] = State(
         0.0, unit="N m", doc="difference to the law before the last change"
@@ -66,14 +78,33 @@ class FrictionCompensation(Component):
 
     def start(self):
         self.begun = False
+        self.silence = 0
+        self.unchanged = 0
+        self.last_finite = math.nan
+
+    def lost(self):
+        """Return whether the velocity is too old, or frozen. Once per cycle."""
+        v = self.velocity.value
+        arrived = self.velocity.new and math.isfinite(v)
+        step = round(1e9 * self.dt)
+        self.silence = 0 if arrived else self.silence + step
+        self.unchanged = 0 if arrived and v != self.last_finite else self.unchanged + step
+        if arrived or (math.isfinite(v) and math.isnan(self.last_finite)):
+            self.last_finite = v  # also an old value, if it is the first one
+        return (
+            self.silence > 1e9 * self.measurement_timeout
+            or self.unchanged > 1e9 * self.frozen_timeout
+        )
 
     def update(self):
         if not self.velocity.valid:
             return
+        if self.lost():
+            self.effort.write(0.0)
+            return
         v = self.velocity.value
         if not math.isfinite(v):
-            self.effort.write(v)  # rejected as not finite: readers keep the last output
-            return
+            return  # readers keep the last effort
         if self.begun and self.rest > 0.0:
             self.rest = max(0.0, self.rest - self.dt / self.fade) if self.fade > 0.0 else 0.0
         law = np.array(

@@ -158,7 +158,8 @@ class JointLimiter(Component):
         math.inf,
         min=1e-9,
         unit="rad/s^2",
-        doc="deceleration for the braking distance before lower and upper",
+        doc="largest acceleration of a position or velocity command, either way, and that of the "
+        "braking distance before lower and upper",
     )
     max_effort: Parameter[float] = Parameter(
         math.inf, min=0.0, unit="N m", doc="largest effort, either way"
@@ -170,22 +171,57 @@ class JointLimiter(Component):
         0.0,
         min=0.0,
         unit="N m s/rad",
-        doc="effort by excess velocity; 0 = no effort towards excess velocity",
+        doc="effort by excess velocity; needed for limits of position or velocity",
+    )
+    measurement_timeout: Parameter[float] = Parameter(
+        0.2,
+        min=0.0,
+        unit="s",
+        doc="longest time without a new finite measured value, then: a velocity slows down to 0, "
+        "an effort is 0",
+    )
+    frozen_timeout: Parameter[float] = Parameter(
+        math.inf, min=0.0, unit="s", doc="the same for a measured value that does not change"
     )
     last: State[float | None] = State(doc="the last output")
+    pace: State[float] = State(
+        0.0, unit="rad/s", doc="velocity of the last position or velocity command"
+    )
+    last_wanted: State[float] = State(0.0, doc="last wanted position")
+    silence: State[np.int64, 2] = State(
+        unit="ns", doc="time since the last new finite value of each measured input"
+    )
+    unchanged: State[np.int64, 2] = State(
+        unit="ns", doc="time since the last change of each measured input"
+    )
+    last_finite: State[np.float64, 2] = State(
+        doc="last finite value of each measured input; NaN = none"
+    )
 
     def prepare(self):
         if self.lower > self.upper:
             raise ValueError("lower is above upper")
         if self.soft_lower > self.soft_upper:
             raise ValueError("soft_lower is above soft_upper")
-        if self.k_position == 0.0 and (
-            math.isfinite(self.soft_lower) or math.isfinite(self.soft_upper)
-        ):
+        soft = math.isfinite(self.soft_lower) or math.isfinite(self.soft_upper)
+        if soft and self.k_position == 0.0:
             raise ValueError("soft limits need a k_position above 0")
+        if self.command is not Command.effort:
+            return
+        hard = math.isfinite(self.lower) or math.isfinite(self.upper)
+        if hard and math.isinf(self.deceleration):
+            raise ValueError("command = effort with limits of the position needs a deceleration")
+        if (hard or soft or math.isfinite(self.max_velocity)) and self.k_velocity == 0.0:
+            raise ValueError(
+                "command = effort with limits of position or velocity needs a k_velocity above 0"
+            )
 
     def start(self):
         self.last = None
+        self.pace = 0.0
+        self.silence[:] = 0
+        self.unchanged[:] = 0
+        self.last_finite[:] = math.nan
 
     @property
     def needs_position(self):
@@ -197,86 +233,177 @@ class JointLimiter(Component):
             or math.isfinite(self.soft_upper)
         )
 
-    def softened(self, limit, x, down, up, factor):
-        """Return the velocity towards a soft limit, within those of braking and the largest."""
-        wanted = limit if math.isinf(limit) else factor * (limit - x)
-        return np.clip(np.clip(wanted, -down, up), -self.max_velocity, self.max_velocity)
+    @property
+    def needs_velocity(self):
+        """Return whether a limit of the effort depends on the velocity."""
+        return self.needs_position or math.isfinite(self.max_velocity)
 
-    def velocities(self, x):
-        """Return the range of the velocity at a position. Braking comes before soft limits, where
-        both disagree.
+    @property
+    def longest_period(self):
+        """Return the period in s, or the time of a longer cycle."""
+        return max(1e-9 * self.period, self.dt)
+
+    def note(self, i, value, is_new):
+        """Note a measured value that is needed."""
+        step = round(1e9 * self.dt)
+        self.silence[i] += step
+        self.unchanged[i] += step
+        if not math.isfinite(value):
+            return
+        if is_new:
+            self.silence[i] = 0
+            if value != self.last_finite[i]:
+                self.unchanged[i] = 0
+        # Also an old value, if it is the first one.
+        if is_new or math.isnan(self.last_finite[i]):
+            self.last_finite[i] = value
+
+    def lost(self, i):
+        """Return whether a measured input is too old, or frozen."""
+        return (
+            self.silence[i] > 1e9 * self.measurement_timeout
+            or self.unchanged[i] > 1e9 * self.frozen_timeout
+        )
+
+    def softened(self, limit, x):
+        """Return the velocity towards a soft limit, within the largest. It slows down by at most
+        deceleration: proportional near the limit, before it along the braking parabola that
+        continues this line.
         """
-        period = max(1e-9 * self.period, self.dt)
-        up = braking_velocity(max(self.upper - x, 0.0), self.deceleration, period)
-        down = braking_velocity(max(x - self.lower, 0.0), self.deceleration, period)
         # A larger factor would cross the soft limit in one period.
-        factor = min(self.k_position, 1.0 / period)
-        low = self.softened(self.soft_lower, x, down, up, factor)
-        return low, self.softened(self.soft_upper, x, down, up, factor)
+        factor = min(self.k_position, 1.0 / self.longest_period)
+        distance = limit - x
+        if math.isinf(limit):
+            return np.clip(limit, -self.max_velocity, self.max_velocity)
+        line = self.deceleration / (factor * factor)
+        size = abs(distance)
+        if size <= line:
+            speed = factor * size
+        else:
+            speed = math.sqrt(self.deceleration * (2.0 * size - line))
+        return np.clip(np.copysign(speed, distance), -self.max_velocity, self.max_velocity)
+
+    def towards(self, distance, pace):
+        """Return the largest velocity towards a limit, after a velocity towards it."""
+        h = self.longest_period
+        allowed = braking_velocity(max(distance, 0.0), self.deceleration, h)
+        slower = pace - self.deceleration * h
+        if slower <= allowed:
+            return allowed
+        # Too fast, e.g. after a change of the limit. Beyond it, brakes by deceleration, before it
+        # by as much as is needed.
+        if distance <= 0.0:
+            return slower
+        return max(allowed, pace - 0.5 * pace * pace * h / distance)
+
+    def limited_velocity(self, speed, x):
+        """Return a velocity within the limits at a position. Where they disagree, braking before
+        lower and upper comes first, then the acceleration, then soft limits and max_velocity.
+        """
+        step = self.deceleration * self.dt
+        slowest = self.pace - step
+        fastest = self.pace + step
+        low = np.clip(self.softened(self.soft_lower, x), slowest, fastest)
+        high = np.clip(self.softened(self.soft_upper, x), slowest, fastest)
+        down = -self.towards(x - self.lower, -self.pace)
+        up = self.towards(self.upper - x, self.pace)
+        return np.clip(speed, np.clip(low, down, up), np.clip(high, down, up))
 
     def efforts(self, x, v):
         """Return the range of the effort: it drives the velocity back into its range."""
-        low, high = self.velocities(x)
         most = self.max_effort
         if self.k_velocity == 0.0:
-            return 0.0 if v <= low else -most, 0.0 if v >= high else most
+            return -most, most
+        h = self.longest_period
+        down = -braking_velocity(max(x - self.lower, 0.0), self.deceleration, h)
+        up = braking_velocity(max(self.upper - x, 0.0), self.deceleration, h)
+        low = np.clip(self.softened(self.soft_lower, x), down, up)
+        high = np.clip(self.softened(self.soft_upper, x), down, up)
         return (
             np.clip(-self.k_velocity * (v - low), -most, most),
             np.clip(-self.k_velocity * (v - high), -most, most),
         )
 
     def followed(self, wanted, start):
-        """Return the position of this cycle on the way from another one."""
-        low, high = self.velocities(start)
+        """Return the position of this cycle on the way from another one. `wanted` may move itself:
+        the way slows down before it relative to its velocity.
+        """
+        h = self.dt
         target = np.clip(wanted, self.lower, self.upper)
-        step = np.clip(target - start, low * self.dt, high * self.dt)
+        drift = (target - self.last_wanted) / h
+        distance = self.last_wanted - start
+        self.last_wanted = target
+        speed = (target - start) / h
+        if math.isfinite(self.deceleration):
+            approach = braking_velocity(abs(distance), self.deceleration, self.longest_period)
+            speed = drift + np.copysign(approach, distance)
+        v = self.limited_velocity(speed, start)
         # Exactly there if only rounding is left.
-        rest = abs(target - start - step)
-        following = target if rest <= 1e-12 * abs(target - start) else start + step
+        rest = abs(target - start - v * h)
+        following = target if rest <= 1e-12 * abs(target - start) else start + v * h
         # Rounding must not cross a limit that has not been crossed before.
-        return np.clip(following, min(self.lower, start), max(self.upper, start))
+        reached = np.clip(
+            following,
+            -math.inf if start < self.lower else self.lower,
+            math.inf if start > self.upper else self.upper,
+        )
+        self.pace = (reached - start) / h
+        return reached
+
+    def slower(self):
+        """Return a velocity on the way to 0."""
+        step = self.deceleration * self.dt
+        return np.clip(
+            self.pace, -max(0.0, -self.pace - step), max(0.0, self.pace - step)
+        )
 
     def send(self, wanted, value):
         """Write the limited value of a command."""
-        if not math.isfinite(wanted):
-            self.y.write(wanted)  # rejected as not finite: readers keep the last output
-            return
         self.y.write(value)
         self.limited.write(value != wanted)
         self.last = value
 
     def update(self):
+        x = self.position.value
+        v = self.velocity.value
+        if self.command is not Command.position and self.needs_position and self.position.valid:
+            self.note(0, x, self.position.new)
+        if self.command is Command.effort and self.needs_velocity and self.velocity.valid:
+            self.note(1, v, self.velocity.new)
         if not self.u.valid:
             return
         wanted = self.u.value
-        x = self.position.value
-        v = self.velocity.value
+        if not math.isfinite(wanted):
+            self.y.write(wanted)  # rejected as not finite: readers keep the last output
+            return
         if self.command is Command.position:
-            if self.last is not None:
-                self.send(wanted, self.followed(wanted, self.last))
-            elif not self.position.valid:
-                self.send(wanted, self.followed(wanted, np.clip(wanted, self.lower, self.upper)))
-            elif math.isfinite(x):
+            start = self.last
+            if start is None:
                 # Begins at the measured position, so that the joint does not jump.
-                self.send(wanted, self.followed(wanted, x))
-            else:
-                self.y.write(x)  # rejected, as above
+                start = np.clip(wanted, self.lower, self.upper)
+                self.last_wanted = start
+                if self.position.valid:
+                    if not math.isfinite(x):
+                        return
+                    start = x
+            self.send(wanted, self.followed(wanted, start))
             return
-        if not math.isfinite(x):
-            self.y.write(x)  # rejected, as above
+        if self.needs_position and not math.isfinite(self.last_finite[0]):
             return
-        if self.needs_position and not self.position.valid:
-            return
+        position_lost = self.needs_position and self.lost(0)
         if self.command is Command.velocity:
-            low, high = self.velocities(x)
-            self.send(wanted, np.clip(wanted, low, high))
+            if position_lost:
+                self.send(wanted, self.slower())
+            else:
+                self.send(wanted, self.limited_velocity(wanted, self.last_finite[0]))
+            self.pace = self.last if self.last is not None else 0.0
             return
-        if not math.isfinite(v):
-            self.y.write(v)  # rejected, as above
+        if self.needs_velocity and not math.isfinite(self.last_finite[1]):
             return
-        if (self.needs_position or math.isfinite(self.max_velocity)) and not self.velocity.valid:
+        if position_lost or (self.needs_velocity and self.lost(1)):
+            self.send(wanted, 0.0)
             return
-        low, high = self.efforts(x, v)
+        low, high = self.efforts(self.last_finite[0], self.last_finite[1])
         self.send(wanted, np.clip(wanted, low, high))
 
     def safe(self):

@@ -90,6 +90,7 @@ Instance::Instance(ComponentDefinition definition, std::shared_ptr<const Library
     context_.period_ns = clock.period_ns * definition_->every;
     context_.recorder_slot = slot();
     context_.device = &statistics_->device;
+    context_.faults = &statistics_->faults;
     context_.log = &log;
     context_.memory = ComponentArena::ofProcess();
     level_.emplace(log.levels(), context_);

@@ -291,7 +291,6 @@ void Cycle::commit(Component& component, ComponentStatistics& statistics, OnBadO
         }
         statistics.faults.not_finite.note(clock_.iteration, output->name().c_str());
         statistics.faults.count.add(1);
-        statistics_.faults.add(1);
     }
 }
 
@@ -306,7 +305,6 @@ bool Cycle::threw(const Step& step, const char* text) noexcept {
     }
     turn.statistics->faults.taken_out.noteCopy(clock_.iteration, text);
     turn.statistics->faults.count.add(1);
-    statistics_.faults.add(1);
     // If a commit threw, outputs committed before it already have the stamp of this cycle.
     accessTo(*step.component).setTime(clock_.time_ns + 1);
     makeSafe(*step.component, *turn.statistics, OnBadOutput::End);
@@ -334,7 +332,6 @@ void Cycle::makeSafe(Component& component, ComponentStatistics& statistics,
     const auto keepBefore = [&](const char* text) {
         statistics.faults.unsafe.noteCopy(clock_.iteration, text);
         statistics.faults.count.add(1);
-        statistics_.faults.add(1);
     };
     try {
         commit(component, statistics, may);

@@ -28,7 +28,6 @@ struct LoopStatistics {
     /// Ns from the requested end of the sleep (`spin` before the deadline) to the wake-up.
     Histogram wake_up;
     std::atomic<std::uint64_t> iteration{0};  ///< cycles completed since the loop started
-    Counter faults;                           ///< component faults that did not end the loop
     // These change between the end of a cycle and Cycle::settle().
     EventCounter overruns;
     EventCounter missed;

@@ -12,12 +12,9 @@
 #include <cstring>
 #include <memory>
 
+#include "rtcf/component.hpp"
 #include "rtcf/realtime.hpp"
 #include "statistics/counter.hpp"
-
-namespace rtcf {
-class Component;
-}
 
 namespace rtcf::executor {
 
@@ -84,14 +81,26 @@ class FirstFault {
 };
 
 /// Faults of one component since the loop began.
-struct ComponentFaults {
+struct ComponentFaults final : FaultSink {
+    FirstFault reported;    ///< a fault that the component has reported; its text
     FirstFault not_finite;  ///< an output kept its last finite value; the text is the output's name
     FirstFault taken_out;   ///< an optional component that threw; a copied text
     FirstFault unsafe;      ///< an output of safe() could not be copied for its readers; likewise
     Counter count;          ///< number of all faults, also those not recorded
 
+    void report(std::uint64_t iteration, const char* text) noexcept RTCF_NONBLOCKING override {
+        reported.note(iteration, text);
+        count.add(1);
+    }
+    /// Records the next fault of the kinds that recur, if the last one was taken. Graph thread.
+    void rearm() noexcept {
+        reported.rearm();
+        not_finite.rearm();
+    }
+
     /// While no cycle runs.
     void clear() noexcept {
+        reported.clear();
         not_finite.clear();
         taken_out.clear();
         unsafe.clear();

@@ -34,7 +34,7 @@ void FaultReportLimit::rearm(std::int64_t now_ns) {
     for (auto it = silences_.begin(); it != silences_.end();) {
         Silence& silence = it->second;
         if (!silence.over && now_ns >= silence.until_ns) {
-            it->first->faults.not_finite.rearm();
+            it->first->faults.rearm();
             silence.over = true;
         }
         const bool forgotten = silence.over && now_ns - silence.until_ns > kLongest;

@@ -1,7 +1,7 @@
 /// @file
-/// Rate limit of reports on non-finite values: the first fault of a component is reported at once,
-/// later ones after a silence, which doubles while the faults continue. Owned by FaultReports;
-/// graph thread.
+/// Rate limit of reports on values that are not finite, and of faults that components report: the
+/// first fault of a component is reported at once, later ones after a silence, which doubles while
+/// the faults continue. Owned by FaultReports; graph thread.
 #pragma once
 
 #include <cstdint>

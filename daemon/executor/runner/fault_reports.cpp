@@ -65,9 +65,7 @@ RunnerEvent FaultReports::endOfLoop(const Graph& graph, std::uint32_t max_overru
 }
 
 void FaultReports::reportComponents(const Graph& graph) {
-    not_finite_.rearm(monotonicNow());
-    const std::uint64_t count = loop_.statistics().faults.value();
-    if (std::exchange(reported_faults_, count) == count) return;
+    recurring_.rearm(monotonicNow());
     for (const GraphNode& node : graph.nodes()) report(*node.instance);
 }
 
@@ -85,9 +83,12 @@ void FaultReports::report(Instance& instance) {
              instance.fullName(), fault->iteration});
         publish_(instance.fullName());
     };
-    if (const ComponentFault* fault = faults.not_finite.take(); fault != nullptr) {
-        const std::uint64_t more = not_finite_.noteReport(instance.statistics(), monotonicNow());
-        say(fault, "output {} is not finite: readers keep its last value", more);
+    const ComponentFault* const reported = faults.reported.take();
+    const ComponentFault* const not_finite = faults.not_finite.take();
+    if (reported != nullptr || not_finite != nullptr) {
+        const std::uint64_t more = recurring_.noteReport(instance.statistics(), monotonicNow());
+        say(not_finite, "output {} is not finite: readers keep its last value", more);
+        say(reported, "{}", more);
     }
     say(faults.taken_out.take(), "update() threw: {}; taken out, the loop goes on", 0);
     say(faults.unsafe.take(), "cannot copy a value of safe(): {}; readers keep the value before",

@@ -27,13 +27,13 @@ class FaultReports {
                  PublishFault publish);
 
     /// Forgets which faults were reported, before components start again.
-    void restart() { not_finite_ = {}; }
+    void restart() { recurring_ = {}; }
 
     /// The event for the fault that has ended the loop. Sets the fault text of its component.
     /// @param max_overruns the limit of the settings
     RunnerEvent endOfLoop(const Graph& graph, std::uint32_t max_overruns) const;
-    /// Reports component faults that did not end the loop. A component is taken out once; values
-    /// that are not finite are reported again after a while.
+    /// Reports component faults that did not end the loop. A component is taken out once; the
+    /// faults that it reports and values that are not finite are reported again after a while.
     void reportComponents(const Graph& graph);
     /// The same for one component.
     void report(Instance& instance);
@@ -51,8 +51,7 @@ class FaultReports {
     const Loop& loop_;
     ReportEvent report_event_;
     PublishFault publish_;
-    std::uint64_t reported_faults_ = 0;  // LoopStatistics::faults at the last report
-    FaultReportLimit not_finite_;
+    FaultReportLimit recurring_;
     OverrunReport overruns_;
     SizeWatch sizes_;
     std::int64_t sizes_due_ns_ = 0;

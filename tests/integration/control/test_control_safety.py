@@ -292,6 +292,14 @@ def test_a_counter_that_begins_again_is_a_beat(blocks: Blocks) -> None:
          "soft limits need a k_position above 0"),
         ("JointLimiter", {"max_velocity": -1.0}, "max_velocity"),
         ("JointLimiter", {"deceleration": 0.0}, "deceleration"),
+        ("JointLimiter", {"command": "effort", "upper": 1.0, "k_velocity": 9.0},
+         "needs a deceleration (rad/s^2)"),
+        ("JointLimiter", {"command": "effort", "upper": 1.0, "deceleration": 9.0},
+         "needs a k_velocity (N m s/rad) above 0"),
+        ("JointLimiter", {"command": "effort", "soft_lower": 1.0},
+         "needs a k_velocity (N m s/rad) above 0"),
+        ("JointLimiter", {"command": "effort", "max_velocity": 1.0},
+         "needs a k_velocity (N m s/rad) above 0"),
         ("EStop", {"stop_rate": 0.0}, "stop_rate"),
         ("CommandTimeout", {"stop_rate": 0.0}, "stop_rate"),
     ],
@@ -342,39 +350,105 @@ def test_a_position_brakes_before_its_limits(
     assert (np.abs(out) <= 1.0).all()
     speed = np.diff(np.concatenate([[0.0], out])) / DT
     assert np.abs(speed).max() <= velocity + ROUNDING
-    # While it moves to a target beyond a limit, it never slows down faster.
-    beyond = np.abs(wanted[1:]) > 1.0
-    same = np.diff(wanted) == 0.0
-    slower = np.abs(speed[:-1]) - np.abs(speed[1:])
-    assert slower[beyond & same].max(initial=0.0) <= deceleration * DT + 1e-8
+    assert np.abs(np.diff(speed, prepend=0.0)).max() <= deceleration * DT + 1e-8
+
+
+def test_a_position_slows_down_before_its_target(blocks: Blocks) -> None:
+    out = blocks.out("JointLimiter", {"in": np.full(2000, 1.0), "position": 0.0},
+                     deceleration=4.0, max_velocity=10.0)  # fmt: skip
+    # Half of the way faster, half of it slower: 2 sqrt(1 / 4) s, up to one cycle on either side.
+    arrived = np.flatnonzero(out == 1.0)[0]
+    assert 999 <= arrived <= 1001
+    assert (np.diff(out) >= -1e-15).all()
+    assert (out[arrived:] == 1.0).all()
+
+
+@seed(31)
+@settings(max_examples=20, deadline=None)
+@given(st.floats(0.2, 1.5), st.floats(1.0, 8.0))
+def test_a_command_within_the_limits_passes_unchanged(
+    blocks: Blocks, size: float, rate: float
+) -> None:
+    time = DT * np.arange(1500)
+    wanted = size * (1.0 - np.cos(rate * time))
+    out = blocks.out("JointLimiter", {"in": wanted, "position": 0.0}, lower=-0.1, upper=3.5,
+                     max_velocity=1.01 * size * rate,
+                     deceleration=1.01 * size * rate**2)  # fmt: skip
+    # A limit of the velocity or position that is close may only brake a little earlier.
+    assert np.abs(out - wanted).max() <= 1e-9
+
+
+def test_velocities_have_a_limited_acceleration(blocks: Blocks) -> None:
+    wanted = np.repeat([2.0, -2.0, 0.5], 600)
+    out = blocks.out("JointLimiter", {"in": wanted}, command="velocity",
+                     deceleration=8.0)  # fmt: skip
+    steps = np.diff(out, prepend=0.0)
+    assert np.abs(steps).max() <= 0.008 + ROUNDING
+    for end in (599, 1199, 1799):
+        assert out[end] == wanted[end]
 
 
 def test_a_joint_that_follows_its_velocity_stops_at_the_limit(stepped: Bench) -> None:
     block = Stepped(stepped, "JointLimiter", command="velocity", upper=1.0, deceleration=5.0)
     position, speeds = 0.0, []
     try:
-        for _ in range(800):
+        for _ in range(1200):
             speeds.append(block.step(**{"in": 2.0, "position": position})["last"])
             position += speeds[-1] * DT
     finally:
         block.unload()
     assert position == pytest.approx(1.0, abs=ROUNDING)
-    assert speeds[:100] == [2.0] * 100
+    assert speeds[400:500] == [2.0] * 100
     # It slows down by 5 * 1 ms in each cycle, from 2.0 to 0: 400 cycles.
     slower = -np.diff(speeds)
-    assert slower.max() <= 0.005 + ROUNDING
+    assert np.abs(slower).max() <= 0.005 + ROUNDING
     assert np.count_nonzero(slower > 0.005 - ROUNDING) >= 398
 
 
 def test_a_velocity_follows_the_braking_distance(blocks: Blocks) -> None:
-    # Against the continuous law v^2 = 2 a d, from which discrete steps differ by at most a h.
-    position = np.linspace(-0.5, 1.5, 1000)
+    # Against the continuous law v^2 = 2 a d, from which discrete steps differ by at most a h. The
+    # joint moves more slowly than commanded, so the limit of the acceleration does not matter.
+    position = np.linspace(-0.5, 1.5, 4000)
     out = blocks.out("JointLimiter", {"in": 9.0, "position": position}, command="velocity",
                      upper=1.0, deceleration=5.0, max_velocity=3.0)  # fmt: skip
     law = np.minimum(3.0, np.sqrt(10.0 * np.maximum(1.0 - position, 0.0)))
-    assert np.allclose(out, law, rtol=0, atol=5.0 * DT)
-    assert (out <= law).all()
-    assert (out[position >= 1.0] == 0.0).all()
+    begun = 5.0 * DT * np.arange(1, 4001) >= law
+    begun &= position < 0.97  # then the joint moves faster than commanded
+    assert np.allclose(out[begun], law[begun], rtol=0, atol=5.0 * DT)
+    assert (out[begun] <= law[begun]).all()
+    assert (np.diff(out[position >= 1.0]) <= 0.0).all()
+    assert (out[position >= 1.05] == 0.0).all()
+
+
+def test_a_limit_that_comes_too_late_is_kept_by_harder_braking(stepped: Bench) -> None:
+    block = Stepped(stepped, "JointLimiter", command="velocity", upper=9.0, deceleration=5.0)
+    position, speeds = 0.0, []
+    try:
+        for cycle in range(900):
+            if cycle == 400:
+                block.set(command="velocity", upper=position + 0.2, deceleration=5.0)
+                upper = position + 0.2
+            speeds.append(block.step(**{"in": 2.0, "position": position})["last"])
+            position += speeds[-1] * DT
+            assert cycle < 400 or position <= upper + ROUNDING
+    finally:
+        block.unload()
+    # 2 rad/s within 0.2 rad: 10 rad/s^2.
+    assert np.diff(speeds[400:]).min() == pytest.approx(-0.01, rel=0.02)
+    assert position == pytest.approx(upper, abs=1e-3)
+
+
+def test_beyond_a_limit_it_brakes_by_the_deceleration(stepped: Bench) -> None:
+    block = Stepped(stepped, "JointLimiter", upper=9.0, deceleration=5.0)
+    try:
+        before = block.step(400, **{"in": 9.0, "position": 0.0})["last"]
+        block.set(upper=before - 0.1, deceleration=5.0)
+        positions = [block.step()["last"] for _ in range(1500)]
+    finally:
+        block.unload()
+    assert np.abs(np.diff(positions, 2)).max() <= 5.0 * DT**2 + ROUNDING
+    assert max(positions) == pytest.approx(before + 0.4, abs=3e-3)  # v^2 / (2 a)
+    assert positions[-1] == pytest.approx(before - 0.1, abs=ROUNDING)
 
 
 def test_soft_limits_bound_the_velocity_by_the_distance(blocks: Blocks) -> None:
@@ -395,8 +469,14 @@ def test_efforts_drive_an_excess_velocity_back(blocks: Blocks) -> None:
     assert np.allclose(out, np.clip(5.0 * (3.0 - velocity), -8.0, 8.0), rtol=0, atol=ROUNDING)
     out = blocks.out("JointLimiter", {"in": -9.0, **inputs}, k_velocity=5.0, **parameters)
     assert np.allclose(out, np.clip(5.0 * (-3.0 - velocity), -8.0, 8.0), rtol=0, atol=ROUNDING)
-    out = blocks.out("JointLimiter", {"in": 9.0, **inputs}, **parameters)
-    assert out.tolist() == np.where(velocity >= 3.0, 0.0, 8.0).tolist()
+    # Near a limit of the position, the braking velocity takes the place of max_velocity.
+    position = np.linspace(0.0, 1.2, 601)
+    inputs = {"position": position, "velocity": 1.0}
+    out = blocks.out("JointLimiter", {"in": 9.0, **inputs}, k_velocity=5.0, upper=1.0,
+                     deceleration=2.0, **parameters)  # fmt: skip
+    law = np.minimum(3.0, np.sqrt(4.0 * np.maximum(1.0 - position, 0.0)))
+    expected = np.clip(5.0 * (law - 1.0), -8.0, 8.0)
+    assert np.allclose(out, expected, rtol=0, atol=5.0 * 2.0 * DT)
 
 
 @pytest.mark.parametrize("command", ["position", "velocity", "effort"])
@@ -406,7 +486,8 @@ def test_values_that_are_not_finite_leave_the_limited_output_as_it_is(
 ) -> None:
     inputs: dict[str, Any] = {"in": 0.5, "position": 0.25, "velocity": 0.1}
     inputs[broken] = np.array([inputs[broken]] * 5 + [np.nan, np.inf] + [inputs[broken]] * 3)
-    values = blocks.run("JointLimiter", inputs, command=command, lower=-1.0, upper=1.0)
+    values = blocks.run("JointLimiter", inputs, command=command, lower=-1.0, upper=1.0,
+                        deceleration=1e6, k_velocity=1e6)  # fmt: skip
     assert np.isfinite(values["out"]).all()
     assert (values["out"] == 0.5).all()
 
@@ -417,7 +498,8 @@ def test_nothing_is_written_before_a_measurement_that_a_limit_needs(
 ) -> None:
     position = MASKED.array(np.zeros(10), mask=np.arange(10) < 5)
     values = blocks.run("JointLimiter", {"in": 0.5, "position": position, "velocity": 0.0},
-                        command=command, upper=1.0)  # fmt: skip
+                        command=command, upper=1.0, deceleration=1e6,
+                        k_velocity=1e6)  # fmt: skip
     assert np.isnan(values["out"][:5]).all()
     assert (values["out"][5:] == 0.5).all()
 

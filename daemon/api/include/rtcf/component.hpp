@@ -45,6 +45,17 @@ struct DeviceStatistics {
     std::atomic<std::int64_t> time_ns{0};  ///< total time spent in these scopes, ns
 };
 
+/// Receives the faults that a component reports.
+class FaultSink {
+   public:
+    /// Real-time safe.
+    /// @param text must live as long as the component
+    virtual void report(std::uint64_t iteration, const char* text) noexcept RTCF_NONBLOCKING = 0;
+
+   protected:
+    ~FaultSink() = default;
+};
+
 /// A component's name, clock and links to the executor. Owned by the executor; outlives the
 /// component.
 struct ComponentContext {
@@ -61,6 +72,7 @@ struct ComponentContext {
     bool disabled = false;               ///< taken out after a fault; written by the cycle thread
     std::uint32_t recorder_slot = 0;     ///< slot number in the flight recorder
     DeviceStatistics* device = nullptr;  ///< null outside an executor
+    FaultSink* faults = nullptr;         ///< null outside an executor
     LogSink* log = nullptr;              ///< null = no log
     NodeGate* gate = nullptr;            ///< access to the ROS node; null without one
     std::vector<std::pair<std::string, std::string>> remaps;  ///< resolved names (from, to)
@@ -204,6 +216,14 @@ class Component {
     /// @}
 
    protected:
+    /// Reports a fault that does not end the loop, such as a lost sensor. `rtcfctl list` then shows
+    /// the component as faulted, with the text, an event tells it, and `rtcfctl stats` counts each
+    /// call. Call it in each cycle of the fault: the log repeats it only after a while. Real-time
+    /// safe.
+    /// @param text must live as long as the component, e.g. "measured is not finite"
+    void reportFault(const char* text) const noexcept RTCF_NONBLOCKING {
+        if (context_->faults != nullptr) context_->faults->report(iteration(), text);
+    }
     /// Sets the error text of a hook: `return fail("no reply from {}", device);`. Without
     /// arguments, the text is used verbatim. RTCF_FAIL(this, …) checks the format at compile time.
     /// Not real-time.

@@ -48,6 +48,7 @@ class Bench {
         context_.clock = &clock_;
         context_.period_ns = period_ns;
         context_.device = &device_;
+        context_.faults = &faults_;
         context_.log = &log_;
         context_.log_level = LogLevel::Debug;
         component_.reset(find(type).create(type.c_str(), &context_));
@@ -141,6 +142,9 @@ class Bench {
     /// Number of non-finite values on outputs declared Finite.
     std::uint64_t nonFinite() const noexcept { return non_finite_; }
 
+    /// The texts of all reportFault() calls.
+    const std::vector<std::string>& faults() const noexcept { return faults_.texts; }
+
     /// A declared state, for reading and writing.
     template <typename T>
     T& state(const std::string& name) {
@@ -188,6 +192,13 @@ class Bench {
        private:
         std::vector<std::string>& lines_;
         LogRecord record_{};
+    };
+
+    struct Faults final : FaultSink {
+        std::vector<std::string> texts;
+        void report(std::uint64_t /*iteration*/, const char* text) noexcept override {
+            texts.emplace_back(text);
+        }
     };
 
     struct Writes {
@@ -264,6 +275,7 @@ class Bench {
     LoopClock clock_;
     ComponentContext context_;
     DeviceStatistics device_;
+    Faults faults_;
     std::vector<std::string> lines_;
     Lines log_;
     std::map<const InputPort*, std::shared_ptr<SlotHeader>> slots_;
