@@ -48,6 +48,10 @@ class NotFinite final : public Faulty {
     rtcf::Output<double> value_{this, "value", "", rtcf::Finite()};
 };
 
+class Reports final : public Faulty {
+    void fault() override { reportFault("the sensor is dead"); }
+};
+
 class WritesNan final : public Faulty {
     void fault() override { value_.write(std::numeric_limits<double>::quiet_NaN()); }
     rtcf::Output<double> value_{this, "value"};
@@ -117,5 +121,6 @@ RTCF_COMPONENT(Hoards, "Allocates 1 MB more in each update, until memory is exha
 RTCF_COMPONENT(Sleeps, "Sleeps in each update")
 RTCF_COMPONENT(Lingers, "Takes 150 ms in each update")
 RTCF_COMPONENT(NotFinite, "Writes NaN to an output that is declared finite")
+RTCF_COMPONENT(Reports, "Reports a fault that does not end the loop")
 RTCF_COMPONENT(WritesNan, "Writes NaN to an output that is not declared finite")
 RTCF_COMPONENT(NotFiniteStops, "Writes infinity to an output that stops the loop then")

@@ -9,6 +9,7 @@ tests/unit/cpp/control cover nested messages, which a bench cannot send.
 from __future__ import annotations
 
 import math
+import re
 import shutil
 import subprocess
 import sys
@@ -155,6 +156,52 @@ def test_a_trajectory_is_followed_and_its_tail_replaced(stepped: Bench) -> None:
             "{positions: [0.5, 0.5], velocities: [0, 0], time_from_start: {secs: 1, nsecs: 0}}]}"
         )
         assert block.step(1001)["position"][:2] == [0.5, 0.5]
+        assert block.state["rejections"] == 0
+    finally:
+        block.unload()
+
+
+def table_of_stops() -> tuple[dict[str, str], float]:
+    """Return what docs/control/trajectory.md says of stops: by limit, and the longest time in s."""
+    text = (TREE / "docs" / "control" / "trajectory.md").read_text(encoding="utf-8")
+    section = text.partition("\n## Stops\n")[2].partition("\n## ")[0]
+    rows = re.findall(r"^\| (\w+) \| (\w+)[:;]", section, re.MULTILINE)
+    formula = re.search(r"at most (\d) V/A \+ (\d) A/J \+ (\d) √\(V/J\) after", section)
+    assert formula is not None
+    of_v, of_a, of_both = map(int, formula.groups())
+    longest = of_v * VELOCITY / ACCELERATION + of_a * ACCELERATION / JERK
+    return dict(rows), longest + of_both * math.sqrt(VELOCITY / JERK)
+
+
+def test_stops_keep_what_the_table_in_the_docs_says(stepped: Bench) -> None:
+    gives_way, longest = table_of_stops()
+    assert gives_way == {
+        "jerk": "first", "acceleration": "next", "velocity": "never", "position": "never"
+    }  # fmt: skip
+    draw = np.random.default_rng(41)
+    block = Stepped(stepped, "TrajectoryGenerator", joints="a", initial='"0"', lower='"-1"',
+                    upper='"1"', **QUOTED)  # fmt: skip
+    try:
+        block.step()
+        for _ in range(8):
+            start = block.state["position"][0]
+            # A short polynomial, whose accelerations may exceed their limit by far.
+            end = float(np.clip(start + draw.uniform(-0.3, 0.3), -0.99, 0.99))
+            duration = max(0.05, 2.0 * abs(end - start) / VELOCITY)
+            nsecs = round(1e9 * duration)
+            block.write(
+                trajectory="{joint_names: [a], points: [{"
+                f"positions: [{end}], velocities: [0], "
+                f"time_from_start: {{secs: {nsecs // 10**9}, nsecs: {nsecs % 10**9}}}}}]}}"
+            )
+            block.step(int(draw.integers(1, round(duration / DT))))
+            block.write(halt=True)
+            for _ in range(math.ceil(longest / DT / 100)):
+                state = block.step(100)
+                assert abs(state["commanded_velocity"][0]) <= VELOCITY + ROUNDING
+                assert abs(state["position"][0]) <= 1.0 + ROUNDING
+            assert state["commanded_velocity"][0] == 0.0
+            block.step(halt=False)
         assert block.state["rejections"] == 0
     finally:
         block.unload()

@@ -380,15 +380,21 @@ def test_a_non_finite_value_is_held_back(daemon: Daemon, client: rtcf.Client) ->
     assert state(client).state == runner_pb2.RUNNER_STATE_RUNNING
 
 
-def test_faults_beyond_the_reported_ones_are_counted(daemon: Daemon, client: rtcf.Client) -> None:
-    load(client, faulty("NotFinite"))
+@pytest.mark.parametrize(
+    ("type_name", "told"),
+    [("NotFinite", "is not finite: readers keep its last value"),
+     ("Reports", "the sensor is dead")],
+)  # fmt: skip
+def test_faults_beyond_the_reported_ones_are_counted(
+    daemon: Daemon, client: rtcf.Client, type_name: str, told: str
+) -> None:
+    load(client, faulty(type_name))
     client.start()
     wait_for(lambda: client.get_component("bad").faults > 20, "the faults")
     # Reported once, and counted in every view.
-    told = "is not finite: readers keep its last value"
     wait_for(lambda: told in daemon.log(), "the log")
     assert daemon.log().count(told) == 1
-    assert re.search(r"is not finite: .* \(\d+ in all\)", daemon.ctl("list").stdout)
+    assert re.search(rf"{told}.* \(\d+ in all\)", daemon.ctl("list").stdout)
     assert re.search(r"fault: .* \(\d+ in all\)", daemon.ctl("info", "bad").stdout)
     assert re.search(r"rt_runner: \d+ faults of components", daemon.ctl("status").stdout)
     assert re.search(r"^/bad: \d+ faults$", daemon.ctl("stats").stdout, re.MULTILINE)

@@ -3,6 +3,7 @@
 import json
 import subprocess
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -163,6 +164,22 @@ def test_an_invalid_goal_in_place_of_another_one_stops_the_arm(
     assert result["state"] == GoalStatus.ABORTED
     wait_for(lambda: abs(measured(launching, "joint1_velocity")) < 1e-3, "the arm to stand")
     assert measured(launching, "joint1_position") < 1.5
+
+
+def test_a_halt_aborts_the_goal_and_the_arm_stands(launching: Launching, peer: Peer) -> None:
+    peer.send([[1.5, READY, STANDS]])
+    with launching.client() as (client, runner), ThreadPoolExecutor() as pool:
+        sent = pool.submit(peer.send, [[5.0, [2.0, *READY[1:]], STANDS]])
+        wait_for(lambda: measured(launching, "joint1_velocity") > 0.1, "the arm to move")
+        client.write("/trajectory.halt", True, runner)
+        try:
+            result = sent.result(timeout=30.0)
+        finally:
+            client.write("/trajectory.halt", False, runner)
+    assert result["state"] == GoalStatus.ABORTED
+    assert "/trajectory is halted" in result["text"]
+    wait_for(lambda: abs(measured(launching, "joint1_velocity")) < 1e-3, "the arm to stand")
+    assert 0.0 < measured(launching, "joint1_position") < 1.5
 
 
 def test_a_component_that_is_no_generator_is_rejected(launching: Launching) -> None:
