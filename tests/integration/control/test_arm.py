@@ -169,6 +169,47 @@ def test_an_emergency_stop_at_any_instant_ends_all_torques(arm: rtcf.Client, tim
         assert np.abs(positions(arm) - held).max() > STILL, "it moves again"
 
 
+def limits_of_the_trajectory() -> dict[str, Any]:
+    """Return velocity, lower and upper of the joints."""
+    (graph,) = read_graphs((ARM / "arm.yaml").read_text(), "arm.yaml")
+    (found,) = (each for each in graph.components if each.name == "trajectory")
+    texts = {each.name: each.value.string_value for each in found.parameters}
+    return {name: np.array(texts[name].split(), float) for name in ("velocity", "lower", "upper")}
+
+
+@pytest.mark.parametrize("stops", [6, pytest.param(1000, marks=pytest.mark.long)])
+def test_a_halt_at_any_instant_keeps_all_limits(bench: Bench, stops: int) -> None:
+    # Goals of the whole range: the arm also meets the table and the block.
+    limits = limits_of_the_trajectory()
+    draw = np.random.default_rng(49)
+    operate(bench.client, mode="goal")
+    contacts = 0.0
+    for _ in range(-(-stops // 20)):
+        count = min(stops, 20)
+        steps = 1500 * count
+        goals = np.ma.masked_all((steps, 6))
+        halt = np.ma.masked_all(steps)
+        for begin in range(0, steps, 1500):
+            goals[begin + 5] = draw.uniform(limits["lower"], limits["upper"])
+            at = begin + int(draw.integers(10, 700))
+            halt[at], halt[begin + 1495] = 1.0, 0.0
+        found = bench.run({"/operator.goal.position": goals, "/trajectory.halt": halt}, steps)
+        contacts = max(contacts, found["/robot.contacts"].max())
+        for i, joint in enumerate(JOINTS):
+            wanted: Any = found[f"/setpoints.velocity{i + 1}"]
+            angle: Any = found[f"/setpoints.position{i + 1}"]
+            measured: Any = found[f"/robot.{joint}_position"]
+            assert np.nanmax(np.abs(wanted)) <= limits["velocity"][i] + 1e-9, joint
+            for each, most in ((angle, 1e-9), (measured, TRACKING)):
+                assert np.nanmax(each) <= limits["upper"][i] + most, joint
+                assert np.nanmin(each) >= limits["lower"][i] - most, joint
+            assert (wanted[1490::1500] == 0.0).all(), joint
+            speed: Any = found[f"/robot.{joint}_velocity"]
+            assert np.abs(speed[1490::1500]).max() < 0.05, joint
+    operate(bench.client, mode="stand")
+    assert stops < 100 or contacts > found["/robot.contacts"][0], "it met the table"
+
+
 def test_a_fault_of_any_component_stops_the_arm_and_names_it(arm: rtcf.Client) -> None:
     (graph,) = read_graphs((ARM / "arm.yaml").read_text(), "arm.yaml")
     names = [each.full_name for each in arm.list_components() if each.full_name != "/robot"]

@@ -142,8 +142,10 @@ class Bench {
     /// Number of non-finite values on outputs declared Finite.
     std::uint64_t nonFinite() const noexcept { return non_finite_; }
 
-    /// The texts of all reportFault() calls.
-    const std::vector<std::string>& faults() const noexcept { return faults_.texts; }
+    /// Number of reportFault() calls.
+    std::uint64_t faults() const noexcept { return faults_.count; }
+    /// The text of the last one; empty = none.
+    const char* fault() const noexcept { return faults_.text; }
 
     /// A declared state, for reading and writing.
     template <typename T>
@@ -195,9 +197,11 @@ class Bench {
     };
 
     struct Faults final : FaultSink {
-        std::vector<std::string> texts;
-        void report(std::uint64_t /*iteration*/, const char* text) noexcept override {
-            texts.emplace_back(text);
+        std::uint64_t count = 0;
+        const char* text = "";
+        void report(std::uint64_t /*iteration*/, const char* of) noexcept override {
+            ++count;
+            text = of;
         }
     };
 
