@@ -360,7 +360,8 @@ def graph(all_links: Sequence[Link], folder: Path) -> str:
         ),
         _component(
             "/trajectory", "rtcf_control/TrajectoryGenerator",
-            {"joints": NAMES, "acceleration": " ".join(f"{each:g}" for each in ACCELERATIONS), "jerk": "60 60 80 120 120 150"}
+            {"joints": NAMES, "acceleration": " ".join(f"{each:g}" for each in ACCELERATIONS),
+             "jerk": "60 60 80 120 120 150"}
             | {name: " ".join(f"{getattr(link, name):g}" for link in arm)
                for name in ("velocity", "lower", "upper")},
             {"measured": "/joint_states", "target": "/target", "command": "/command",

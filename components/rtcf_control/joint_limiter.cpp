@@ -137,8 +137,7 @@ class JointLimiter final : public rtcf::Component {
                         reportFault("position is not finite: out begins at the measured position");
                         return;
                     }
-                    last_ =
-                        has_position ? position.value() : Range{lower, upper}.limit(wanted);
+                    last_ = has_position ? position.value() : Range{lower, upper}.limit(wanted);
                     wanted_ = Range{lower, upper}.limit(wanted);
                 }
                 write(wanted, followed(wanted, last_));
@@ -219,8 +218,8 @@ class JointLimiter final : public rtcf::Component {
         const double rest = std::abs(target - from - v * h);
         const double next = rest <= 1e-12 * std::abs(target - from) ? target : from + v * h;
         // Rounding must not cross a limit that has not been crossed before.
-        const double reached = Range{from < lower ? -kInfinity : lower,
-                                     from > upper ? kInfinity : upper}.limit(next);
+        const double reached =
+            Range{from < lower ? -kInfinity : lower, from > upper ? kInfinity : upper}.limit(next);
         pace_ = (reached - from) / h;
         return reached;
     }
@@ -264,8 +263,8 @@ class JointLimiter final : public rtcf::Component {
             // the braking parabola that continues this line.
             const double line = deceleration / (factor * factor);
             const double size = std::abs(distance);
-            const double speed = size <= line ? factor * size
-                                              : std::sqrt(deceleration * (2.0 * size - line));
+            const double speed =
+                size <= line ? factor * size : std::sqrt(deceleration * (2.0 * size - line));
             return std::copysign(speed, distance);
         };
         const Range fastest{-max_velocity, max_velocity};

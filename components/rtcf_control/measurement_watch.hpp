@@ -1,6 +1,6 @@
 /// @file
-/// Limit on the age of a component's measured inputs, so that a dead sensor is not driven on. Part of
-/// its component, which calls it in each cycle and does what is safe while an input is lost.
+/// Limit on the age of a component's measured inputs, so that a dead sensor is not driven on. Part
+/// of its component, which calls it in each cycle and does what is safe while an input is lost.
 #pragma once
 
 #include <array>
@@ -87,9 +87,7 @@ class MeasurementWatch {
     using Times = Eigen::Matrix<std::int64_t, static_cast<int>(Count), 1>;
     using Numbers = Eigen::Matrix<double, static_cast<int>(Count), 1>;
 
-    static Numbers none() {
-        return Numbers::Constant(std::numeric_limits<double>::quiet_NaN());
-    }
+    static Numbers none() { return Numbers::Constant(std::numeric_limits<double>::quiet_NaN()); }
     static bool above(std::int64_t time_ns, double limit_s) noexcept {
         return static_cast<double>(time_ns) > 1e9 * limit_s;
     }

@@ -191,11 +191,10 @@ class Pid final : public rtcf::Component {
         const double y = measured.value();
         const double silence = watch_.silence(0);
         const bool is_new = measurement == rtcf::DataStatus::New && std::isfinite(y);
-        const char* fault = measurement != rtcf::DataStatus::None ? watch_.note(0, y, is_new, elapsed()) : nullptr;
+        const char* fault =
+            measurement != rtcf::DataStatus::None ? watch_.note(0, y, is_new, elapsed()) : nullptr;
         if (fault == nullptr && !std::isfinite(r + y + forward + schedule))
-            fault = !std::isfinite(r)         ? "setpoint is not finite"
-                    : !std::isfinite(forward) ? "feedforward is not finite"
-                                              : "gain is not finite";
+            fault = notFinite(r, forward);
         const bool complete = has_setpoint && watch_.valid(0);
         if (!complete || fault != nullptr) {
             if (fault != nullptr) reportFault(fault);
@@ -242,6 +241,12 @@ class Pid final : public rtcf::Component {
         saturated.write(limited != wanted);
     }
 
+    // The text of a fault: the first of the setpoint, the feed-forward and the gain that is wrong.
+    static const char* notFinite(double r, double forward) {
+        if (!std::isfinite(r)) return "setpoint is not finite";
+        return std::isfinite(forward) ? "gain is not finite" : "feedforward is not finite";
+    }
+
     template <typename T>
     static T valueOr(rtcf::Input<T>& input, T otherwise) {
         return input.read() != rtcf::DataStatus::None ? input.value() : otherwise;
@@ -277,8 +282,8 @@ class Pid final : public rtcf::Component {
         const double before = setpoint_;
         const double largest = setpoint_rate * elapsed;
         setpoint_ = track ? y : std::clamp(r, before - largest, before + largest);
-        setpoint_slope_ = (filter_time * setpoint_slope_ + setpoint_ - before) /
-                          (filter_time + gap_ + elapsed);
+        setpoint_slope_ =
+            (filter_time * setpoint_slope_ + setpoint_ - before) / (filter_time + gap_ + elapsed);
         gap_ = 0.0;
         // The sensor may be slower than the loop: its slope holds until its next value is due.
         if (since > 0.0) {

@@ -353,9 +353,7 @@ class JointLimiter(Component):
     def slower(self):
         """Return a velocity on the way to 0."""
         step = self.deceleration * self.dt
-        return np.clip(
-            self.pace, -max(0.0, -self.pace - step), max(0.0, self.pace - step)
-        )
+        return np.clip(self.pace, -max(0.0, -self.pace - step), max(0.0, self.pace - step))
 
     def send(self, wanted, value):
         """Write the limited value of a command."""

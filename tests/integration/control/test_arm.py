@@ -32,6 +32,7 @@ TRACKING = 0.03  # rad
 BUMP = 0.002  # rad
 STILL = 0.005  # rad
 CYCLES = 1000  # per second
+MASKED: Any = np.ma
 
 
 @pytest.fixture
@@ -187,8 +188,7 @@ def test_a_halt_at_any_instant_keeps_all_limits(bench: Bench, stops: int) -> Non
     for _ in range(-(-stops // 20)):
         count = min(stops, 20)
         steps = 1500 * count
-        goals = np.ma.masked_all((steps, 6))
-        halt = np.ma.masked_all(steps)
+        goals, halt = MASKED.masked_all((steps, 6)), MASKED.masked_all(steps)
         for begin in range(0, steps, 1500):
             goals[begin + 5] = draw.uniform(limits["lower"], limits["upper"])
             at = begin + int(draw.integers(10, 700))

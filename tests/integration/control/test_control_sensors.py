@@ -168,11 +168,11 @@ def test_sensors_out_of_range_or_with_jumps_leave_the_output_in_its_limits(
 @pytest.mark.parametrize("role", ["observer", "KalmanFilter"])
 def test_an_estimate_without_measurements_is_not_new_for_long(blocks: Blocks, role: str) -> None:
     measured = dead(np.sin(0.01 * np.arange(LENGTH)), 100)
-    model = {"A": "0 1; 0 0", "B": "", "C": "1 0", "process_noise": "1", "measurement_noise": "1"}
-    component, own = ("StateSpace", {"role": "observer"})
-    if role == "KalmanFilter":
-        component, own = role, {"measurement_timeout": TIMEOUT}
-    found = blocks.run(component, {"measured1": measured}, **model, **own)
+    model: Values = {"A": "0 1; 0 0", "B": "", "C": "1 0"}
+    if role == "observer":
+        found = blocks.run("StateSpace", {"measured1": measured}, role=role, **model)
+    else:
+        found = blocks.run(role, {"measured1": measured}, measurement_timeout=TIMEOUT, **model)
     changed = np.flatnonzero(np.diff(found["out1"]) != 0.0) + 1
     assert not ((changed > 100 + TIMEOUT / DT + 1) & (changed < RETURN)).any()
     assert (changed >= RETURN).sum() > 200
