@@ -188,11 +188,11 @@ def test_a_halt_at_any_instant_keeps_all_limits(bench: Bench, stops: int) -> Non
     for _ in range(-(-stops // 20)):
         count = min(stops, 20)
         steps = 1500 * count
-        goals, halt = MASKED.masked_all((steps, 6)), MASKED.masked_all(steps)
+        goals, halt = MASKED.masked_all((steps, 6)), MASKED.masked_all(steps, dtype=bool)
         for begin in range(0, steps, 1500):
             goals[begin + 5] = draw.uniform(limits["lower"], limits["upper"])
             at = begin + int(draw.integers(10, 700))
-            halt[at], halt[begin + 1495] = 1.0, 0.0
+            halt[at], halt[begin + 1495] = True, False
         found = bench.run({"/operator.goal.position": goals, "/trajectory.halt": halt}, steps)
         contacts = max(contacts, found["/robot.contacts"].max())
         for i, joint in enumerate(JOINTS):
