@@ -232,9 +232,15 @@ class JointLimiter final : public rtcf::Component {
         const double step = deceleration * dt();
         const Range reachable{pace_ - step, pace_ + step};
         const Range wanted = softened(x);
-        const Range braking{-towards(x - lower, -pace_), towards(upper - x, pace_)};
+        const Range braking = brakingRange(x, pace_);
         return {braking.limit(reachable.limit(wanted.low)),
                 braking.limit(reachable.limit(wanted.high))};
+    }
+
+    // Range of the velocity within the braking distances before lower and upper.
+    // @param pace velocity of the last command
+    Range brakingRange(double x, double pace) const {
+        return {-towards(x - lower, -pace), towards(upper - x, pace)};
     }
 
     // Largest velocity towards a limit.
@@ -276,9 +282,7 @@ class JointLimiter final : public rtcf::Component {
         const double largest = max_effort;
         if (k_velocity == 0.0) return {-largest, largest};
         const Range wanted = softened(x);
-        const double h = periodOf();
-        const Range braking{-brakingVelocity(std::max(x - lower, 0.0), deceleration, h),
-                            brakingVelocity(std::max(upper - x, 0.0), deceleration, h)};
+        const Range braking = brakingRange(x, 0.0);
         return {std::clamp(-k_velocity * (v - braking.limit(wanted.low)), -largest, largest),
                 std::clamp(-k_velocity * (v - braking.limit(wanted.high)), -largest, largest)};
     }

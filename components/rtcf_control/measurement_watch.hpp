@@ -1,6 +1,7 @@
 /// @file
-/// Limit on the age of a component's measured inputs, so that a dead sensor is not driven on. Part
-/// of its component, which calls it in each cycle and does what is safe while an input is lost.
+/// Limit on the age of a component's measured inputs, against driving on with a dead sensor. Part
+/// of its component, which calls it in each cycle and writes its safe output while an input is
+/// lost.
 #pragma once
 
 #include <array>
@@ -24,7 +25,7 @@ class MeasurementWatch {
 
     /// @param names   of the inputs, for reports
     /// @param timeout default of measurement_timeout, s
-    /// @param effect  what the component does while an input is lost, e.g. "out = 0"
+    /// @param effect  safe output while an input is lost, for reports, e.g. "out = 0"
     MeasurementWatch(rtcf::Component* owner, const std::array<std::string, Count>& names,
                      const std::string& effect, double timeout = 0.2)
         : timeout_(owner, "measurement_timeout", timeout, rtcf::Min(0.0), rtcf::Unit("s"),

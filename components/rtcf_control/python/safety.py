@@ -314,9 +314,8 @@ class JointLimiter(Component):
         most = self.max_effort
         if self.k_velocity == 0.0:
             return -most, most
-        h = self.longest_period
-        down = -braking_velocity(max(x - self.lower, 0.0), self.deceleration, h)
-        up = braking_velocity(max(self.upper - x, 0.0), self.deceleration, h)
+        down = -self.towards(x - self.lower, 0.0)
+        up = self.towards(self.upper - x, 0.0)
         low = np.clip(self.softened(self.soft_lower, x), down, up)
         high = np.clip(self.softened(self.soft_upper, x), down, up)
         return (

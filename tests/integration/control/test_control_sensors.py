@@ -1,4 +1,4 @@
-"""Dead and wrong sensors: what each component with a measured input then does.
+"""Dead and wrong sensors: the outputs of each component with a measured input.
 
 The time from the last good value to the safe output is that of the table in docs/control/index.md.
 """
@@ -87,7 +87,7 @@ def dead(values: Any, begin: int) -> Any:
 
 
 def filled(value: float) -> Callable[[Any, int], Any]:
-    """Return a fault in which the sensor says the same in each cycle."""
+    """Return a fault with one value in all cycles; -infinity = the last good one."""
 
     def fault(values: Any, begin: int) -> Any:
         found = values.copy()
@@ -107,7 +107,7 @@ def blocks(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Blocks]:
 
 
 def good(random: np.random.Generator) -> Any:
-    """Return what a sensor says of a joint that moves."""
+    """Return the measurements of a joint that moves."""
     time = DT * np.arange(LENGTH)
     return np.sin(random.uniform(1.0, 8.0) * time) + random.normal(scale=1e-4, size=LENGTH)
 

@@ -162,7 +162,7 @@ def test_a_trajectory_is_followed_and_its_tail_replaced(stepped: Bench) -> None:
 
 
 def table_of_stops() -> tuple[dict[str, str], float]:
-    """Return what docs/control/trajectory.md says of stops: by limit, and the longest time in s."""
+    """Return the table of docs/control/trajectory.md by limit, and the longest stop in s."""
     text = (TREE / "docs" / "control" / "trajectory.md").read_text(encoding="utf-8")
     section = text.partition("\n## Stops\n")[2].partition("\n## ")[0]
     rows = re.findall(r"^\| (\w+) \| (\w+)[:;]", section, re.MULTILINE)
@@ -173,7 +173,7 @@ def table_of_stops() -> tuple[dict[str, str], float]:
     return dict(rows), longest + of_both * math.sqrt(VELOCITY / JERK)
 
 
-def test_stops_keep_what_the_table_in_the_docs_says(stepped: Bench) -> None:
+def test_stops_keep_the_limits_of_the_table_in_the_docs(stepped: Bench) -> None:
     gives_way, longest = table_of_stops()
     assert gives_way == {
         "jerk": "first", "acceleration": "next", "velocity": "never", "position": "never"
