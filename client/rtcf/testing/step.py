@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+_SHORTEST = 0.1  # stay within the tolerance, as a fraction of the record
+
 
 @dataclass(frozen=True)
 class StepResponse:
@@ -18,7 +20,7 @@ class StepResponse:
     settling_time: float
     """The time, since the first sample, after which the value stays within the tolerance.
 
-    Infinite if the last sample is outside.
+    Infinite if the value does not settle: see step_response().
     """
     overshoot: float
     """The maximum distance beyond the target, as a fraction of the step; 0 without overshoot."""
@@ -39,8 +41,12 @@ def step_response(
     value      the response, of the same length as `time`
     tolerance  of the settling time, as a fraction of the step
 
-    The rise time is infinite if the value never reaches 90 % of the step. Raises ValueError for
-    invalid arguments.
+    The rise time is infinite if the value never reaches 90 % of the step. The value settles if its
+    last stay within the tolerance lasts to the last sample, at least a tenth of the record, and
+    more than twice as long as each earlier stay. A limit cycle, or a record that ends while the
+    value crosses the target, has no such stay: the settling time is infinite.
+
+    Raises ValueError for invalid arguments.
     """
     seconds, values = np.asarray(time, dtype=float), np.asarray(value, dtype=float)
     if seconds.ndim != 1 or seconds.shape != values.shape or seconds.size < 2:
@@ -56,17 +62,27 @@ def step_response(
     if not 0 < tolerance < 1:
         raise ValueError("tolerance must be a fraction of the step between 0 and 1")
     share = (values - initial) / (target - initial)
-    outside = np.flatnonzero(np.abs(share - 1) > tolerance)
     since = seconds - seconds[0]
-    settled = 0 if outside.size == 0 else int(outside[-1]) + 1
     return StepResponse(
         rise_time=_first(since, share, 0.9) - _first(since, share, 0.1)
         if share.max() >= 0.9
         else float("inf"),
-        settling_time=float(since[settled]) if settled < since.size else float("inf"),
+        settling_time=_settling_time(since, np.abs(share - 1) <= tolerance),
         overshoot=max(0.0, float(share.max()) - 1),
         final_error=float(target - values[-1]),
     )
+
+
+def _settling_time(time: npt.NDArray[np.float64], inside: npt.NDArray[np.bool_]) -> float:
+    """Return the begin of the last stay inside, or infinity if it is too short."""
+    edges = np.flatnonzero(np.diff(inside)) + 1
+    begins = np.append(0, edges) if inside[0] else edges
+    begins, ends = begins[::2], begins[1::2]
+    if not inside[-1]:
+        return float("inf")
+    earlier = float((time[ends] - time[begins[:-1]]).max(initial=0.0))
+    begin, end = float(time[begins[-1]]), float(time[-1])
+    return begin if end - begin >= max(_SHORTEST * end, 2.0 * earlier) else float("inf")
 
 
 def _first(

@@ -333,12 +333,15 @@ def test_a_periodic_signal_has_no_settling_time(visit: Opener) -> None:
           const { step } = await import("/page/data/measure.js");
           const times = Array.from({ length: 10000 }, (_, i) => i / 2000);
           const square = (t) => Math.sign(Math.sin(2 * Math.PI * (t * 1.1 + 0.52)));
+          const hunting = (t) => t < 1 ? 0 : 1 + 0.03 * Math.sin(20 * t);
           return { square: step(times, times.map(square)),
+            hunting: step(times, times.map(hunting)),
             once: step(times, times.map((t) => t < 2 ? 0 : 1)) };
         })()"""
     )
     assert found["square"] == {"rise": None, "overshoot": None, "settling": None}
     assert found["once"]["settling"] is not None
+    assert found["hunting"]["settling"] is None
 
 
 def test_events_are_lines_with_a_label_in_the_top_pane(visit: Opener, loop: Daemon) -> None:

@@ -52,7 +52,8 @@ export function frequency(times, found, min, max) {
 }
 
 // Rise time from 10 to 90 %, overshoot in % and settling time to 2 % of a step from its first to its
-// last level. A signal that does not settle, or returns to its first level, is not a step.
+// last level. A signal that does not settle, or returns to its first level, is not a step. The settling
+// time needs a last stay within 2 % of at least a tenth of the signal, and twice as long as each earlier one.
 export function step(times, found) {
   const none = { rise: NaN, overshoot: NaN, settling: NaN };
   const count = found.length, edge = Math.max(1, Math.floor(count / 20)), tail = count - 2 * edge;
@@ -63,17 +64,22 @@ export function step(times, found) {
   if (Math.abs(mean(found, tail, tail + edge) - mean(found, tail + edge, count)) > Math.abs(size) * 0.015) return none;
   for (let i = tail; i < count; i++) if (Math.abs(found[i] - to) > Math.abs(size) * 0.05) return none;
   for (let i = 0; i < edge; i++) if (Math.abs(found[i] - from) > Math.abs(size) * 0.05) return none;
-  let low = -1, high = -1, most = -Infinity, settled = 0;
+  let low = -1, high = -1, most = -Infinity, settled = 0, longest = 0;
   for (let i = 0; i < count; i++) {
     const part = (found[i] - from) / size;
     if (low < 0 && part >= 0.1) low = i;
     if (high < 0 && part >= 0.9) high = i;
     if (high >= 0 && part <= 0.1) return none;
     if (part > most) most = part;
-    if (Math.abs(part - 1) > 0.02) settled = i + 1;
+    if (Math.abs(part - 1) > 0.02) {
+      if (i > settled) longest = Math.max(longest, times[i] - times[settled]);
+      settled = i + 1;
+    }
   }
-  settled = Math.min(settled, count - 1);
-  return { rise: times[high] - times[low], overshoot: Math.max(0, most - 1) * 100, settling: times[settled] - times[low] };
+  const stay = settled < count ? times[count - 1] - times[settled] : 0;
+  const settles = stay > 0 && stay >= Math.max((times[count - 1] - times[0]) / 10, 2 * longest);
+  return { rise: times[high] - times[low], overshoot: Math.max(0, most - 1) * 100,
+    settling: settles ? times[settled] - times[low] : NaN };
 }
 
 function mean(found, begin, end) {

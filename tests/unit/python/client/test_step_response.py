@@ -35,6 +35,30 @@ def test_a_response_that_never_settles_has_no_times() -> None:
     assert measured.final_error == pytest.approx(0.5)
 
 
+@pytest.mark.parametrize("amplitude", [0.5, 0.1, 0.03, 0.0201])
+@pytest.mark.parametrize("end", [18.85, 19.5, 19.99, 20.0])
+def test_a_limit_cycle_has_no_settling_time(amplitude: float, end: float) -> None:
+    time = TIME[end >= TIME]
+    value = 1 - np.exp(-5 * time) + amplitude * np.sin(2 * time)
+    assert step_response(time, value, target=1.0).settling_time == math.inf
+
+
+def test_a_record_that_ends_in_a_crossing_has_no_settling_time() -> None:
+    time = TIME[TIME <= 1.0]
+    assert step_response(time, time, target=1.0).settling_time == math.inf
+
+
+def test_an_oscillation_that_decays_has_its_settling_time() -> None:
+    value = 1 - np.exp(-TIME) * np.cos(10 * TIME)
+    outside = np.abs(value - 1) > 0.02
+    measured = step_response(TIME, value, target=1.0)
+    assert measured.settling_time == TIME[np.flatnonzero(outside)[-1] + 1]
+
+
+def test_a_response_that_begins_within_the_tolerance_settles_at_once() -> None:
+    assert step_response(TIME, np.ones_like(TIME), target=1.0).settling_time == 0.0
+
+
 @pytest.mark.parametrize(
     ("time", "value", "target", "tolerance", "words"),
     [
