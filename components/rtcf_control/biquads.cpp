@@ -21,12 +21,14 @@ constexpr double kPi = 3.14159265358979323846;
 // of the bilinear transform.
 constexpr double kLargestShare = 0.49;
 
-// A section before its discretisation, with S = s / (2 pi frequency):
-// H = (b[0] + b[1] S + b[2] S^2) / (a[0] + a[1] S + a[2] S^2).
+// A section with S = s / (2 pi frequency): H = (b[0] + b[1] S + b[2] S^2) / (1 + damping S + S^2),
+// or without S^2 in the denominator.
 struct AnalogSection {
     double frequency = 0.0;  // Hz; the discrete section has the response of H at this frequency
     std::array<double, 3> b{1.0, 0.0, 0.0};
-    std::array<double, 3> a{1.0, 0.0, 0.0};
+    double damping = 0.0;
+    bool second_order = true;
+    double bandwidth = 0.0;  // Hz, of a bandpass or notch: replaces damping
 };
 
 struct AnalogChain {
@@ -35,31 +37,48 @@ struct AnalogChain {
     std::uint64_t identity = 0;  // hash of the sections
 };
 
-// y = b[0] x + b[1] x1 + b[2] x2 - a[0] y1 - a[1] y2, with the values of the last two cycles.
+// A section for one period, see Biquads::filter().
 struct Section {
     std::array<double, 3> b{1.0, 0.0, 0.0};
-    std::array<double, 2> a{0.0, 0.0};
+    double damping = 0.0;
+    double k = 0.0;  // tan(pi frequency period)
+    bool second_order = true;
     template <typename Visit>
     void fields(Visit&& visit) {
         visit("b0", b[0]);
         visit("b1", b[1]);
         visit("b2", b[2]);
-        visit("a1", a[0]);
-        visit("a2", a[1]);
+        visit("damping", damping);
+        visit("k", k);
+        visit("second_order", second_order);
     }
 };
 
-// Bilinear transform, S = (1 - z^-1) / (K (1 + z^-1)) with K = tan(pi frequency period). Real-time
-// safe.
-Section discretise(const AnalogSection& analog, double frequency, double period_s) {
-    const double k = std::tan(kPi * frequency * period_s);
-    const auto transform = [k](const std::array<double, 3>& c) {
-        return std::array<double, 3>{c[2] + c[1] * k + c[0] * k * k, 2.0 * (c[0] * k * k - c[2]),
-                                     c[2] - c[1] * k + c[0] * k * k};
-    };
-    const std::array<double, 3> b = transform(analog.b);
-    const std::array<double, 3> a = transform(analog.a);
-    return {{b[0] / a[0], b[1] / a[0], b[2] / a[0]}, {a[1] / a[0], a[2] / a[0]}};
+// V = U / (1 + damping S + S^2), of the input U of a section, and its derivatives S V and S^2 V.
+struct Motion {
+    double value = 0.0;
+    double rate = 0.0;
+    double acceleration = 0.0;
+    template <typename Visit>
+    void fields(Visit&& visit) {
+        visit("value", value);
+        visit("rate", rate);
+        visit("acceleration", acceleration);
+    }
+};
+
+// Chooses the damping of a bandpass or notch so that the gain is 1/sqrt(2) at two frequencies that
+// differ by the bandwidth, as Orfanidis does (Introduction to Signal Processing, 1996, section
+// 11.3). Real-time safe.
+Section discretise(const AnalogSection& analog, double frequency, double bandwidth,
+                   double period_s) {
+    Section made{analog.b, analog.damping, std::tan(kPi * frequency * period_s),
+                 analog.second_order};
+    if (bandwidth > 0.0) {
+        made.damping = std::tan(kPi * bandwidth * period_s) * (1.0 + made.k * made.k) / made.k;
+        made.b[1] *= made.damping;
+    }
+    return made;
 }
 
 // Reads a chain of sections from a text such as "lowpass 100 0.707; notch 50 5".
@@ -111,11 +130,13 @@ class ChainReader {
 
     std::string resonant(const std::string& kind, double frequency, double q) {
         if (q < 1e-6 || q > 1e6) return fmt::format("{}: Q = {} is not in 1e-6 to 1e6", kind, q);
-        AnalogSection made{frequency, {}, {1.0, 1.0 / q, 1.0}};
-        if (kind == "lowpass") made.b = {1.0, 0.0, 0.0};
+        AnalogSection made;
+        made.frequency = frequency;
+        made.damping = 1.0 / q;
         if (kind == "highpass") made.b = {0.0, 0.0, 1.0};
-        if (kind == "bandpass") made.b = {0.0, 1.0 / q, 0.0};
+        if (kind == "bandpass") made.b = {0.0, 1.0, 0.0};
         if (kind == "notch") made.b = {1.0, 0.0, 1.0};
+        if (kind == "bandpass" || kind == "notch") made.bandwidth = frequency / q;
         return add(kind, made);
     }
 
@@ -124,7 +145,7 @@ class ChainReader {
         if (zero <= 0.0 || pole <= 0.0) return "lead_lag: the frequencies must be above 0 Hz";
         const double ratio = std::sqrt(pole / zero);
         return add("lead_lag",
-                   {std::sqrt(zero) * std::sqrt(pole), {1.0, ratio, 0.0}, {1.0, 1.0 / ratio, 0.0}});
+                   {std::sqrt(zero) * std::sqrt(pole), {1.0, ratio, 0.0}, 1.0 / ratio, false});
     }
 
     std::string butterworthSections(const std::string& kind, double order, double frequency) {
@@ -138,13 +159,12 @@ class ChainReader {
         // that no value between sections is large.
         if (whole % 2 == 1) {
             const AnalogSection first{
-                frequency, {low ? 1.0 : 0.0, low ? 0.0 : 1.0, 0.0}, {1.0, 1.0, 0.0}};
+                frequency, {low ? 1.0 : 0.0, low ? 0.0 : 1.0, 0.0}, 1.0, false};
             if (std::string error = add(kind, first); !error.empty()) return error;
         }
         for (int i = whole / 2; i >= 1; --i) {
             const double damping = 2.0 * std::sin(kPi * (2 * i - 1) / (2.0 * order));
-            const AnalogSection pair{
-                frequency, {low ? 1.0 : 0.0, 0.0, low ? 0.0 : 1.0}, {1.0, damping, 1.0}};
+            const AnalogSection pair{frequency, {low ? 1.0 : 0.0, 0.0, low ? 0.0 : 1.0}, damping};
             if (std::string error = add(kind, pair); !error.empty()) return error;
         }
         return {};
@@ -155,13 +175,20 @@ class ChainReader {
             return fmt::format(
                 "{}: {} Hz is not between 0 and {} Hz, 49 % of the component's frequency", kind,
                 made.frequency, highest_);
+        if (made.bandwidth >= highest_)
+            return fmt::format(
+                "{}: the bandwidth F / Q = {} Hz is not below {} Hz, 49 % of the component's "
+                "frequency: raise Q",
+                kind, made.bandwidth, highest_);
         if (chain_.count == kMostSections)
             return fmt::format("at most {} sections; a Butterworth filter has one for two orders",
                                kMostSections);
         chain_.sections[chain_.count++] = made;
         mix(made.frequency);
         for (const double coefficient : made.b) mix(coefficient);
-        for (const double coefficient : made.a) mix(coefficient);
+        mix(made.damping);
+        mix(made.second_order ? 2.0 : 1.0);
+        mix(made.bandwidth);
         return {};
     }
 
@@ -177,11 +204,11 @@ class ChainReader {
     AnalogChain chain_;
 };
 
-// Direct form I: the state of a section is the last two values of its input and of its output. It
-// does not depend on the coefficients, so that it stays valid when they change. Neighbours share
-// it.
+// The state of a section is the motion of its filter in continuous time, which the bilinear
+// transform, the trapezoidal rule, integrates. It does not depend on the period, so that it stays
+// valid when the period changes.
 class Biquads final : public rtcf::Component {
-    using Signals = std::array<double, kMostSections + 1>;
+    using Motions = std::array<Motion, kMostSections>;
 
     // Smaller values are set to 0: numbers below 1e-308 would slow down the cycle.
     static constexpr double kSmallest = 1e-200;
@@ -209,10 +236,8 @@ class Biquads final : public rtcf::Component {
                                          rtcf::Doc("hash of the sections in the parameter")};
     rtcf::State<std::int64_t> period_{this, "design_period", 0, rtcf::Unit("ns"),
                                       rtcf::Doc("period for which the sections are designed")};
-    rtcf::State<Signals> last_{
-        this, "last", {}, rtcf::Doc("input and outputs of the sections in the last cycle")};
-    rtcf::State<Signals> before_{
-        this, "before", {}, rtcf::Doc("input and outputs of the sections in the cycle before it")};
+    rtcf::State<Motions> motion_{this, "motion", {}, rtcf::Doc("state of the sections")};
+    rtcf::State<double> last_{this, "last", 0.0, rtcf::Doc("output of the sections")};
     rtcf::State<double> offset_{this, "offset", 0.0,
                                 rtcf::Doc("difference that a transition adds to the output")};
     rtcf::State<double> fading_{this, "fading", 0.0, rtcf::Unit("s"),
@@ -242,16 +267,19 @@ class Biquads final : public rtcf::Component {
         }
         if (!begun_) {
             begin(x);
-        } else if (identity_ != analog_->identity || period_ != period()) {
+        } else if (identity_ != analog_->identity) {
             redesign(x);
         }
-        Signals now{};
-        const double y = filter(x, now) + offset_;
+        Motions next = motion_;
+        const double filtered = filter(x, next);
+        const double y = filtered + offset_;
         out.write(y);
         if (!std::isfinite(y)) return;  // too large a number: rejected as not finite
-        before_ = last_.value();
-        last_ = now;
+        motion_ = next;
+        last_ = filtered;
         output_ = y;
+        // The cycle in which the period changes is still the previous period after the last one.
+        if (period_ != period()) design();
         if (fading_ <= 0.0) return;
         const double left = fading_ - dt();
         offset_ = left > 0.0 ? offset_ * (left / fading_) : 0.0;
@@ -263,49 +291,33 @@ class Biquads final : public rtcf::Component {
 
     void begin(double x) {
         design();
-        Signals steady{};
-        if (settled) {
-            steady[0] = x;
-            for (std::size_t i = 0; i < count_; ++i) {
-                const AnalogSection& section = analog_->sections[i];
-                steady[i + 1] = steady[i] * (section.b[0] / section.a[0]);
-            }
-        }
-        last_ = steady;
-        before_ = steady;
+        settle(0, settled ? x : 0.0);
         offset_ = 0.0;
         fading_ = 0.0;
         begun_ = true;
     }
 
+    // Gives sections the state that they have after a constant input for a long time.
+    void settle(std::size_t first, double input) {
+        for (std::size_t i = first; i < count_; ++i) {
+            motion_.value()[i] = {input, 0.0, 0.0};
+            input *= design_.value()[i].b[0];
+        }
+    }
+
     // Designs the sections again. The output continues from the value that it would have without
     // the change.
     void redesign(double x) {
-        Signals now{};
+        Motions now = motion_;
         const double expected = filter(x, now) + offset_;
-        if (period_ != period()) resample();
         const std::uint32_t count = count_;
         design();
-        for (std::size_t i = count; i < count_; ++i) {
-            last_.value()[i + 1] = last_.value()[count];
-            before_.value()[i + 1] = before_.value()[count];
-        }
+        if (count_ > count) settle(count, last_);
+        now = motion_;
         const double offset = expected - filter(x, now);
         const bool fades = fade > 0.0 && std::isfinite(offset);
         offset_ = fades ? offset : 0.0;
         fading_ = fades ? fade.value() : 0.0;
-    }
-
-    // Moves the values of the last two cycles to the times of the new period, along their lines.
-    void resample() {
-        const double ratio = static_cast<double>(period()) / static_cast<double>(period_.value());
-        for (std::size_t i = 0; i <= count_; ++i) {
-            double& last = last_.value()[i];
-            double& before = before_.value()[i];
-            const double slope = last - before;  // per old period
-            last += slope * (1.0 - ratio);
-            before = last - slope * ratio;
-        }
     }
 
     void design() {
@@ -313,30 +325,40 @@ class Biquads final : public rtcf::Component {
         const double highest = kLargestShare / period_s;
         for (std::size_t i = 0; i < analog_->count; ++i) {
             const AnalogSection& section = analog_->sections[i];
-            // prepare() has checked the frequency at the period of that time.
-            if (section.frequency >= highest)
-                RTCF_WARN_THROTTLE(this, 10.0, "{} Hz is too high for this loop: {} Hz instead",
-                                   section.frequency, highest);
-            design_.value()[i] =
-                discretise(section, std::min(section.frequency, highest), period_s);
+            // prepare() has checked them at the period of that time.
+            const double most = std::max(section.frequency, section.bandwidth);
+            if (most >= highest)
+                RTCF_WARN(this, "{} Hz is too high for this loop: {} Hz instead", most, highest);
+            design_.value()[i] = discretise(section, std::min(section.frequency, highest),
+                                            std::min(section.bandwidth, highest), period_s);
         }
         count_ = static_cast<std::uint32_t>(analog_->count);
         identity_ = analog_->identity;
         period_ = period();
     }
 
-    double filter(double x, Signals& now) const {
-        const Signals& last = last_.value();
-        const Signals& before = before_.value();
-        now[0] = x;
+    // Moves the sections by one period. Returns their output.
+    double filter(double x, Motions& motions) const {
         for (std::size_t i = 0; i < count_; ++i) {
             const Section& c = design_.value()[i];
-            const double y = c.b[0] * now[i] + c.b[1] * last[i] + c.b[2] * before[i] -
-                             c.a[0] * last[i + 1] - c.a[1] * before[i + 1];
-            now[i + 1] = std::abs(y) < kSmallest ? 0.0 : y;
+            Motion& m = motions[i];
+            const double value = m.value + c.k * m.rate;
+            if (c.second_order) {
+                const double rate = m.rate + c.k * m.acceleration;
+                m.acceleration = flushed((x - value - (c.damping + c.k) * rate) /
+                                         (1.0 + c.damping * c.k + c.k * c.k));
+                m.rate = flushed(rate + c.k * m.acceleration);
+            } else {
+                m.acceleration = 0.0;
+                m.rate = flushed((x - value) / (c.damping + c.k));
+            }
+            m.value = flushed(value + c.k * m.rate);
+            x = c.b[0] * m.value + c.b[1] * m.rate + c.b[2] * m.acceleration;
         }
-        return now[count_];
+        return x;
     }
+
+    static double flushed(double value) { return std::abs(value) < kSmallest ? 0.0 : value; }
 };
 
 }  // namespace

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 
 #include <rtcf/component.hpp>
@@ -6,6 +7,8 @@ namespace rtcf_control {
 namespace {
 
 class Derivative final : public rtcf::Component {
+    static constexpr double kLongest = 2.0;  // intervals for which the rate is held
+
     rtcf::Input<double> in{this, "in"};
     rtcf::Output<double> out{this, "out", "", rtcf::Finite()};
 
@@ -18,7 +21,9 @@ class Derivative final : public rtcf::Component {
     rtcf::State<double> rate_{this, "rate", 0.0, rtcf::Unit("1/s"), rtcf::Doc("filtered rate")};
     rtcf::State<double> last_{this, "last", 0.0, rtcf::Doc("the last input")};
     rtcf::State<double> gap_{this, "gap", 0.0, rtcf::Unit("s"),
-                             rtcf::Doc("time without a finite input, since the last input")};
+                             rtcf::Doc("time without a new finite input")};
+    rtcf::State<double> interval_{this, "interval", 0.0, rtcf::Unit("s"),
+                                  rtcf::Doc("time between the last two new inputs")};
     rtcf::State<bool> begun_{this, "begun", false, rtcf::Doc("the first value has come")};
 
     bool start() override {
@@ -29,19 +34,36 @@ class Derivative final : public rtcf::Component {
     }
 
     void update() override {
-        if (in.read() == rtcf::DataStatus::None) return;
+        const rtcf::DataStatus status = in.read();
+        if (status == rtcf::DataStatus::None) return;
         const double value = in.value();
         if (!std::isfinite(value)) {
             gap_ += dt();
             out.write(value);  // rejected as not finite: readers keep the last output
             return;
         }
-        if (begun_) rate_ = (filter_time * rate_ + value - last_) / (filter_time + gap_ + dt());
+        if (begun_ && status != rtcf::DataStatus::New) {
+            hold();
+            return;
+        }
+        if (begun_) {
+            rate_ = (filter_time * rate_ + value - last_) / (filter_time + gap_ + dt());
+            interval_ = gap_ + dt();
+        }
         out.write(gain * rate_);
         last_ = value;
         gap_ = 0.0;
         begun_ = std::isfinite(rate_.value());
         if (!begun_) rate_ = 0.0;  // overflow, which the filter would keep
+    }
+
+    // Keeps the rate for as long as a slow source may take, also if one of its values is lost. Then
+    // the rate falls as 1 / time: a later value would not have changed by more.
+    void hold() {
+        const double before = gap_;
+        gap_ += dt();
+        if (gap_ > kLongest * interval_) rate_ *= std::max(before, kLongest * interval_) / gap_;
+        out.write(gain * rate_);
     }
 
     // Runs in the last cycle, too, to pass on the safe command of an upstream component.

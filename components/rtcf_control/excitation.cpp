@@ -2,8 +2,10 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <string>
 
 #include <rtcf/component.hpp>
+#include <rtcf/design_period.hpp>
 
 #include "waveform.hpp"
 
@@ -138,11 +140,15 @@ class Excitation final : public rtcf::Component {
     rtcf::State<double> base_{this, "base", 0.0, rtcf::Doc("in at the begin")};
     rtcf::State<double> reference_{this, "reference", 0.0, rtcf::Doc("measured at the begin")};
     rtcf::State<bool> high_{this, "high", true, rtcf::Doc("the relay is at amplitude")};
+    rtcf::State<bool> begun_{this, "begun", false, rtcf::Doc("the signal runs")};
     rtcf::State<std::int64_t> time_{this, "time", 0, rtcf::Unit("ns"),
                                     rtcf::Doc("time since the signal began")};
     rtcf::State<double> phase_{this, "phase", 0.0, rtcf::Doc("phase of the wave, from 0 to 1")};
-    rtcf::State<std::uint32_t> register_{this, "register", 1, rtcf::Doc("shift register of PRBS")};
+    rtcf::State<std::uint32_t> register_{this, "register", kPrbsStart,
+                                         rtcf::Doc("shift register of PRBS")};
     rtcf::Derived<double> peak_{this, 1.0};  // of the multisine
+    rtcf::DesignPeriod design_period_{this};
+    bool is_configured_ = false;
 
     bool prepare(const rtcf::Values& proposed) override {
         if (proposed[lower] > proposed[upper])
@@ -151,11 +157,26 @@ class Excitation final : public rtcf::Component {
         if (proposed[measured_lower] > proposed[measured_upper])
             return RTCF_FAIL(this, "measured_lower = {} is above measured_upper = {}",
                              proposed[measured_lower], proposed[measured_upper]);
-        if (const char* const error = frequencyError(waveOf(proposed[shape]), proposed[frequency_],
-                                                     proposed[end_frequency]))
-            return fail(error);
+        const Waveform next{waveOf(proposed[shape]),
+                            proposed[frequency_],
+                            proposed[end_frequency],
+                            proposed[duration],
+                            0.0,
+                            proposed[lines]};
+        if (const char* const error = next.frequencyError()) return fail(error);
+        const double component_hz = 1e9 / static_cast<double>(design_period_.proposed());
+        if (const std::string error = next.samplingError(component_hz); !error.empty()) {
+            const bool is_new = !is_configured_ || !next.hasFrequenciesOf(waveform());
+            if (is_new && next.shape != Shape::Prbs) return fail(error);
+            if (is_new || design_period_.proposed() != period()) RTCF_WARN(this, "{}", error);
+        }
         if (proposed[shape] == ExcitationShape::Multisine)
             peak_.stage(peakOfMultisine(proposed[lines]));
+        return true;
+    }
+
+    bool configure() override {
+        is_configured_ = true;
         return true;
     }
 
@@ -180,6 +201,7 @@ class Excitation final : public rtcf::Component {
         const bool stopped = stop_now.read() != rtcf::DataStatus::None && stop_now.value();
         age_ = renewed ? 0 : age_ + elapsed();
         if (runs()) {
+            since_ += elapsed();
             if (stopped || !wanted) {
                 set(Progress::Stopped);
             } else if (lease > 0.0 && age_ > nanoseconds(lease)) {
@@ -239,17 +261,17 @@ class Excitation final : public rtcf::Component {
         }
     }
 
-    WaveState wave() noexcept { return {time_.value(), phase_.value(), register_.value()}; }
+    WaveState wave() noexcept {
+        return {begun_.value(), time_.value(), phase_.value(), register_.value()};
+    }
+    Waveform waveform() const noexcept {
+        return {waveOf(shape), frequency_, end_frequency, duration, 0.0, lines, *peak_};
+    }
 
     void excite(double command) {
         double unit = 0.0;
-        if (since_ >= nanoseconds(delay)) {
-            const Waveform form{waveOf(shape), frequency_, end_frequency, duration,
-                                0.0,           lines,      *peak_};
-            unit = shape == ExcitationShape::Relay ? relay() : wave().value(form);
-            wave().advance(form, elapsed());
-        }
-        since_ += elapsed();
+        if (since_ >= nanoseconds(delay))
+            unit = shape == ExcitationShape::Relay ? relay() : wave().next(waveform(), elapsed());
         const double from = mode == ExcitationMode::Add ? command : base_.value();
         const double value = std::clamp(from + amplitude * unit, lower.value(), upper.value());
         out.write(value);

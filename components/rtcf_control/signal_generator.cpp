@@ -1,8 +1,10 @@
 #include <algorithm>
 #include <cstdint>
 #include <limits>
+#include <string>
 
 #include <rtcf/component.hpp>
+#include <rtcf/design_period.hpp>
 
 #include "waveform.hpp"
 
@@ -70,20 +72,35 @@ class SignalGenerator final : public rtcf::Component {
                                   rtcf::Doc("lower limit of the output")};
     rtcf::Parameter<double> upper{this, "upper", kInfinity, rtcf::Doc("upper limit of the output")};
 
+    rtcf::State<bool> begun_{this, "begun", false, rtcf::Doc("the signal runs")};
     rtcf::State<std::int64_t> time_{this, "time", 0, rtcf::Unit("ns"),
                                     rtcf::Doc("time since the signal began")};
     rtcf::State<double> phase_{this, "phase", 0.0, rtcf::Doc("phase of the wave, from 0 to 1")};
-    rtcf::State<std::uint32_t> register_{this, "register", 1, rtcf::Doc("shift register of PRBS")};
+    rtcf::State<std::uint32_t> register_{this, "register", kPrbsStart,
+                                         rtcf::Doc("shift register of PRBS")};
     rtcf::Derived<double> peak_{this, 1.0};  // of the multisine
+    rtcf::DesignPeriod design_period_{this};
+    bool is_configured_ = false;
 
     bool prepare(const rtcf::Values& proposed) override {
         if (proposed[lower] > proposed[upper])
             return RTCF_FAIL(this, "lower = {} is above upper = {}", proposed[lower],
                              proposed[upper]);
-        if (const char* const error =
-                frequencyError(proposed[shape], proposed[frequency_], proposed[end_frequency]))
-            return fail(error);
+        const Waveform next{proposed[shape],    proposed[frequency_], proposed[end_frequency],
+                            proposed[duration], proposed[delay],      proposed[lines]};
+        if (const char* const error = next.frequencyError()) return fail(error);
+        const double component_hz = 1e9 / static_cast<double>(design_period_.proposed());
+        if (const std::string error = next.samplingError(component_hz); !error.empty()) {
+            const bool is_new = !is_configured_ || !next.hasFrequenciesOf(waveform());
+            if (is_new && next.shape != Shape::Prbs) return fail(error);
+            if (is_new || design_period_.proposed() != period()) RTCF_WARN(this, "{}", error);
+        }
         if (proposed[shape] == Shape::Multisine) peak_.stage(peakOfMultisine(proposed[lines]));
+        return true;
+    }
+
+    bool configure() override {
+        is_configured_ = true;
         return true;
     }
 
@@ -102,9 +119,7 @@ class SignalGenerator final : public rtcf::Component {
             write(0.0);
             return;
         }
-        const Waveform signal = waveform();
-        write(amplitude * wave().value(signal));
-        wave().advance(signal, elapsed());
+        write(amplitude * wave().next(waveform(), elapsed()));
     }
 
     void restart() { wave().restart(); }
@@ -115,7 +130,9 @@ class SignalGenerator final : public rtcf::Component {
         out.write(std::clamp(value, lower.value(), upper.value()));
     }
 
-    WaveState wave() noexcept { return {time_.value(), phase_.value(), register_.value()}; }
+    WaveState wave() noexcept {
+        return {begun_.value(), time_.value(), phase_.value(), register_.value()};
+    }
 
     Waveform waveform() const noexcept {
         return {shape, frequency_, end_frequency, duration, delay, lines, *peak_};

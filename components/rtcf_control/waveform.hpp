@@ -6,6 +6,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <string>
+
+#include <rtcf/component.hpp>
 
 namespace rtcf_control {
 
@@ -15,6 +18,9 @@ enum class Shape { Step, Ramp, Sine, Square, Triangle, LinearChirp, LogChirp, Pr
 constexpr double kTurn = 6.28318530717958647692;  ///< 2 pi
 /// Phases closer than this to an edge count as on it: sums of rounded steps miss it by less.
 constexpr double kPhaseTolerance = 1e-9;
+/// First state of the shift register of PRBS: of all states, the one from which the sum of the
+/// first n bits stays within the square root of n for the longest time, 25808 bits.
+constexpr std::uint32_t kPrbsStart = 0x1DF7;
 
 /// The sum of `lines` sines, multiples of the frequency, with the phases of Schroeder (Synthesis of
 /// low-peak-factor signals, IEEE Transactions on Information Theory, 1970), which keep its peak
@@ -35,12 +41,6 @@ inline double peakOfMultisine(int lines) {
     return peak;
 }
 
-/// Reason why the frequencies of a signal do not fit its form; null if they do.
-inline const char* frequencyError(Shape shape, double frequency, double end_frequency) noexcept {
-    const bool is_wrong = shape == Shape::LogChirp && (frequency <= 0.0 || end_frequency <= 0.0);
-    return is_wrong ? "log_chirp: frequency and end_frequency must be above 0 Hz" : nullptr;
-}
-
 /// Nanoseconds of a time in s.
 inline std::int64_t nanoseconds(double seconds) noexcept { return std::llround(seconds * 1e9); }
 
@@ -56,6 +56,43 @@ struct Waveform {
 
     bool chirps() const noexcept { return shape == Shape::LinearChirp || shape == Shape::LogChirp; }
 
+    /// Whether another signal has the same frequencies.
+    bool hasFrequenciesOf(const Waveform& other) const noexcept {
+        return shape == other.shape && frequency == other.frequency &&
+               end_frequency == other.end_frequency && lines == other.lines;
+    }
+
+    /// Why the frequencies do not fit the shape; null if they do.
+    const char* frequencyError() const noexcept {
+        const bool is_wrong =
+            shape == Shape::LogChirp && (frequency <= 0.0 || end_frequency <= 0.0);
+        return is_wrong ? "log_chirp: frequency and end_frequency must be above 0 Hz" : nullptr;
+    }
+
+    /// Why a component with this frequency, Hz, cannot play the signal: sampled values alias above
+    /// half of it. Empty if it can. Not real-time safe.
+    std::string samplingError(double component_hz) const {
+        double highest = frequency;
+        double limit = component_hz / 2.0;
+        if (shape == Shape::Step || shape == Shape::Ramp) return {};
+        if (shape == Shape::Prbs) {
+            if (frequency <= component_hz * (1.0 + kPhaseTolerance)) return {};
+            return fmt::format(
+                "a PRBS of {} bits per second has one bit per cycle here, {} per second: lower "
+                "frequency, or raise the loop's",
+                frequency, component_hz);
+        }
+        if (chirps()) highest = std::max(frequency, end_frequency);
+        if (shape == Shape::Multisine) highest = frequency * lines;
+        // A square wave of half the component's frequency changes its sign in each cycle.
+        if (shape == Shape::Square) limit *= 1.0 + kPhaseTolerance;
+        if (highest < limit) return {};
+        return fmt::format(
+            "the highest frequency of the signal, {} Hz, is not below {} Hz, half of the "
+            "component's: lower frequency, end_frequency or lines, or raise the loop's frequency",
+            highest, component_hz / 2.0);
+    }
+
     /// Turns of a chirp from its start to a time, s. Real-time safe.
     double turns(double time) const noexcept {
         if (shape == Shape::LinearChirp)
@@ -68,17 +105,26 @@ struct Waveform {
 
 /// A running signal: refers to the state of its component. All functions are real-time safe.
 struct WaveState {
-    std::int64_t& time;   ///< ns since the signal began
+    bool& begun;          ///< the first value has been played
+    std::int64_t& time;   ///< of the last value, ns since the signal began
     double& phase;        ///< of the wave, 0 to 1
     std::uint32_t& bits;  ///< shift register of PRBS
 
     void restart() const noexcept {
+        begun = false;
         time = 0;
         phase = 0.0;
-        bits = 1U;
+        bits = kPrbsStart;
     }
 
-    /// Value of the signal in this cycle, between -1 and 1.
+    /// Value of the signal in this cycle, `elapsed` ns after the last one, between -1 and 1.
+    double next(const Waveform& wave, std::int64_t elapsed) const noexcept {
+        if (begun) advance(wave, elapsed);
+        begun = true;
+        return value(wave);
+    }
+
+   private:
     double value(const Waveform& wave) const noexcept {
         const std::int64_t since = time - nanoseconds(wave.delay);
         switch (wave.shape) {
@@ -103,7 +149,7 @@ struct WaveState {
         return 0.0;
     }
 
-    /// Moves to the next cycle, `elapsed` ns later. A chirp begins again at its end.
+    // A chirp begins again at its end.
     void advance(const Waveform& wave, std::int64_t elapsed) const noexcept {
         const double before = 1e-9 * static_cast<double>(time);
         time += elapsed;
@@ -120,7 +166,7 @@ struct WaveState {
         if (wave.shape == Shape::Prbs && whole > 0.0) {
             const std::uint32_t bit = ((bits >> 14U) ^ (bits >> 13U)) & 1U;
             bits = ((bits << 1U) | bit) & 0x7FFFU;
-            if (bits == 0U) bits = 1U;
+            if (bits == 0U) bits = kPrbsStart;
         }
     }
 };

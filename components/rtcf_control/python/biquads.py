@@ -18,7 +18,7 @@ class Kind(enum.IntEnum):
 
 class Biquad(Component):
     """Second-order section by the pre-warped bilinear transform (Oppenheim & Schafer, Discrete-Time
-    Signal Processing, 2010, chapter 7). Begins settled at its first value.
+    Signal Processing, 2010, chapter 7), the trapezoidal rule. Begins settled at its first value.
     """
 
     u: Input[float]
@@ -26,22 +26,23 @@ class Biquad(Component):
     kind: Parameter[Kind] = Parameter(Kind.lowpass)
     f: Parameter[float] = Parameter(50.0, min=1e-3, unit="Hz", doc="frequency of the section")
     q: Parameter[float] = Parameter(math.sqrt(0.5), min=1e-6, max=1e6, doc="quality")
-    inputs: State[np.float64, 2]
-    outputs: State[np.float64, 2]
+    value: State[float] = State(0.0, doc="the input, filtered by the poles")
+    rate: State[float] = State(0.0, doc="its derivative, per radian at f")
+    acceleration: State[float] = State(0.0, doc="its second derivative")
+    step: State[int] = State(0, unit="ns", doc="time from the last value to this one")
     begun: State[bool]
 
     def start(self):
         self.begun = False
 
-    def analog(self):
-        """Return the numerator of the section, in powers of s / (2 pi f)."""
-        if self.kind is Kind.lowpass:
-            return 1.0, 0.0, 0.0
-        if self.kind is Kind.highpass:
-            return 0.0, 0.0, 1.0
-        if self.kind is Kind.bandpass:
-            return 0.0, 1.0 / self.q, 0.0
-        return 1.0, 0.0, 1.0
+    def damping(self, k, step, highest):
+        """Return the damping of the poles. The gain of a bandpass or notch is 1 / sqrt(2) at two
+        frequencies that differ by f / q, as in Orfanidis, Introduction to Signal Processing, 1996,
+        section 11.3.
+        """
+        if self.kind is Kind.lowpass or self.kind is Kind.highpass:
+            return 1.0 / self.q
+        return math.tan(math.pi * min(self.f / self.q, highest) * step) * (1.0 + k * k) / k
 
     def update(self):
         self.run()
@@ -56,23 +57,33 @@ class Biquad(Component):
         if not math.isfinite(x):
             self.y.write(x)  # rejected as not finite: readers keep the last output
             return
-        b0, b1, b2 = self.analog()
-        k = math.tan(math.pi * min(self.f, 0.49 * self.frequency) / self.frequency)
-        scale = 1.0 + k / self.q + k * k
         if not self.begun:
-            self.inputs[:] = x
-            self.outputs[:] = x * b0
+            self.value = x
+            self.rate = 0.0
+            self.acceleration = 0.0
+            self.step = self.period
             self.begun = True
-        y = (
-            (b2 + b1 * k + b0 * k * k) / scale * x
-            + 2.0 * (b0 * k * k - b2) / scale * self.inputs[0]
-            + (b2 - b1 * k + b0 * k * k) / scale * self.inputs[1]
-            - 2.0 * (k * k - 1.0) / scale * self.outputs[0]
-            - (1.0 - k / self.q + k * k) / scale * self.outputs[1]
-        )
+        step = 1e-9 * self.step
+        highest = 0.49 / step
+        k = math.tan(math.pi * min(self.f, highest) * step)
+        damping = self.damping(k, step, highest)
+        value = self.value + k * self.rate
+        rate = self.rate + k * self.acceleration
+        acceleration = (x - value - (damping + k) * rate) / (1.0 + damping * k + k * k)
+        rate += k * acceleration
+        value += k * rate
+        y = value
+        if self.kind is Kind.highpass:
+            y = acceleration
+        elif self.kind is Kind.bandpass:
+            y = damping * rate
+        elif self.kind is Kind.notch:
+            y = value + acceleration
         self.y.write(y)
-        if math.isfinite(y):
-            self.inputs[1] = self.inputs[0]
-            self.inputs[0] = x
-            self.outputs[1] = self.outputs[0]
-            self.outputs[0] = y
+        if not math.isfinite(y):
+            return
+        self.value = value
+        self.rate = rate
+        self.acceleration = acceleration
+        # A cycle in which the period changes is still the previous period after the last one.
+        self.step = self.period

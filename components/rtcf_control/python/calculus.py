@@ -7,6 +7,7 @@ import numpy as np
 from rtcf.component import Component, Input, Output, Parameter, State
 
 LONGEST = 1000  # cycles
+HELD = 2.0  # intervals for which a rate is held
 
 
 class Method(enum.IntEnum):
@@ -79,7 +80,8 @@ class Derivative(_Block):
     )
     rate: State[float] = State(0.0, unit="1/s")
     last: State[float | None]
-    gap: State[float] = State(0.0, unit="s", doc="time without a finite input")
+    gap: State[float] = State(0.0, unit="s", doc="time without a new finite input")
+    interval: State[float] = State(0.0, unit="s", doc="time between the last two new inputs")
 
     def start(self):
         self.rate = 0.0
@@ -94,10 +96,14 @@ class Derivative(_Block):
             self.gap += self.dt
             self.y.write(value)  # rejected as not finite: readers keep the last output
             return
+        if self.last is not None and not self.u.new:
+            self.hold()
+            return
         if self.last is not None:
             self.rate = (self.filter_time * self.rate + value - self.last) / (
                 self.filter_time + self.gap + self.dt
             )
+            self.interval = self.gap + self.dt
         self.y.write(self.gain * self.rate)
         self.gap = 0.0
         if math.isfinite(self.rate):
@@ -105,6 +111,16 @@ class Derivative(_Block):
         else:
             self.last = None  # overflow, which the filter would keep
             self.rate = 0.0
+
+    def hold(self):
+        """Keep the rate for as long as a slow source may take, also if one of its values is lost.
+        Then the rate falls as 1 / time: a later value would not have changed by more.
+        """
+        before = self.gap
+        self.gap += self.dt
+        if self.gap > HELD * self.interval:
+            self.rate *= max(before, HELD * self.interval) / self.gap
+        self.y.write(self.gain * self.rate)
 
 
 class MovingAverage(_Block):

@@ -9,6 +9,9 @@ from rtcf.component import Component, Derived, Input, Output, Parameter, State
 TURN = 2.0 * math.pi
 # Phases closer than this to an edge count as on it: sums of rounded steps miss it by less.
 PHASE_TOLERANCE = 1e-9
+# First state of the shift register of PRBS: of all states, the one from which the sum of the first
+# n bits stays within the square root of n for the longest time, 25808 bits.
+PRBS_START = 0x1DF7
 
 
 class Shape(enum.IntEnum):
@@ -119,9 +122,10 @@ class Excitation(Component):
     base: State[float] = State(0.0, doc="u at the begin")
     reference: State[float] = State(0.0, doc="measured at the begin")
     high: State[bool] = State(True, doc="the relay is at amplitude")
+    playing: State[bool] = State(False, doc="the signal has begun")
     played: State[int] = State(0, unit="ns", doc="time since the signal began")
     phase: State[float] = State(0.0, doc="phase of the wave, from 0 to 1")
-    bits: State[int] = State(1, doc="shift register of PRBS")
+    bits: State[int] = State(PRBS_START, doc="shift register of PRBS")
     peak: Derived[float]  # of the multisine
 
     def prepare(self):
@@ -192,9 +196,10 @@ class Excitation(Component):
             self.reference = self.measured.value if self.measured.valid else 0.0
             self.high = True
             self.since = 0
+            self.playing = False
             self.played = 0
             self.phase = 0.0
-            self.bits = 1
+            self.bits = PRBS_START
 
     def relay(self):
         """Return 1 or -1: switch when the measured value has left its first value."""
@@ -231,7 +236,7 @@ class Excitation(Component):
         return self.frequency_hz * self.duration / ratio * grown
 
     def advance(self):
-        """Move the wave to the next cycle. A chirp begins again at its end."""
+        """Move the wave to this cycle. A chirp begins again at its end."""
         before = 1e-9 * self.played
         self.played += self.elapsed
         if self.shape is Shape.linear_chirp or self.shape is Shape.log_chirp:
@@ -249,7 +254,7 @@ class Excitation(Component):
             bit = ((self.bits >> 14) ^ (self.bits >> 13)) & 1
             self.bits = ((self.bits << 1) | bit) & 0x7FFF
             if self.bits == 0:
-                self.bits = 1
+                self.bits = PRBS_START
 
     def send(self, value, signal):
         """Write all outputs."""
@@ -265,6 +270,7 @@ class Excitation(Component):
         stopped = self.stop_now.valid and self.stop_now.value
         self.silence = 0 if renewed else self.silence + self.elapsed
         if self.progress is Progress.running:
+            self.since += self.elapsed
             if stopped or not wanted:
                 self.progress = Progress.stopped
             elif self.lease > 0.0 and self.silence > nanoseconds(self.lease):
@@ -281,9 +287,10 @@ class Excitation(Component):
             return
         unit = 0.0
         if self.since >= nanoseconds(self.delay):
+            if self.playing:
+                self.advance()
+            self.playing = True
             unit = self.wave()
-            self.advance()
-        self.since += self.elapsed
         base = command if self.mode is Mode.add else self.base
         value = np.clip(base + self.amplitude * unit, self.lower, self.upper)
         self.send(value, value - base)

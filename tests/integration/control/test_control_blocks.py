@@ -617,3 +617,18 @@ def test_a_delay_that_a_faster_loop_makes_too_long_is_reported(stepped: Bench) -
     finally:
         block.unload()
         stepped.client.set_runner(runner_pb2.RunnerSettings(frequency_hz=1000))
+
+
+def test_a_derivative_of_a_slow_source_has_no_spikes(stepped: Bench) -> None:
+    block = Stepped(stepped, "Derivative")
+    try:
+        found = []
+        for k in range(10):  # a ramp of 1/s at 100 Hz in a loop of 1 kHz
+            found.append(block.step(**{"in": 0.01 * k})["rate"])
+            found += [block.step()["rate"] for _ in range(9)]
+        assert found[11:] == pytest.approx([1.0] * 89)
+        # The source stops: the rate is held for two of its intervals, then falls.
+        assert block.step(11)["rate"] == pytest.approx(1.0)
+        assert block.step(20)["rate"] == pytest.approx(0.5)
+    finally:
+        block.unload()

@@ -17,6 +17,7 @@ from block_bench import Blocks, Stepped, rejection
 from hypothesis import given, seed, settings
 from hypothesis import strategies as st
 from rtcf.testing import Bench
+from rtcf.v1 import runner_pb2
 from scipy import signal
 
 DT = 0.001
@@ -219,3 +220,58 @@ def test_a_stop_writes_the_offset(stepped: Bench) -> None:
         assert float(last.value) == 0.5
     finally:
         client.unload(["/end/source", "/end/limiter"])
+
+
+@pytest.mark.parametrize("bits", [100, 200, 400, 1000])
+def test_the_first_bits_of_prbs_have_a_small_mean(blocks: Blocks, bits: int) -> None:
+    found = wave(blocks, "prbs", steps=bits, frequency=1000.0)
+    assert abs(found.mean()) <= 1.0 / np.sqrt(bits)
+
+
+@pytest.mark.parametrize(
+    ("parameters", "said"),
+    [
+        ({"shape": "sine", "frequency": 500.0}, "500 Hz, is not below 500 Hz"),
+        ({"shape": "square", "frequency": 501.0}, "501 Hz, is not below 500 Hz"),
+        ({"shape": "triangle", "frequency": 900.0}, "900 Hz, is not below 500 Hz"),
+        ({"shape": "linear_chirp", "end_frequency": 800.0}, "800 Hz, is not below 500 Hz"),
+        ({"shape": "log_chirp", "frequency": 600.0}, "600 Hz, is not below 500 Hz"),
+        ({"shape": "multisine", "lines": 64, "frequency": 20.0}, "1280 Hz, is not below 500 Hz"),
+    ],
+)
+@pytest.mark.parametrize("type_", ["SignalGenerator", "Excitation"])
+def test_frequencies_that_alias_are_rejected_with_one_line(
+    stepped: Bench, type_: str, parameters: dict[str, Any], said: str
+) -> None:
+    if type_ == "Excitation" and parameters["shape"] in ("sine", "square", "triangle"):
+        pytest.skip("Excitation has no such shape")
+    with rejection(said):
+        Stepped(stepped, type_, **parameters)
+
+
+def test_a_slower_loop_reports_a_frequency_that_aliases_once(stepped: Bench) -> None:
+    block = Stepped(stepped, "SignalGenerator", shape="sine", frequency=400.0)
+    try:
+        block.step(3)
+        stepped.client.set_runner(runner_pb2.RunnerSettings(frequency_hz=500))
+        block.step(20)
+        text = [line for line in stepped.logs if "400 Hz, is not below 250 Hz" in line]
+        assert len(text) == 1
+    finally:
+        block.unload()
+        stepped.client.set_runner(runner_pb2.RunnerSettings(frequency_hz=1000))
+
+
+@pytest.mark.parametrize("other", [500.0, 4000.0])
+def test_the_phase_continues_at_another_frequency_of_the_loop(stepped: Bench, other: float) -> None:
+    block = Stepped(stepped, "SignalGenerator", shape="sine", frequency=5.0)
+    try:
+        before = block.step(10)["phase"]
+        stepped.client.set_runner(runner_pb2.RunnerSettings(frequency_hz=other))
+        # The first cycle comes one old period after the last one, each other one new period.
+        first = block.step()["phase"]
+        assert first - before == pytest.approx(5.0 * 0.001, abs=ROUNDING)
+        assert block.step()["phase"] - first == pytest.approx(5.0 / other, abs=ROUNDING)
+    finally:
+        block.unload()
+        stepped.client.set_runner(runner_pb2.RunnerSettings(frequency_hz=1000))
