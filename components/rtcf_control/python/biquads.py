@@ -3,7 +3,6 @@
 import enum
 import math
 
-import numpy as np
 from rtcf.component import Component, Input, Output, Parameter, State
 
 
