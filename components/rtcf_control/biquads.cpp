@@ -265,6 +265,8 @@ class Biquads final : public rtcf::Component {
             out.write(x);  // rejected as not finite: readers keep the last output
             return;
         }
+        // The last cycle may be a new period ago, or still an old one, as in a running loop.
+        if (begun_ && period_ != period() && elapsed() == period()) design();
         if (!begun_) {
             begin(x);
         } else if (identity_ != analog_->identity) {
@@ -278,7 +280,6 @@ class Biquads final : public rtcf::Component {
         motion_ = next;
         last_ = filtered;
         output_ = y;
-        // The cycle in which the period changes is still the previous period after the last one.
         if (period_ != period()) design();
         if (fading_ <= 0.0) return;
         const double left = fading_ - dt();

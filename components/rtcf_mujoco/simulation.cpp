@@ -1,8 +1,10 @@
 #include <mujoco/mujoco.h>
+#include <pthread.h>
 #include <sensor_msgs/JointState.h>
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cctype>
 #include <cmath>
 #include <cstddef>
@@ -24,20 +26,49 @@ using Vector6 = Eigen::Matrix<double, 6, 1>;
 
 // MuJoCo's handlers are global. Its own ones end the process, and write a file into its folder.
 [[noreturn]] void onError(const char* text) { throw std::runtime_error(text); }
-void onWarning(const char* /*text*/) {}  // counted in mjData::warning
+
+// Collects the warnings of its thread. Those of a step, in the real-time thread, are counted in
+// mjData::warning. Only one thread loads models.
+class Warnings {
+   public:
+    Warnings() {
+        text_.clear();
+        thread_ = pthread_self();
+    }
+    ~Warnings() { thread_ = 0; }
+    Warnings(const Warnings&) = delete;
+    Warnings& operator=(const Warnings&) = delete;
+
+    static void add(const char* text) {
+        if (thread_ == pthread_self()) text_.append(text_.empty() ? "" : " ").append(text);
+    }
+    const std::string& text() const noexcept { return text_; }
+
+   private:
+    static inline std::atomic<pthread_t> thread_{0};
+    static inline std::string text_;
+};
 
 // A model as configure() loads it, with the data of one simulation.
 class Model {
    public:
-    /// @throws std::runtime_error with one line, if the file is missing or no valid MJCF
+    /// @throws std::runtime_error with one line, if the file is missing, no valid MJCF, or has NaN,
+    /// which MuJoCo takes as a value that is not given
     explicit Model(const std::string& file) {
+        const Warnings warnings;
         std::string error(1000, '\0');
         model_.reset(
             mj_loadXML(file.c_str(), nullptr, error.data(), static_cast<int>(error.size())));
-        if (model_ == nullptr) throw std::runtime_error(oneLine(error.substr(0, error.find('\0'))));
+        error.resize(error.find('\0'));
+        if (model_ == nullptr) throw std::runtime_error(oneLine(error));
+        warning_ = oneLine(error + warnings.text());
+        if (warning_.find("NaN") != std::string::npos) throw std::runtime_error(warning_);
         data_.reset(mj_makeData(model_.get()));
         if (data_ == nullptr) throw std::runtime_error("no memory for its data");
     }
+
+    /// What MuJoCo warned of while it loaded the model, on one line; empty if nothing
+    const std::string& warning() const noexcept { return warning_; }
 
     mjModel* operator->() const noexcept { return model_.get(); }
     mjModel* get() const noexcept { return model_.get(); }
@@ -63,6 +94,7 @@ class Model {
         void operator()(mjModel* model) const { mj_deleteModel(model); }
         void operator()(mjData* data) const { mj_deleteData(data); }
     };
+    std::string warning_;
     std::unique_ptr<mjModel, Delete> model_;
     std::unique_ptr<mjData, Delete> data_;
 };
@@ -441,9 +473,10 @@ class Simulation final : public rtcf::Component {
         if (!std::filesystem::path(file).is_absolute())
             return RTCF_FAIL(this, "parameter model = {} is no absolute path", file);
         mju_user_error = onError;
-        mju_user_warning = onWarning;
+        mju_user_warning = Warnings::add;
         try {
             Model loaded(file);
+            if (!loaded.warning().empty()) RTCF_WARN(this, "model {}: {}", file, loaded.warning());
             const int key = keyframe.value().empty() ? -1 : loaded.find(mjOBJ_KEY, keyframe);
             if (key < 0 && !keyframe.value().empty())
                 return RTCF_FAIL(this, "parameter keyframe = {}: {} has no such keyframe",

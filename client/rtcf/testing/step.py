@@ -26,6 +26,8 @@ class StepResponse:
     """The maximum distance beyond the target, as a fraction of the step; 0 without overshoot."""
     final_error: float
     """The target minus the last value, in units of the value."""
+    unsettled: str = ""
+    """Why the settling time is infinite; empty if it is finite."""
 
 
 def step_response(
@@ -63,26 +65,40 @@ def step_response(
         raise ValueError("tolerance must be a fraction of the step between 0 and 1")
     share = (values - initial) / (target - initial)
     since = seconds - seconds[0]
+    settling_time, unsettled = _settling(since, np.abs(share - 1) <= tolerance)
     return StepResponse(
         rise_time=_first(since, share, 0.9) - _first(since, share, 0.1)
         if share.max() >= 0.9
         else float("inf"),
-        settling_time=_settling_time(since, np.abs(share - 1) <= tolerance),
+        settling_time=settling_time,
         overshoot=max(0.0, float(share.max()) - 1),
         final_error=float(target - values[-1]),
+        unsettled=unsettled,
     )
 
 
-def _settling_time(time: npt.NDArray[np.float64], inside: npt.NDArray[np.bool_]) -> float:
-    """Return the begin of the last stay inside, or infinity if it is too short."""
+def _settling(
+    time: npt.NDArray[np.float64], inside: npt.NDArray[np.bool_]
+) -> tuple[float, str]:
+    """Return the begin of the last stay inside, or infinity and why it does not count."""
+    if not inside[-1]:
+        return float("inf"), "the last value is outside the tolerance"
     edges = np.flatnonzero(np.diff(inside)) + 1
     begins = np.append(0, edges) if inside[0] else edges
     begins, ends = begins[::2], begins[1::2]
-    if not inside[-1]:
-        return float("inf")
     earlier = float((time[ends] - time[begins[:-1]]).max(initial=0.0))
-    begin, end = float(time[begins[-1]]), float(time[-1])
-    return begin if end - begin >= max(_SHORTEST * end, 2.0 * earlier) else float("inf")
+    begin = float(time[begins[-1]])
+    stay = float(time[-1]) - begin
+    if stay < _SHORTEST * time[-1]:
+        return float("inf"), (
+            f"the value is within the tolerance for the last {stay:.3g} s only: measure for longer"
+        )
+    if stay < 2.0 * earlier:
+        return float("inf"), (
+            f"the value leaves the tolerance again: it stays for {stay:.3g} s at the end, and has "
+            f"stayed for {earlier:.3g} s before"
+        )
+    return begin, ""
 
 
 def _first(

@@ -149,6 +149,9 @@ def _print(
     ]
     columns = ("step", "before", "after") if len(found) > 1 else ("step", "now")
     output.table(columns, rows, columns[1:])
+    for title, (_, measures) in zip(columns[1:], found, strict=False):
+        if measures.unsettled:
+            output.line(f"{title}, settling time: {measures.unsettled}")
     for title, ((time, value), _) in zip(columns[1:], found, strict=True):
         output.line("")
         ends = {0.0: "0 s", 1.0: f"{time[-1]:.3g} s"}

@@ -148,6 +148,7 @@ class GravityCompensation final : public rtcf::Component {
         try {
             chain_ = std::make_unique<RobotChain>(text, setup_->selection);
         } catch (const std::exception& error) {
+            if (isFile()) return RTCF_FAIL(this, "{}: {}", setup_->urdf, error.what());
             return fail("{}", error.what());
         }
         own_identity_ = std::make_unique<const Identity>(identityOf(text));
@@ -185,11 +186,15 @@ class GravityCompensation final : public rtcf::Component {
 
     std::size_t count() const noexcept { return chain_->joints().size(); }
 
+    bool isFile() const {
+        return !setup_->urdf.empty() && setup_->urdf.find('<') == std::string::npos;
+    }
+
     // Reads the text of the URDF.
     bool read(std::string& text) {
         const std::string& source = setup_->urdf;
         if (source.empty()) return readParameter(text);
-        if (source.find('<') != std::string::npos) {
+        if (!isFile()) {
             text = source;
             return true;
         }

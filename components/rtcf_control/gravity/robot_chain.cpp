@@ -24,29 +24,34 @@ template <typename... Arguments>
     throw std::runtime_error(fmt::vformat(text, fmt::make_format_args(arguments...)));
 }
 
-// Keeps the first error that urdfdom logs, instead of printing it. Logging is global: one thread
+// Keeps the errors that urdfdom logs, instead of printing them. Logging is global: one thread
 // configures components.
-class FirstError final : public console_bridge::OutputHandler {
+class Errors final : public console_bridge::OutputHandler {
    public:
-    FirstError() { console_bridge::useOutputHandler(this); }
-    ~FirstError() override { console_bridge::restorePreviousOutputHandler(); }
-    FirstError(const FirstError&) = delete;
-    FirstError& operator=(const FirstError&) = delete;
+    Errors() { console_bridge::useOutputHandler(this); }
+    ~Errors() override { console_bridge::restorePreviousOutputHandler(); }
+    Errors(const Errors&) = delete;
+    Errors& operator=(const Errors&) = delete;
 
     void log(const std::string& text, console_bridge::LogLevel level, const char* /*file*/,
              int /*line*/) override {
-        if (level < console_bridge::CONSOLE_BRIDGE_LOG_ERROR || !text_.empty()) return;
-        text_ = text;
+        if (level < console_bridge::CONSOLE_BRIDGE_LOG_ERROR || count_ == kMost) return;
+        if (!text_.empty()) text_ += "; ";
+        ++count_;
+        text_ += text;
         std::replace(text_.begin(), text_.end(), '\n', ' ');
     }
     const std::string& text() const { return text_; }
 
    private:
+    static constexpr int kMost = 3;  // the value, its element, and the link
+    int count_ = 0;
     std::string text_;
 };
 
+// urdfdom leaves out an element that it cannot read, logs the error and still returns the model.
 urdf::ModelInterfaceSharedPtr parse(const std::string& text) {
-    FirstError error;
+    Errors errors;
     urdf::ModelInterfaceSharedPtr model;
     std::string why;
     try {
@@ -54,8 +59,8 @@ urdf::ModelInterfaceSharedPtr parse(const std::string& text) {
     } catch (const std::exception& thrown) {
         why = thrown.what();
     }
-    if (model != nullptr && model->getRoot() != nullptr) return model;
-    if (!error.text().empty()) why = error.text();
+    if (model != nullptr && model->getRoot() != nullptr && errors.text().empty()) return model;
+    if (!errors.text().empty()) why = errors.text();
     reject("the URDF cannot be read: {}", why.empty() ? "it describes no robot" : why);
 }
 
@@ -73,6 +78,11 @@ KDL::RigidBodyInertia inertiaOf(const urdf::Link& link) {
     const double mass = link.inertial->mass;
     if (!std::isfinite(mass) || mass < 0.0)
         reject("link {}: its mass {} is not finite and 0 or above", link.name, mass);
+    for (const double moment : {link.inertial->ixx, link.inertial->iyy, link.inertial->izz}) {
+        if (!std::isfinite(moment) || moment < 0.0)
+            reject("link {}: its moment of inertia {} is not finite and 0 or above", link.name,
+                   moment);
+    }
     return KDL::RigidBodyInertia(mass, frameOf(link.inertial->origin).p);
 }
 

@@ -62,6 +62,8 @@ class Biquad(Component):
             self.acceleration = 0.0
             self.step = self.period
             self.begun = True
+        elif round(1e9 * self.dt) == self.period:
+            self.step = self.period
         step = 1e-9 * self.step
         highest = 0.49 / step
         k = math.tan(math.pi * min(self.f, highest) * step)
@@ -84,5 +86,5 @@ class Biquad(Component):
         self.value = value
         self.rate = rate
         self.acceleration = acceleration
-        # A cycle in which the period changes is still the previous period after the last one.
+        # The last cycle may be a new period ago, or still an old one, as in a running loop.
         self.step = self.period

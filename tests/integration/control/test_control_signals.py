@@ -27,6 +27,10 @@ TIME = np.arange(5000) * DT
 SHAPES = (
     "step", "ramp", "sine", "square", "triangle", "linear_chirp", "log_chirp", "prbs", "multisine",
 )  # fmt: skip
+PERIODIC: dict[str, dict[str, Any]] = {
+    "SignalGenerator": {"shape": "sine"},
+    "Excitation": {"shape": "multisine", "lower": -1.0, "upper": 1.0},
+}
 
 
 @pytest.fixture(scope="module")
@@ -263,15 +267,19 @@ def test_a_slower_loop_reports_a_frequency_that_aliases_once(stepped: Bench) -> 
 
 
 @pytest.mark.parametrize("other", [500.0, 4000.0])
-def test_the_phase_continues_at_another_frequency_of_the_loop(stepped: Bench, other: float) -> None:
-    block = Stepped(stepped, "SignalGenerator", shape="sine", frequency=5.0)
+@pytest.mark.parametrize("type_", ["SignalGenerator", "Excitation"])
+def test_the_phase_continues_at_another_frequency_of_the_loop(
+    stepped: Bench, type_: str, other: float
+) -> None:
+    block = Stepped(stepped, type_, frequency=5.0, **PERIODIC[type_])
     try:
+        if type_ == "Excitation":
+            block.step(**{"run": False, "in": 0.0})
+            block.step(**{"run": True})
         before = block.step(10)["phase"]
         stepped.client.set_runner(runner_pb2.RunnerSettings(frequency_hz=other))
-        # The first cycle comes one old period after the last one, each other one new period.
-        first = block.step()["phase"]
-        assert first - before == pytest.approx(5.0 * 0.001, abs=ROUNDING)
-        assert block.step()["phase"] - first == pytest.approx(5.0 / other, abs=ROUNDING)
+        found = [before] + [block.step()["phase"] for _ in range(3)]
+        assert np.allclose(np.diff(found), 5.0 / other, rtol=0, atol=ROUNDING)
     finally:
         block.unload()
         stepped.client.set_runner(runner_pb2.RunnerSettings(frequency_hz=1000))

@@ -216,6 +216,9 @@ def test_every_kind_of_joint_tendon_and_sensor_has_a_port() -> None:
             "sensor wide has 5 values: only those with 1, 3 or 4 have a port type",
         ),
         ({"model": "{twice}"}, "port 'a_b' is declared twice"),
+        ({"model": "{nan}"}, "XML contains a 'NaN'"),
+        ({"model": "{negative}"}, "mass, inertia or density are negative"),
+        ({"model": "{unreadable}"}, "problem reading attribute 'mass'"),
     ],
 )
 def test_unsuitable_models_are_rejected_with_one_line(
@@ -229,6 +232,9 @@ def test_unsuitable_models_are_rejected_with_one_line(
         "user": f"<mujoco><worldbody/><sensor><user name='wide' dim='5' {user}/></sensor></mujoco>",
         "twice": f"<mujoco><worldbody>{joint}</worldbody><actuator>{motors}</actuator></mujoco>",
     }
+    for name, mass in (("nan", "nan"), ("negative", "-1"), ("unreadable", "abc")):
+        body = joint.replace("<geom", f"<geom mass='{mass}'")
+        texts[name] = f"<mujoco><worldbody>{body}</worldbody></mujoco>"
     for name, text in texts.items():
         (tmp_path / f"{name}.xml").write_text(text)
     given: dict[str, Any] = {"model": str(ARM), **parameters}

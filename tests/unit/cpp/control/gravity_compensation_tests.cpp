@@ -307,6 +307,30 @@ TEST(GravityCompensation, RejectsRobotsWithOneLine) {
     }
 }
 
+TEST(GravityCompensation, RejectsALinkThatTheLibraryLeavesOut) {
+    const std::string moments = "ixx='0' ixy='0' ixz='0' iyy='0' iyz='0' izz='0'";
+    const std::string mass = "<mass value='1'/>";
+    const std::vector<std::pair<std::string, std::string>> inertials{
+        {"<mass value='abc'/><inertia " + moments + "/>", "abc"},
+        {"<mass value=''/><inertia " + moments + "/>", "mass"},
+        {"<mass value='nan'/><inertia " + moments + "/>", "nan"},
+        {"<mass/><inertia " + moments + "/>", "mass"},
+        {"<inertia " + moments + "/>", "mass"},
+        {mass, "inertia"},
+        {mass + "<inertia ixx='1'/>", "inertia"},
+        {mass + "<inertia ixx='x' ixy='0' ixz='0' iyy='0' iyz='0' izz='0'/>", "inertia"},
+        {mass + "<inertia ixx='-1' ixy='0' ixz='0' iyy='0' iyz='0' izz='0'/>", "-1"},
+    };
+    for (const auto& [inertial, value] : inertials) {
+        const std::string found =
+            whyNot(robot(link("base") + "<link name='upper'><inertial>" + inertial +
+                         "</inertial></link>" + joint("j", "revolute", "base", "upper")));
+        EXPECT_NE(found.find("upper"), std::string::npos) << inertial << ": " << found;
+        EXPECT_NE(found.find(value), std::string::npos) << inertial << ": " << found;
+        EXPECT_EQ(found.find('\n'), std::string::npos) << found;
+    }
+}
+
 TEST(GravityCompensation, RejectsSelectionsWithOneLine) {
     const auto text = [](const char* value) { return std::string(value); };
     const std::vector<std::pair<Bench::Parameters, std::string>> cases{

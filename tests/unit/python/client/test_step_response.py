@@ -40,12 +40,18 @@ def test_a_response_that_never_settles_has_no_times() -> None:
 def test_a_limit_cycle_has_no_settling_time(amplitude: float, end: float) -> None:
     time = TIME[end >= TIME]
     value = 1 - np.exp(-5 * time) + amplitude * np.sin(2 * time)
-    assert step_response(time, value, target=1.0).settling_time == math.inf
+    measured = step_response(time, value, target=1.0)
+    assert measured.settling_time == math.inf
+    assert measured.unsettled
 
 
 def test_a_record_that_ends_in_a_crossing_has_no_settling_time() -> None:
     time = TIME[TIME <= 1.0]
-    assert step_response(time, time, target=1.0).settling_time == math.inf
+    measured = step_response(time, time, target=1.0)
+    assert measured.settling_time == math.inf
+    assert measured.unsettled == (
+        "the value is within the tolerance for the last 0.019 s only: measure for longer"
+    )
 
 
 def test_an_oscillation_that_decays_has_its_settling_time() -> None:
@@ -53,6 +59,7 @@ def test_an_oscillation_that_decays_has_its_settling_time() -> None:
     outside = np.abs(value - 1) > 0.02
     measured = step_response(TIME, value, target=1.0)
     assert measured.settling_time == TIME[np.flatnonzero(outside)[-1] + 1]
+    assert measured.unsettled == ""
 
 
 def test_a_response_that_begins_within_the_tolerance_settles_at_once() -> None:

@@ -1,0 +1,85 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <rtcf/test.hpp>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace rtcf::test {
+namespace {
+
+constexpr std::int64_t kFirst = 1'000'000;  // ns
+constexpr double kRounding = 1e-9;
+constexpr double kTurn = 6.28318530717958647692;
+
+// Runs a component with a period of 1 ms, then of another one. In a running loop, the first cycle
+// after the change still comes 1 ms after the last one; in a held loop, a new period.
+// @param check called after each cycle, with its time in s
+void changePeriod(Bench& bench, std::int64_t period, bool is_running, int cycles,
+                  const std::function<void(double)>& write,
+                  const std::function<void(double)>& check) {
+    std::int64_t time = 0;
+    for (int i = 0; i < 2 * cycles; ++i) {
+        const bool is_new = i >= cycles;
+        accessTo(bench.component()).context().period_ns = is_new ? period : kFirst;
+        bench.clock().period_ns = is_new ? period : kFirst;
+        bench.clock().elapsed_ns = is_new && (i > cycles || !is_running) ? period : kFirst;
+        if (i > 0) time += bench.clock().elapsed_ns;
+        write(1e-9 * static_cast<double>(time));
+        bench.cycle();
+        check(1e-9 * static_cast<double>(time));
+    }
+}
+
+struct PeriodChange : testing::TestWithParam<std::pair<std::int64_t, bool>> {};
+
+TEST_P(PeriodChange, KeepsTheTimeOfASignal) {
+    Bench bench("SignalGenerator", {{"frequency", 20.0}});
+    changePeriod(
+        bench, GetParam().first, GetParam().second, 100, [](double) {},
+        [&](double time) {
+            EXPECT_NEAR(*bench.read<double>("out"), std::sin(kTurn * 20.0 * time), kRounding);
+        });
+}
+
+// A section has exactly its response at its frequency, with any period.
+TEST_P(PeriodChange, KeepsTheResponseOfAFilterToAWave) {
+    const std::vector<std::pair<std::string, double>> sections{
+        {"lowpass 20 5", -5.0}, {"highpass 20 5", 5.0}, {"lowpass 20 0.7; highpass 20 3", 2.1}};
+    for (const auto& [text, gain] : sections) {
+        const bool is_single = text.find(';') == std::string::npos;
+        Bench bench("Biquads", {{"sections", text}});
+        changePeriod(
+            bench, GetParam().first, GetParam().second, 4000,
+            [&](double time) { bench.write("in", std::sin(kTurn * 20.0 * time)); },
+            [&, gain = gain](double time) {
+                if (time < 3.0) return;
+                const double turns = kTurn * 20.0 * time;
+                EXPECT_NEAR(*bench.read<double>("out"),
+                            gain * (is_single ? std::cos(turns) : std::sin(turns)), kRounding)
+                    << text << " at " << time;
+            });
+    }
+}
+
+TEST_P(PeriodChange, KeepsAConstantOutputExactly) {
+    Bench bench("Biquads", {{"sections", std::string("notch 50 5; bandpass 30 2; lowpass 9 3")}});
+    changePeriod(
+        bench, GetParam().first, GetParam().second, 50, [&](double) { bench.write("in", 2.5); },
+        [&](double) { EXPECT_EQ(*bench.read<double>("out"), 0.0); });
+    Bench passing("Biquads", {{"sections", std::string("notch 50 5; lead_lag 5 40; lowpass 9 3")}});
+    changePeriod(
+        passing, GetParam().first, GetParam().second, 50, [&](double) { passing.write("in", 2.5); },
+        [&](double) { EXPECT_EQ(*passing.read<double>("out"), 2.5); });
+}
+
+INSTANTIATE_TEST_SUITE_P(Loop, PeriodChange,
+                         testing::Values(std::pair{4'000'000, true}, std::pair{4'000'000, false},
+                                         std::pair{250'000, true}, std::pair{250'000, false},
+                                         std::pair{2'000'000, true}));
+
+}  // namespace
+}  // namespace rtcf::test
