@@ -167,8 +167,10 @@ class Excitation final : public rtcf::Component {
         const double component_hz = 1e9 / static_cast<double>(design_period_.proposed());
         if (const std::string error = next.samplingError(component_hz); !error.empty()) {
             const bool is_new = !is_configured_ || !next.hasFrequenciesOf(waveform());
-            if (is_new && next.shape != Shape::Prbs) return fail(error);
-            if (is_new || design_period_.proposed() != period()) RTCF_WARN(this, "{}", error);
+            if (is_new && next.shape != Shape::Prbs)
+                return RTCF_FAIL(this, "{}: {}", error, kSamplingAdvice);
+            if (is_new || design_period_.proposed() != period())
+                RTCF_WARN(this, "{}: {}", error, kSamplingAdvice);
         }
         if (proposed[shape] == ExcitationShape::Multisine)
             peak_.stage(peakOfMultisine(proposed[lines]));

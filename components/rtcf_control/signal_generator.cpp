@@ -92,8 +92,10 @@ class SignalGenerator final : public rtcf::Component {
         const double component_hz = 1e9 / static_cast<double>(design_period_.proposed());
         if (const std::string error = next.samplingError(component_hz); !error.empty()) {
             const bool is_new = !is_configured_ || !next.hasFrequenciesOf(waveform());
-            if (is_new && next.shape != Shape::Prbs) return fail(error);
-            if (is_new || design_period_.proposed() != period()) RTCF_WARN(this, "{}", error);
+            if (is_new && next.shape != Shape::Prbs)
+                return RTCF_FAIL(this, "{}: {}", error, kSamplingAdvice);
+            if (is_new || design_period_.proposed() != period())
+                RTCF_WARN(this, "{}: {}", error, kSamplingAdvice);
         }
         if (proposed[shape] == Shape::Multisine) peak_.stage(peakOfMultisine(proposed[lines]));
         return true;

@@ -44,6 +44,10 @@ inline double peakOfMultisine(int lines) {
 /// Nanoseconds of a time in s.
 inline std::int64_t nanoseconds(double seconds) noexcept { return std::llround(seconds * 1e9); }
 
+/// What to do about Waveform::samplingError().
+constexpr const char* kSamplingAdvice =
+    "lower frequency, end_frequency or lines, or raise the loop's frequency";
+
 /// A signal, from the parameters of its component.
 struct Waveform {
     Shape shape = Shape::Sine;
@@ -77,10 +81,8 @@ struct Waveform {
         if (shape == Shape::Step || shape == Shape::Ramp) return {};
         if (shape == Shape::Prbs) {
             if (frequency <= component_hz * (1.0 + kPhaseTolerance)) return {};
-            return fmt::format(
-                "a PRBS of {} bits per second has one bit per cycle here, {} per second: lower "
-                "frequency, or raise the loop's",
-                frequency, component_hz);
+            return fmt::format("a PRBS of {} bits per second has one bit per cycle, {} per second",
+                               frequency, component_hz);
         }
         if (chirps()) highest = std::max(frequency, end_frequency);
         if (shape == Shape::Multisine) highest = frequency * lines;
@@ -88,9 +90,8 @@ struct Waveform {
         if (shape == Shape::Square) limit *= 1.0 + kPhaseTolerance;
         if (highest < limit) return {};
         return fmt::format(
-            "the highest frequency of the signal, {} Hz, is not below {} Hz, half of the "
-            "component's: lower frequency, end_frequency or lines, or raise the loop's frequency",
-            highest, component_hz / 2.0);
+            "the highest frequency, {} Hz, is not below {} Hz, half of the component's", highest,
+            component_hz / 2.0);
     }
 
     /// Turns of a chirp from its start to a time, s. Real-time safe.

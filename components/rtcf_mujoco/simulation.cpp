@@ -420,6 +420,8 @@ class Plant {
 // Source of the model: E. Todorov, T. Erez, Y. Tassa, "MuJoCo: A physics engine for model-based
 // control", IROS 2012.
 class Simulation final : public rtcf::Component {
+    static constexpr std::size_t kMostOfRecord = 94;  // bytes of a text in a log record
+
     rtcf::Parameter<std::string> model{this, "model", "",
                                        rtcf::Doc("absolute path of an MJCF or URDF file")};
     rtcf::Parameter<std::string> keyframe{
@@ -476,7 +478,8 @@ class Simulation final : public rtcf::Component {
         mju_user_warning = Warnings::add;
         try {
             Model loaded(file);
-            if (!loaded.warning().empty()) RTCF_WARN(this, "model {}: {}", file, loaded.warning());
+            for (std::size_t at = 0; at < loaded.warning().size(); at += kMostOfRecord)
+                RTCF_WARN(this, "model {}: {}", file, loaded.warning().substr(at, kMostOfRecord));
             const int key = keyframe.value().empty() ? -1 : loaded.find(mjOBJ_KEY, keyframe);
             if (key < 0 && !keyframe.value().empty())
                 return RTCF_FAIL(this, "parameter keyframe = {}: {} has no such keyframe",

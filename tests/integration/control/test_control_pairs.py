@@ -13,6 +13,7 @@ import pytest
 from daemon_process import BUILD_TREE
 from pages import TREE
 from rtcf.testing import Bench
+from rtcf.v1 import runner_pb2
 from values import port_value, wait_until_after
 
 SOURCES = TREE / "components" / "rtcf_control" / "python"
@@ -28,6 +29,8 @@ LOAD = np.where(CYCLE > 900, 0.3, 0.0)
 _MASKED: Any = np.ma
 # A caller that renews `run` each 20 cycles, begins each 500, and is silent from cycle 1200 on.
 RUN = _MASKED.array(CYCLE % 500 >= 20, mask=(CYCLE % 20 > 0) | ((CYCLE > 1200) & (CYCLE < 1500)))
+# A source that is slower than the loop for a while, and then stops.
+SLOW = _MASKED.array(SIGNAL, mask=((CYCLE > 500) & (CYCLE % 10 > 0)) | (CYCLE > 1600))
 LAW: dict[str, Any] = {"coulomb": 2.0, "breakaway": 3.5, "viscous": 0.8, "stribeck_velocity": 0.05}
 MOTOR: dict[str, Any] = {"inertia": 0.05, "viscous": 0.5, "step": 5e-4}
 ELASTIC: dict[str, Any] = {**MOTOR, "load_inertia": 0.1, "stiffness": 200.0, "damping": 0.5}
@@ -93,6 +96,7 @@ PAIRS: list[tuple[str, str, Mapping[str, Any], Mapping[str, Any] | None]] = [
 # By component in C++: its ports and those in Python, and the values of inputs.
 INPUTS: dict[str, dict[str, tuple[str, Any]]] = {
     "Integrator": {"in": ("u", SIGNAL), "reset": ("reset", RESET)},
+    "Derivative": {"in": ("u", SLOW)},
     "FrictionCompensation": {"velocity": ("velocity", SIGNAL)},
     "Motor": {"command": ("command", SIGNAL), "load_torque": ("load_torque", LOAD)},
     "Excitation": {
@@ -199,6 +203,30 @@ def test_both_fade_after_a_change_of_parameters(compiled: Path, tmp_path: Path) 
     one, two = np.array(efforts).T
     assert np.allclose(one, two, rtol=0, atol=ROUNDING)
     assert abs(one[50] - one[49]) > 1.0 > np.max(np.abs(np.diff(one[5:50])))
+
+
+@pytest.mark.parametrize("kind", ["lowpass", "bandpass"])
+def test_both_filters_are_the_same_at_another_period(
+    compiled: Path, tmp_path: Path, kind: str
+) -> None:
+    file = tmp_path / "pair.yaml"
+    file.write_text(
+        "components:\n"
+        + _line("cpp", "rtcf_control", "Biquads", {"sections": f"{kind} 30 3"})
+        + _line("python", "pairs", "Biquad", {"kind": kind, "f": 30.0, "q": 3.0})
+    )
+    outputs = []
+    with Bench(str(file), path=[BUILD_TREE / "lib" / "rtcf", compiled]) as bench:
+        for cycle in range(60):
+            if cycle == 40:
+                bench.client.set_runner(runner_pb2.RunnerSettings(frequency_hz=250))
+            for name in ("/cpp/cpp.in", "/python/python.u"):
+                bench.client.write(name, math.sin(0.3 * cycle))
+            bench.client.step(1)
+            outputs.append([port_value(bench.client, "/cpp/cpp", "out"),
+                            port_value(bench.client, "/python/python", "y")])  # fmt: skip
+    one, two = np.array(outputs).T
+    assert np.allclose(one, two, rtol=0, atol=ROUNDING)
 
 
 def test_both_are_the_same_in_the_last_cycle(compiled: Path, tmp_path: Path) -> None:

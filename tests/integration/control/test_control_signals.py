@@ -124,7 +124,7 @@ def test_multisine_has_equal_lines_and_its_amplitude_as_peak(blocks: Blocks, lin
     shape=st.sampled_from(SHAPES),
     amplitude=st.floats(-10.0, 10.0),
     offset=st.floats(-10.0, 10.0),
-    frequency=st.floats(0.01, 400.0),
+    frequency=st.floats(0.01, 49.0),  # 10 lines of it are below 500 Hz
     limits=st.tuples(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0)),
 )
 def test_each_signal_stays_within_its_amplitude_and_limits(
@@ -243,14 +243,35 @@ def test_the_first_bits_of_prbs_have_a_small_mean(blocks: Blocks, bits: int) -> 
         ({"shape": "multisine", "lines": 64, "frequency": 20.0}, "1280 Hz, is not below 500 Hz"),
     ],
 )
-@pytest.mark.parametrize("type_", ["SignalGenerator", "Excitation"])
 def test_frequencies_that_alias_are_rejected_with_one_line(
-    stepped: Bench, type_: str, parameters: dict[str, Any], said: str
+    stepped: Bench, parameters: dict[str, Any], said: str
 ) -> None:
-    if type_ == "Excitation" and parameters["shape"] in ("sine", "square", "triangle"):
-        pytest.skip("Excitation has no such shape")
     with rejection(said):
-        Stepped(stepped, type_, **parameters)
+        Stepped(stepped, "SignalGenerator", **parameters)
+    if parameters["shape"] in ("sine", "square", "triangle"):
+        return
+    with rejection(said):
+        Stepped(stepped, "Excitation", **parameters)
+    block = Stepped(stepped, "Excitation")
+    try:
+        with rejection(said):
+            block.set(**parameters)
+    finally:
+        block.unload()
+
+
+def test_a_square_wave_may_change_its_sign_in_each_cycle(blocks: Blocks) -> None:
+    assert wave(blocks, "square", steps=4, frequency=500.0).tolist() == [1.0, -1.0, 1.0, -1.0]
+
+
+def test_more_bits_than_cycles_are_reported(stepped: Bench) -> None:
+    block = Stepped(stepped, "SignalGenerator", shape="prbs", frequency=2500.0)
+    try:
+        block.step(3)
+        said = "a PRBS of 2500 bits per second has one bit per cycle, 1000 per second: lower frequency"
+        assert sum(said in line for line in stepped.logs) == 1
+    finally:
+        block.unload()
 
 
 def test_a_slower_loop_reports_a_frequency_that_aliases_once(stepped: Bench) -> None:
@@ -261,6 +282,9 @@ def test_a_slower_loop_reports_a_frequency_that_aliases_once(stepped: Bench) -> 
         block.step(20)
         text = [line for line in stepped.logs if "400 Hz, is not below 250 Hz" in line]
         assert len(text) == 1
+        block.set(amplitude=0.0)  # other parameters can still change
+        with rejection("401 Hz, is not below 250 Hz"):
+            block.set(frequency=401.0)
     finally:
         block.unload()
         stepped.client.set_runner(runner_pb2.RunnerSettings(frequency_hz=1000))
