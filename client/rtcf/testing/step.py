@@ -77,9 +77,7 @@ def step_response(
     )
 
 
-def _settling(
-    time: npt.NDArray[np.float64], inside: npt.NDArray[np.bool_]
-) -> tuple[float, str]:
+def _settling(time: npt.NDArray[np.float64], inside: npt.NDArray[np.bool_]) -> tuple[float, str]:
     """Return the begin of the last stay inside, or infinity and why it does not count."""
     if not inside[-1]:
         return float("inf"), "the last value is outside the tolerance"

@@ -226,7 +226,7 @@ def test_a_new_period_keeps_the_response(stepped: Bench) -> None:
         assert time - before == pytest.approx(delay, rel=0.03)
         stepped.client.set_runner(runner_pb2.RunnerSettings(frequency_hz=250))
         lag = []
-        for k in range(100):
+        for _ in range(100):
             time += 0.004
             after = block.step(**{"in": time})["last_output"]
             lag.append(time - after)
