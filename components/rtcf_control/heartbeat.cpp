@@ -57,8 +57,11 @@ class Heartbeat final : public rtcf::Component {
     void safe() noexcept override { stopped.write(true); }
 
     void update() override {
-        const bool has_value = beat.read() != rtcf::DataStatus::None;
-        const bool beats = has_value && (!begun_ || beat.value() != last_);
+        const rtcf::DataStatus status = beat.read();
+        const bool has_value = status != rtcf::DataStatus::None;
+        // A value from before the start is no beat.
+        const bool beats =
+            begun_ ? has_value && beat.value() != last_ : status == rtcf::DataStatus::New;
         if (has_value) last_ = beat.value();
         age_ = beats ? 0 : age_ + elapsed();
         begun_ = begun_ || beats;

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "rtcf/queue.hpp"
@@ -22,6 +23,9 @@ class Backlog {
         for (std::size_t i = 0; i < queue.capacity(); ++i)
             slots_.push_back(type_.make_slot(queue.sample()));
     }
+
+    /// Counts a message that is too old for the queue. Any thread.
+    void refuse() noexcept { lost_.fetch_add(1, std::memory_order_relaxed); }
 
     /// Stores a message; ignores bytes that are not a valid message. One thread at a time; not
     /// real-time safe.
@@ -53,15 +57,31 @@ class Backlog {
             queue_.take(slot, now_ns - slot.stamp);
         }
         tail_.store(tail, std::memory_order_release);
-        if (const std::uint64_t lost = lost_.load(std::memory_order_relaxed); lost != told_) {
-            queue_.noteDropped(lost - told_);
-            told_ = lost;
-        }
+        queue_.noteDropped(takeLost());
+    }
+
+    /// Drops the messages of the time before a start, also those in the queue. Graph thread, while
+    /// no cycle runs.
+    /// @return number of messages
+    std::uint64_t dropOld() noexcept {
+        const std::size_t head = head_.load(std::memory_order_acquire);
+        const std::uint64_t dropped =
+            queue_.size() + (head - tail_.load(std::memory_order_relaxed)) + takeLost();
+        queue_.clear();
+        tail_.store(head, std::memory_order_release);
+        queue_.noteDropped(dropped);
+        return dropped;
     }
 
     QueueBase& queue() const noexcept { return queue_; }
 
    private:
+    // Number of messages lost since the last call.
+    std::uint64_t takeLost() noexcept {
+        const std::uint64_t lost = lost_.load(std::memory_order_relaxed);
+        return lost - std::exchange(told_, lost);
+    }
+
     const TypeInfo& type_;
     QueueBase& queue_;
     std::shared_ptr<SlotHeader> arrived_;  // of the delivering thread

@@ -10,16 +10,18 @@ Injector::Injector(std::string topic, const TypeInfo& type)
     if (type_.fixed_size) fixed_size_ = static_cast<std::uint32_t>(type_.sample().size());
 }
 
-bool Injector::deliver(const std::uint8_t* bytes, std::uint32_t size, std::int64_t arrived_ns) {
+bool Injector::deliver(const std::uint8_t* bytes, std::uint32_t size, std::int64_t arrived_ns,
+                       bool is_old) {
     if (!admits(size)) return false;
+    const Arrival arrival{arrived_ns, is_old};
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (!queueing_) return store(bytes, size);
+    if (!queueing_) return store(bytes, size, arrival, 0);
     while (!waiting_.empty() &&
            (waiting_.size() >= kMaxWaiting || waiting_bytes_ + size > kMaxWaitingBytes)) {
         dropOldest();
         passed_over_.fetch_add(1, std::memory_order_relaxed);
     }
-    waiting_.push_back({arrived_ns, {bytes, bytes + size}});
+    waiting_.push_back({arrival, {bytes, bytes + size}});
     waiting_bytes_ += size;
     return true;
 }
@@ -46,7 +48,7 @@ void Injector::setQueueing(bool queueing) {
 void Injector::deliverUntil(std::int64_t arrived_ns, double rate) {
     const std::lock_guard<std::mutex> lock(mutex_);
     const auto ready = [&](std::size_t at) {
-        return waiting_.size() > at && waiting_[at].arrived_ns <= arrived_ns;
+        return waiting_.size() > at && waiting_[at].arrival.time_ns <= arrived_ns;
     };
     if (backlogs_.empty()) {
         while (ready(1)) {
@@ -55,9 +57,9 @@ void Injector::deliverUntil(std::int64_t arrived_ns, double rate) {
         }
     }
     while (ready(0)) {
-        const auto& [came_ns, bytes] = waiting_.front();
-        const double age_ns = rate * static_cast<double>(arrived_ns - came_ns);
-        store(bytes.data(), static_cast<std::uint32_t>(bytes.size()),
+        const auto& [arrival, bytes] = waiting_.front();
+        const double age_ns = rate * static_cast<double>(arrived_ns - arrival.time_ns);
+        store(bytes.data(), static_cast<std::uint32_t>(bytes.size()), arrival,
               static_cast<std::int64_t>(age_ns));
         dropOldest();
     }
@@ -82,13 +84,16 @@ void Injector::passOver() noexcept {
     if (backlogs_.empty()) passed_over_.fetch_add(1, std::memory_order_relaxed);
 }
 
-bool Injector::store(const std::uint8_t* bytes, std::uint32_t size, std::int64_t age_ns) {
+bool Injector::store(const std::uint8_t* bytes, std::uint32_t size, const Arrival& arrival,
+                     std::int64_t age_ns) {
     if (!type_.deserialize(*slots_[back_], bytes, size)) {
         refused_.fetch_add(1, std::memory_order_relaxed);
         return false;
     }
-    for (const auto& backlog : backlogs_) backlog->store(bytes, size, age_ns);
+    for (const auto& backlog : backlogs_)
+        arrival.is_old ? backlog->refuse() : backlog->store(bytes, size, age_ns);
     slots_[back_]->stamp = age_ns;
+    arrivals_[back_] = arrival;
     const std::uint32_t before = middle_.exchange(back_ | kFresh, std::memory_order_acq_rel);
     if (attention_ != nullptr) attention_->request(Attention::kArrived);
     if ((before & kFresh) != 0) passOver();

@@ -4,6 +4,9 @@
 /// Neither side waits. Only the newest value counts, except for queues, which get every message.
 /// Under a simulated clock, cycles come in bursts, so messages wait until the clock has reached the
 /// first cycle after them.
+/// A running loop counts a value's age from the cycle that takes it. Values that arrived before the
+/// start of a loop are old, and of their true age. Steps have no real time between them: what
+/// arrives meanwhile belongs to the next cycle.
 #pragma once
 
 #include <array>
@@ -13,6 +16,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "exchange/attention.hpp"
@@ -36,10 +40,11 @@ class Injector {
 
     /// Delivers one serialised message. Any thread; not real-time safe.
     /// @param arrived_ns arrival, CLOCK_MONOTONIC, ns; never before the last one
+    /// @param is_old the sender may have sent it long ago; inputs read it as old, queues drop it
     /// @return false if the bytes are not a message of this type, or too large; nothing has changed
     /// then
     bool deliver(const std::uint8_t* bytes, std::uint32_t size,
-                 std::int64_t arrived_ns = monotonicNow());
+                 std::int64_t arrived_ns = monotonicNow(), bool is_old = false);
 
     /// True if a message of `size` bytes is allowed; else counts it as rejected. Any thread.
     bool admits(std::uint32_t size);
@@ -77,12 +82,32 @@ class Injector {
 
     /// The slot that inputs read. Cycle thread.
     const SlotHeader* front() const noexcept { return slots_[front_].get(); }
+    /// Arrival of its value, CLOCK_MONOTONIC, ns. Cycle thread.
+    std::int64_t arrived() const noexcept RTCF_NONBLOCKING { return arrivals_[front_].time_ns; }
+    /// True if its value is not new to inputs. Cycle thread.
+    bool isOld() const noexcept RTCF_NONBLOCKING { return arrivals_[front_].is_old; }
 
     /// Swaps `slot` with the front slot. The caller then connects the inputs to it. Cycle thread;
     /// real-time safe.
-    void restore(std::shared_ptr<SlotHeader>& slot) noexcept RTCF_NONBLOCKING {
+    /// @param arrived_ns arrival of its value, CLOCK_MONOTONIC, ns
+    void restore(std::shared_ptr<SlotHeader>& slot, std::int64_t arrived_ns) noexcept
+        RTCF_NONBLOCKING {
         slots_[front_].swap(slot);
+        arrivals_[front_] = {arrived_ns, true};
     }
+
+    /// @name Start of the loop; graph thread, while no cycle runs
+    /// @{
+    /// Sets the age of the front slot's value, if any, at the loop time `time_ns`. Also at a
+    /// boundary; real-time safe.
+    void setAge(std::int64_t age_ns, std::int64_t time_ns) noexcept RTCF_NONBLOCKING {
+        if (front()->stamp != 0) slots_[front_]->stamp = stampOf(time_ns - age_ns);
+    }
+    /// Counts messages that arrived before the start, and that queues have dropped.
+    void noteDropped(std::uint64_t count) noexcept { dropped_ += count; }
+    /// Their number since the last call.
+    std::uint64_t takeDropped() noexcept { return std::exchange(dropped_, 0); }
+    /// @}
 
     /// Makes the newest delivered value the front slot; its time is the loop's time minus its age.
     /// Cycle thread; real-time safe.
@@ -96,8 +121,12 @@ class Injector {
     }
 
    private:
+    struct Arrival {
+        std::int64_t time_ns = 0;  // CLOCK_MONOTONIC
+        bool is_old = false;
+    };
     struct Waiting {
-        std::int64_t arrived_ns;
+        Arrival arrival;
         std::vector<std::uint8_t> bytes;
     };
     // Limits of waiting messages, while the clock stands or the loop cannot keep up. Beyond them,
@@ -107,7 +136,8 @@ class Injector {
 
     void dropOldest();
     void passOver() noexcept;
-    bool store(const std::uint8_t* bytes, std::uint32_t size, std::int64_t age_ns = 0);
+    bool store(const std::uint8_t* bytes, std::uint32_t size, const Arrival& arrival,
+               std::int64_t age_ns);
 
     // Flag in middle_, beside an index from 0 to 2: the slot has not been adopted yet.
     static constexpr std::uint32_t kFresh = 4;
@@ -116,8 +146,10 @@ class Injector {
     const TypeInfo& type_;
     // Before adoption, the stamp of a delivered slot is its age.
     std::array<std::shared_ptr<SlotHeader>, 3> slots_;
-    std::uint32_t fixed_size_ = 0;  // size of a message of a type of fixed size, bytes
-    std::uint32_t front_ = 0;       // of the cycle thread
+    std::array<Arrival, 3> arrivals_;  // of the slots' values
+    std::uint64_t dropped_ = 0;        // of the graph thread
+    std::uint32_t fixed_size_ = 0;     // size of a message of a type of fixed size, bytes
+    std::uint32_t front_ = 0;          // of the cycle thread
     std::atomic<std::uint32_t> middle_{1};
     std::mutex mutex_;  // of the delivering threads; protects the members up to waiting_bytes_
     std::uint32_t back_ = 2;

@@ -15,7 +15,6 @@ namespace {
 
 // Outputs up to this size are restored from the last frame if update() throws. For larger ones, a
 // copy after each write costs less per cycle.
-constexpr std::size_t kLargestPutBack = 4096;  // bytes
 
 const ComponentRecord& findRecord(const Library& library, const ComponentDefinition& definition) {
     if (const ComponentRecord* record = library.find(definition.type)) return *record;
@@ -217,8 +216,7 @@ void Instance::configure() {
 void Instance::freezePorts() {
     accessTo(*component_).freeze();
     accessTo(*component_).stageOutputs([this](const OutputPort& output) {
-        const TypeInfo& type = output.type();
-        return definition_->optional || !type.fixed_size || type.size > kLargestPutBack;
+        return definition_->optional || !showsChangesInPlace(output.type());
     });
     if (definition_->optional) statistics_->faults.taken_out.allocateText();
     if (!accessTo(*component_).stagedOutputs().empty()) statistics_->faults.unsafe.allocateText();
@@ -252,10 +250,10 @@ void Instance::start() {
     setHookTime();
     callHook(Hook::Start, [this] {
         if (!component_->start()) return false;
-        // Publishes first values for components that run earlier in the schedule. Checked outputs
-        // wait for the cycle, which reports values that are not finite.
+        // Publishes first values for components that run earlier in the schedule. The cycle reports
+        // values that are not finite.
         for (OutputPort* output : accessTo(*component_).stagedOutputs())
-            if (!output->checked()) output->commit();
+            if (output->valid()) output->commit();
         return true;
     });
     for (MailboxBase* mailbox : accessTo(*component_).mailboxes()) mailbox->open();

@@ -23,6 +23,7 @@ struct Rewire {
     const SlotHeader* source;
     const Injector* injector;
     bool continued;  ///< the same writer's values as before
+    bool arrived;    ///< the writer joins the loop: a queue gets the value of its start()
     /// Filled at the boundary: slot of the input's value before the change.
     const SlotHeader* held = nullptr;
 
@@ -39,7 +40,7 @@ struct Rewire {
             input->disconnect();
             return;
         }
-        if (queue != nullptr && !continued) queue->skip();
+        if (queue != nullptr && !continued && !arrived) queue->skip();
     }
 };
 

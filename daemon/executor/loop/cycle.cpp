@@ -43,14 +43,21 @@ Cycle::Cycle(FlightRecorder& recorder, std::shared_ptr<Attention> attention)
     statistics_.wake_up.allocate();
 }
 
-void Cycle::begin(std::int64_t period_ns, std::uint64_t warmup_cycles, std::int64_t time_ns,
-                  bool monotonic) {
+void Cycle::announce(Pace pace) {
+    const bool monotonic = pace == Pace::RealTime;
+    const std::int64_t time_ns = monotonic ? monotonicNow() : 0;
     // The time between two loops counts only if one clock has measured it.
-    if (!monotonic || !monotonic_ || time_ns < clock_.time_ns) moveTime(time_ns - clock_.time_ns);
+    const bool measured = monotonic && monotonic_ && time_ns >= clock_.time_ns;
+    if (!measured && time_ns != clock_.time_ns) moveTime(time_ns - clock_.time_ns);
     monotonic_ = monotonic;
     clock_.iteration = 0;
     clock_.time_ns = time_ns;
-    clock_.stamp_ns = 0;
+    clock_.stamp_ns = monotonic ? time_ns + stamp_offset_ns_.load(std::memory_order_relaxed) : 0;
+}
+
+void Cycle::begin(std::int64_t period_ns, std::uint64_t warmup_cycles, Pace pace) {
+    announce(pace);
+    if (pace != Pace::Steps) takeOld();
     clock_.period_ns = period_ns;
     clock_.elapsed_ns = period_ns;
     total_elapsed_ns_ = 0;
@@ -68,6 +75,23 @@ void Cycle::begin(std::int64_t period_ns, std::uint64_t warmup_cycles, std::int6
     statistics_.iteration.store(0, std::memory_order_relaxed);
     fault_ = {};
     active_ = true;
+}
+
+// Values from outside that arrived before the start are old: they keep their true age, and queues
+// drop them.
+void Cycle::takeOld() {
+    const std::int64_t now = monotonicNow();
+    for (const Feed& feed : schedule_->feeds) {
+        Injector& injector = *feed.injector;
+        const bool fresh = injector.adopt(clock_);
+        injector.setAge(now - injector.arrived(), clock_.time_ns);
+        for (InputPort* input : feed.readers) {
+            if (fresh || &input->slot() == injector.front()) input->injectOld(injector.front());
+        }
+        std::uint64_t dropped = 0;  // a message may be in several queues
+        for (const auto& backlog : feed.backlogs) dropped = std::max(dropped, backlog->dropOld());
+        injector.noteDropped(dropped);
+    }
 }
 
 // Stamps must be earlier than the next cycle, so that its writes are new to each reader.
@@ -418,9 +442,16 @@ void Cycle::feed() noexcept RTCF_NONBLOCKING {
     if ((attention_.work() & Attention::kArrived) == 0) return;
     attention_.take(Attention::kArrived);
     for (const Feed& feed : schedule_->feeds) {
-        if (!feed.injector->adopt(clock_)) continue;
+        Injector& injector = *feed.injector;
+        if (!injector.adopt(clock_)) continue;
         for (const auto& backlog : feed.backlogs) backlog->enter(clock_.time_ns);
-        for (InputPort* input : feed.readers) input->inject(feed.injector->front());
+        for (InputPort* input : feed.readers) {
+            if (injector.isOld()) {
+                input->injectOld(injector.front());
+            } else {
+                input->inject(injector.front());
+            }
+        }
         for (const auto& backlog : feed.backlogs) backlog->queue().skip();
     }
 }

@@ -38,6 +38,13 @@ struct LoopStatistics {
     EventCounter catching_up;        ///< late because of the previous overrun, with CatchUp
 };
 
+/// What begins the cycles, and measures their time.
+enum class Pace {
+    RealTime,  ///< loop time is CLOCK_MONOTONIC
+    Clock,     ///< a simulated clock; loop time is a count of periods from 0
+    Steps,     ///< an operator; the same
+};
+
 class Cycle {
    public:
     /// @param recorder notes the running component; outlives the cycle
@@ -47,12 +54,14 @@ class Cycle {
 
     /// @name Graph thread
     /// @{
-    /// Resets clock and counters, so that the next cycle is number 0. While no cycle runs.
-    /// @param time_ns loop time; the cycles' times are later
-    /// @param monotonic CLOCK_MONOTONIC is the loop time, not a count of periods from 0. Unless it
-    /// was that before, too, all values keep the ages of the last cycle.
-    void begin(std::int64_t period_ns, std::uint64_t warmup_cycles, std::int64_t time_ns,
-               bool monotonic);
+    /// Sets the clock before the start hooks, so that what they write belongs to the start. While
+    /// no cycle runs. If CLOCK_MONOTONIC is not the loop time, or was not before, all values keep
+    /// the ages of the last cycle.
+    void announce(Pace pace);
+    /// Resets clock and counters, so that the next cycle is number 0. Unless it is a step, takes
+    /// the values from outside that arrived before it, as old ones. After announce() and the start
+    /// hooks.
+    void begin(std::int64_t period_ns, std::uint64_t warmup_cycles, Pace pace);
     /// Undoes begin() if no thread can run the cycles.
     void abandon() noexcept { active_ = false; }
     Boundary& boundary() noexcept { return boundary_; }
@@ -118,7 +127,9 @@ class Cycle {
         clock_.stamp_ns = time_ns + stamp_offset_ns_.load(std::memory_order_relaxed);
     }
     void moveTime(std::int64_t by_ns);
+    void takeOld();
     void changeComponents(Adoption& adoption) noexcept;
+    static void publish(Component& successor) noexcept;
     bool runSpecial(std::int64_t begin_ticks, std::int64_t time_ns,
                     std::int64_t latency_ns) noexcept;
     bool exchange(std::int64_t time_ns) noexcept;

@@ -56,6 +56,7 @@ void Cycle::changeComponents(Adoption& adoption) noexcept {
         const RealtimeHookNote note(notes_, accessTo(successor).context().recorder_slot,
                                     Hook::TakeOver);
         successor.takeOver(Predecessor(*hand_over.previous));
+        publish(successor);
     }
     if (active_) {
         for (Leaving& leaving : adoption.leaving) {
@@ -73,6 +74,18 @@ void Cycle::changeComponents(Adoption& adoption) noexcept {
     std::for_each(new_inputs, adoption.rewires.end(), [](Rewire& each) { each.apply(); });
     clock_.time_ns = time;
     clock_.stamp_ns = stamp;
+}
+
+// Publishes what takeOver() wrote to staged outputs. The cycle reports values that are not finite.
+void Cycle::publish(Component& successor) noexcept {
+    for (OutputPort* output : accessTo(successor).stagedOutputs()) {
+        if (!output->valid()) continue;
+        try {
+            output->commit();
+        } catch (...) {
+            output->discard();  // no memory: readers wait for the first cycle
+        }
+    }
 }
 
 void Cycle::capture(Capture& capture) noexcept {
@@ -106,10 +119,17 @@ bool Cycle::restore(Restoration& restoration) noexcept {
     const std::int64_t later = restoration.sets_time ? 0 : clock_.time_ns - saved.time_ns;
     for (SlotHeader* header : restoration.headers) header->stamp = movedStamp(header->stamp, later);
     for (Restoration::Topic& topic : restoration.topics) {
+        Injector& injector = *topic.injector;
         topic.slot->stamp = movedStamp(topic.slot->stamp, later);
-        topic.injector->restore(topic.slot);
-        for (const Restoration::Input& reader : topic.readers)
-            reader.put(topic.injector->front(), later);
+        injector.restore(topic.slot, topic.arrived_ns);
+        // In a running loop it is old, of its true age. Steps go on exactly from the snapshot.
+        if (!restoration.sets_time)
+            injector.setAge(monotonicNow() - topic.arrived_ns, clock_.time_ns);
+        for (const Restoration::Input& reader : topic.readers) {
+            reader.put(injector.front(), later);
+            if (!restoration.sets_time && reader.held == nullptr)
+                reader.input->injectOld(injector.front());
+        }
     }
     for (const Restoration::Input& input : restoration.inputs)
         input.put(&input.input->slot(), later);

@@ -76,14 +76,18 @@ Loop::~Loop() {
     log_.setIteration(nullptr);
 }
 
-void Loop::reset(const LoopSettings& settings, std::uint64_t stops_known, bool real_time) {
+void Loop::announce(Pace pace) {
+    refreshWallClock();
+    cycle_.announce(pace);
+}
+
+void Loop::reset(const LoopSettings& settings, std::uint64_t stops_known, Pace pace) {
     stops_known_ = stops_known;
     if (stopRequested()) {
         throw Error(ErrorKind::LoopStopped,
                     "the loop is not started: a stop was requested after the start");
     }
-    cycle_.begin(settings.period_ns, settings.warmup_cycles, real_time ? monotonicNow() : 0,
-                 real_time);
+    cycle_.begin(settings.period_ns, settings.warmup_cycles, pace);
     bucket_ = 0;
     cycles_on_time_ = 0;
     caught_up_ = 0;
@@ -94,10 +98,10 @@ void Loop::reset(const LoopSettings& settings, std::uint64_t stops_known, bool r
 RealtimeProblems Loop::start(const LoopSettings& settings, std::uint64_t stops_known) {
     RealtimeProblems problems;
     retune(settings);
-    reset(settings, stops_known, settings.clock == nullptr);
+    if (settings.clock == nullptr) refreshWallClock();
+    reset(settings, stops_known, settings.clock == nullptr ? Pace::RealTime : Pace::Clock);
     simulation_ = settings.clock;
     if (simulation_ == nullptr) {
-        refreshWallClock();
         idle_guard_ = std::make_unique<IdleStateGuard>();
         if (!idle_guard_->problem().empty()) problems.push_back({idle_guard_->problem(), false});
     }
@@ -266,7 +270,7 @@ void Loop::run() noexcept {
 
 void Loop::beginStepping(const LoopSettings& settings, std::uint64_t stops_known,
                          std::int64_t stamp_ns) {
-    reset(settings, stops_known, false);
+    reset(settings, stops_known, Pace::Steps);
     cycle_.setStampOffset(stamp_ns - nextStep());
 }
 

@@ -57,6 +57,8 @@ class Loop {
 
     /// @name Graph thread
     /// @{
+    /// Sets the clock before the start hooks, see Cycle::announce(). While the loop does not run.
+    void announce(Pace pace);
     /// Starts the thread, which executes the adopted schedule.
     /// @param stops_known value of stops() when this start was requested
     /// @return missing prerequisites of real time
@@ -159,7 +161,7 @@ class Loop {
         std::int64_t missed = 0;  ///< beats of a device missed before this one
     };
 
-    void reset(const LoopSettings& settings, std::uint64_t stops_known, bool real_time);
+    void reset(const LoopSettings& settings, std::uint64_t stops_known, Pace pace);
     RealtimeSettings placed(RealtimeSettings settings, RealtimeProblems& problems);
     void leaveCpu();
     bool perform(BoundaryWork& work, std::int64_t timeout_ns);

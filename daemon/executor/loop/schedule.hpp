@@ -82,9 +82,10 @@ struct Latch {
     const SlotHeader* from;
     const Component* writer;
 
-    /// Real-time safe if TypeInfo::copy is. @throws any exception of a copy
+    /// Copies a value that was written, or changed in place. Real-time safe if TypeInfo::copy is.
+    /// @throws any exception of a copy
     void copy() const {
-        if (to->stamp != from->stamp) type->copy(*to, *from);
+        if (to->stamp != from->stamp || showsChangesInPlace(*type)) type->copy(*to, *from);
     }
 };
 

@@ -110,7 +110,6 @@ v1::ComponentSnapshot componentTo(const SnapshotComponent& component) {
         to.set_source(input.source);
         to.set_seen(input.seen);
         if (input.held) *to.mutable_held() = valueTo(*input.held);
-        to.set_since(input.since);
     }
     return message;
 }
@@ -146,7 +145,6 @@ SnapshotComponent componentFrom(const v1::ComponentSnapshot& message) {
         input.source = from.source();
         input.seen = from.seen();
         if (from.has_held()) input.held = valueFrom(from.held());
-        input.since = from.since();
         component.inputs.push_back(std::move(input));
     }
     return component;

@@ -160,7 +160,7 @@ class Builder {
             if (reader.input->queue() != nullptr)
                 feed.backlogs.push_back(backlogOf(*injector, *reader.input->queue()));
             if (binding.writer != injector.get()) {
-                adoption_.rewires.push_back({reader.input, nullptr, injector.get(), false});
+                adoption_.rewires.push_back({reader.input, nullptr, injector.get(), false, false});
                 binding.writer = injector.get();
                 binding.source = nullptr;
                 binding.source_owner = injector;
@@ -191,13 +191,22 @@ class Builder {
             latched ? latchOf(*connection.writer, slot) : slot;
         Binding binding = present(reader.input);
         if (binding.writer != slot.get() || binding.source != source.get()) {
+            const bool arrived = reader.input->queue() != nullptr && arrives(*connection.writer);
             adoption_.rewires.push_back(
-                {reader.input, source.get(), nullptr, binding.writer == slot.get()});
+                {reader.input, source.get(), nullptr, binding.writer == slot.get(), arrived});
             binding.writer = slot.get();
             binding.source = source.get();
             binding.source_owner = source;
         }
         plan_.bindings.emplace(reader.input, std::move(binding));
+    }
+
+    bool arrives(const Writer& writer) const {
+        const auto& previous = previous_.graph.nodes();
+        const Instance* const instance = plan_.graph.nodes()[writer.node].instance.get();
+        return std::none_of(previous.begin(), previous.end(), [instance](const GraphNode& node) {
+            return node.instance.get() == instance;
+        });
     }
 
     std::shared_ptr<SlotHeader> latchOf(const Writer& writer,
@@ -224,7 +233,7 @@ class Builder {
         // The input never had a writer, nor a value from a snapshot.
         if (binding.source_owner == nullptr && binding.held_owner == nullptr) return;
         if (binding.writer != nullptr)
-            adoption_.rewires.push_back({input, nullptr, nullptr, false});
+            adoption_.rewires.push_back({input, nullptr, nullptr, false, false});
         binding.writer = nullptr;
         plan_.bindings.emplace(input, std::move(binding));
     }

@@ -60,9 +60,10 @@ void LoopControl::applySettings() {
 }
 
 const std::vector<std::string>& LoopControl::start(const Progress& progress) {
-    startComponents(progress);
+    const bool simulated = simulation_.wanted(settings_, progress, [this] { requireNoStop(); });
+    startComponents(simulated ? Pace::Clock : Pace::RealTime, progress);
     try {
-        if (simulation_.wanted(settings_, progress, [this] { requireNoStop(); }))
+        if (simulated)
             simulation_.begin(settings_, *plan_);
         else
             simulation_.end(settings_, *plan_);
@@ -77,6 +78,7 @@ const std::vector<std::string>& LoopControl::start(const Progress& progress) {
     }
     publication_.setState(RunnerState::Running);
     loop_fault_.clear();
+    reportOldMessages();
     publish();
     for (const std::string& problem : degraded_) {
         report_event_({RunnerEvent::Kind::Degraded, "degraded real time: " + problem, {}, 0});
@@ -92,8 +94,9 @@ void LoopControl::requireNoStop() const {
                             runner_));
 }
 
-void LoopControl::startComponents(const Progress& progress) {
+void LoopControl::startComponents(Pace pace, const Progress& progress) {
     faults_.restart();
+    loop_.announce(pace);
     plan_.startComponents(progress, [this] { requireNoStop(); });
 }
 
@@ -166,7 +169,7 @@ void LoopControl::noteLoopFault() {
 }
 
 void LoopControl::beginStepping(const Progress& progress, std::int64_t stamp_ns) {
-    startComponents(progress);
+    startComponents(Pace::Steps, progress);
     try {
         loop_.beginStepping(settings_.loop, job_stops_, stamp_ns);
     } catch (...) {
@@ -175,6 +178,7 @@ void LoopControl::beginStepping(const Progress& progress, std::int64_t stamp_ns)
     }
     publication_.setState(RunnerState::Stepping);
     loop_fault_.clear();
+    reportOldMessages();
     publish();
 }
 
@@ -200,6 +204,17 @@ void LoopControl::reportOverruns(bool last) {
     const bool limit_ignored = !degraded_.empty() && settings_.loop.max_overruns != 0;
     faults_.reportOverruns(plan_->graph, last,
                            limit_ignored ? "; max_overruns does not stop a degraded loop" : "");
+}
+
+void LoopControl::reportOldMessages() {
+    for (const Feed& feed : plan_->schedule.feeds) {
+        const std::uint64_t count = feed.injector->takeDropped();
+        if (count == 0) continue;
+        log_.write(LogLevel::Warn, {},
+                   fmt::format("{} on {} from before the start {} dropped",
+                               count == 1 ? "1 message" : fmt::format("{} messages", count),
+                               feed.injector->topic(), count == 1 ? "was" : "were"));
+    }
 }
 
 void LoopControl::finish() noexcept {

@@ -75,7 +75,8 @@ class LoopControl {
 
    private:
     void requireNoStop() const;
-    void startComponents(const Progress& progress);
+    void startComponents(Pace pace, const Progress& progress);
+    void reportOldMessages();
     void loopEnded();
     void noteLoopFault();
     RealtimeProblems lockAndStart();

@@ -49,12 +49,14 @@ void Replay::describe(ReplayOutcome& outcome) const {
 ReplayOutcome Replay::run(const ReplayChunk& chunk) {
     ReplayOutcome outcome;
     std::size_t bytes = 0;
-    while (next_ns_ <= chunk.until_ns) {
+    // The last cycle is the first one that is not before the last message.
+    const auto unread = [&] { return outcome.consumed < chunk.messages.size(); };
+    while (next_ns_ <= chunk.until_ns || (chunk.end && unread())) {
         if (bytes > kMaxOutputBytes || outcome.outputs.size() > kMaxOutputs) {
             outcome.more = true;
             break;
         }
-        for (; outcome.consumed < chunk.messages.size(); ++outcome.consumed) {
+        for (; unread(); ++outcome.consumed) {
             const RecordedMessage& message = chunk.messages[outcome.consumed];
             if (message.time_ns > next_ns_) break;
             inject(message);

@@ -38,7 +38,7 @@ struct ReplayChunk {
     std::vector<RecordedTopic> topics;  ///< with `begin`: topics of the recording
     std::vector<RecordedMessage> messages;  ///< in order of time; none after `until_ns`
     std::int64_t until_ns = 0;              ///< runs all cycles up to this time
-    bool end = false;                       ///< ends the replay
+    bool end = false;  ///< ends the replay, after a cycle that reads the last message
 };
 
 struct ReplayOutcome {

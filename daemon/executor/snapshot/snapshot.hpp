@@ -55,7 +55,6 @@ struct SnapshotInput {
     std::int64_t seen = 0;  ///< stamp of the value of the last read
     /// The value of a removed writer, until the present one writes; unset = the present one's.
     std::optional<SnapshotValue> held;
-    std::int64_t since = 0;  ///< stamp of the present writer's value when it was connected
 };
 
 struct SnapshotComponent {

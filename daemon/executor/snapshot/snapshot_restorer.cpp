@@ -8,6 +8,7 @@
 #include <cstring>
 
 #include "common/error.hpp"
+#include "realtime/cycle_counter.hpp"
 
 namespace rtcf::executor {
 
@@ -212,11 +213,9 @@ void SnapshotRestorer::fitInput(const SnapshotInput& saved, InputPort& input,
         return;
     }
     checkStamp(saved.seen, name);
-    checkStamp(saved.since, name);
     const auto found = plan_.bindings.find(&input);
     const Binding binding = found == plan_.bindings.end() ? Binding{} : found->second;
-    Restoration::Input to{&input, source.empty() ? nullptr : binding.source, nullptr, saved.seen,
-                          saved.since};
+    Restoration::Input to{&input, source.empty() ? nullptr : binding.source, nullptr, saved.seen};
     // Without a writer and a value, but bound before: the value goes.
     const bool is_emptied = source.empty() && found != plan_.bindings.end();
     if (saved.held || is_emptied) {
@@ -239,9 +238,18 @@ void SnapshotRestorer::fitTopics() {
                                     to.type().name));
                 return;
             }
-            restoration_.topics.push_back(
-                {&to, slotFrom(to.type(), from.value, from.name), readers_[&to]});
+            restoration_.topics.push_back({&to, slotFrom(to.type(), from.value, from.name),
+                                           arrivalOf(from.value), readers_[&to]});
         });
+}
+
+// Arrival of a value from outside, CLOCK_MONOTONIC, ns. The machine may have booted since.
+std::int64_t SnapshotRestorer::arrivalOf(const SnapshotValue& value) const {
+    const std::int64_t now = realtimeNow();
+    const std::int64_t since_snapshot = now - std::clamp<std::int64_t>(snapshot_.taken_ns, 0, now);
+    const std::int64_t time = snapshot_.clock.time_ns;
+    const std::int64_t age = time - std::clamp(value.stamp, time - kLongest / 2, time);
+    return monotonicNow() - since_snapshot - age;
 }
 
 std::shared_ptr<SlotHeader> SnapshotRestorer::slotFrom(const TypeInfo& type,

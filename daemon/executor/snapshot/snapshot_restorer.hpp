@@ -46,6 +46,7 @@ class SnapshotRestorer {
     void fitInputs(const SnapshotComponent& saved, const Instance& instance);
     void fitInput(const SnapshotInput& saved, InputPort& input, const std::string& name);
     void fitTopics();
+    std::int64_t arrivalOf(const SnapshotValue& value) const;
     /// Matches the elements of one kind by name, and calls `fit` for each pair.
     /// @param from elements of the snapshot
     /// @param to elements of the graph

@@ -123,7 +123,6 @@ SnapshotInput SnapshotTaker::inputOf(const Capture::Input& input) const {
     result.type = snapshotTypeOf(input.input->type());
     result.source = sources_.of(*input.input);
     result.seen = input.seen;
-    result.since = input.since;
     if (input.held.from != nullptr) result.held = valueFrom(input.held);
     return result;
 }

@@ -26,7 +26,6 @@ bool Capture::Value::take() noexcept {
 
 bool Capture::Input::take() noexcept {
     seen = input->seen();
-    since = input->since();
     const SlotHeader& slot = input->slot();
     const bool own = &slot == (injector != nullptr ? injector->front() : source);
     held.from = own || slot.stamp == 0 ? nullptr : &slot;
@@ -37,8 +36,7 @@ void Restoration::Input::put(const SlotHeader* other, std::int64_t later) const 
     if (QueueBase* const queue = input->queue()) queue->clear();
     const SlotHeader* const own = source != nullptr ? source : other;
     const bool waits = held != nullptr && source != nullptr;
-    input->set(held != nullptr ? held : own, movedStamp(seen, later), waits ? source : nullptr,
-               movedStamp(since, later));
+    input->set(held != nullptr ? held : own, movedStamp(seen, later), waits ? source : nullptr);
 }
 
 void Restoration::Value::put() const noexcept {

@@ -43,7 +43,6 @@ struct Capture {
         const Injector* injector;  ///< null = none
         Value held;  ///< value of an earlier writer; `from` is null if the input has none
         std::int64_t seen = 0;
-        std::int64_t since = 0;
 
         /// Copies the read position and the value of an earlier writer. Real-time safe.
         /// @return false if the buffer is too small
@@ -89,7 +88,6 @@ struct Restoration {
         const SlotHeader* source;  ///< slot of its writer; null = none, or an injector
         const SlotHeader* held;    ///< value of an earlier writer; null = none
         std::int64_t seen;
-        std::int64_t since;
 
         /// Restores the value and the read position; empties a queue. Real-time safe.
         /// @param other source if none is set
@@ -99,6 +97,7 @@ struct Restoration {
     struct Topic {
         Injector* injector;
         std::shared_ptr<SlotHeader> slot;
+        std::int64_t arrived_ns;  ///< CLOCK_MONOTONIC
         std::vector<Input> readers;
     };
     struct Turn {

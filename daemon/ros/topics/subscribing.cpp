@@ -1,5 +1,10 @@
 #include "ros/topics/subscribing.hpp"
 
+#include <ros/master.h>
+#include <ros/this_node.h>
+#include <xmlrpcpp/XmlRpcException.h>
+#include <xmlrpcpp/XmlRpcValue.h>
+
 #include <algorithm>
 #include <set>
 
@@ -14,6 +19,31 @@ using Connection = std::pair<std::string, std::string>;  // topic and MD5 sum of
 
 Connection connection(const executor::Injector& injector) {
     return {injector.topic(), injector.type().ros_md5};
+}
+
+using Publishers = std::map<std::string, std::set<std::string>>;  // nodes by topic
+
+// The publishers that the master knows; none without an answer. Calls the master.
+// @param caller this node's name
+Publishers publishersAt(const std::string& caller) {
+    Publishers publishers;
+    XmlRpc::XmlRpcValue request;
+    XmlRpc::XmlRpcValue response;
+    XmlRpc::XmlRpcValue state;
+    request[0] = caller;
+    if (!ros::master::execute("getSystemState", request, response, state, false)) return {};
+    try {
+        XmlRpc::XmlRpcValue& topics = state[0];
+        for (int topic = 0; topic < topics.size(); ++topic) {
+            XmlRpc::XmlRpcValue& nodes = topics[topic][1];
+            std::set<std::string>& names = publishers[topics[topic][0]];
+            for (int node = 0; node < nodes.size(); ++node)
+                names.insert(static_cast<std::string&>(nodes[node]));
+        }
+    } catch (const XmlRpc::XmlRpcException&) {
+        return {};  // not a master of ROS
+    }
+    return publishers;
 }
 
 }  // namespace
@@ -80,8 +110,11 @@ Reconciled Subscribing::reconcileTopics(ros::NodeHandle& handle, bool master) {
     // Without the lock, because closing waits for callbacks.
     for (const auto& subscriber : closing_first) subscriber->close();
     Reconciled result = Reconciled::Done;
+    Publishers publishers;
+    if (!opening.empty()) publishers = publishersAt(ros::this_node::getName());
     for (const auto& subscriber : opening) {
-        if (!subscriber->open(handle, queue_)) result = Reconciled::Later;
+        if (!subscriber->open(handle, queue_, publishers[subscriber->topic()]))
+            result = Reconciled::Later;
     }
     for (const auto& subscriber : closing) subscriber->close();
     return result;

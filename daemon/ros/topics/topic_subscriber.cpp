@@ -11,12 +11,29 @@ namespace rtcf::ros1 {
 TopicSubscriber::TopicSubscriber(std::shared_ptr<executor::Injector> injector)
     : injector_(std::move(injector)), muted_(std::make_shared<std::atomic<bool>>(false)) {}
 
-bool TopicSubscriber::open(ros::NodeHandle& handle, ros::CallbackQueueInterface& queue) {
-    using Message = boost::shared_ptr<const RawBytes>;
-    const boost::function<void(const Message)> deliver = [injector = injector_,
-                                                          muted = muted_](const Message& message) {
-        if (!*muted) injector->deliver(message->bytes.get(), message->size);
-    };
+bool LatchedBefore::includes(const std::map<std::string, std::string>& header) {
+    if (publishers_.empty()) return false;
+    if (Clock::now() > until_) {
+        publishers_.clear();
+        return false;
+    }
+    const auto sender = header.find("callerid");
+    if (sender == header.end() || publishers_.erase(sender->second) == 0) return false;
+    const auto latching = header.find("latching");
+    return latching != header.end() && latching->second == "1";
+}
+
+bool TopicSubscriber::open(ros::NodeHandle& handle, ros::CallbackQueueInterface& queue,
+                           std::set<std::string> publishers) {
+    using Event = ros::MessageEvent<const RawBytes>;
+    const boost::function<void(const Event&)> deliver =
+        [injector = injector_, muted = muted_,
+         latched = std::make_shared<LatchedBefore>(std::move(publishers))](const Event& event) {
+            const bool is_old = latched->includes(event.getConnectionHeader());
+            const RawBytes& message = *event.getConstMessage();
+            if (*muted) return;
+            injector->deliver(message.bytes.get(), message.size, executor::monotonicNow(), is_old);
+        };
     ros::SubscribeOptions options;
     options.topic = injector_->topic();
     // Large, so that no message is lost before the injector, which decides whether only the newest
@@ -25,7 +42,7 @@ bool TopicSubscriber::open(ros::NodeHandle& handle, ros::CallbackQueueInterface&
     options.queue_size = kQueue;
     options.md5sum = injector_->type().ros_md5;
     options.datatype = injector_->type().ros_type;
-    options.helper = boost::make_shared<ros::SubscriptionCallbackHelperT<const Message&>>(deliver);
+    options.helper = boost::make_shared<ros::SubscriptionCallbackHelperT<const Event&>>(deliver);
     options.callback_queue = &queue;
     options.transport_hints = ros::TransportHints().tcpNoDelay();
     ros::Subscriber subscriber;

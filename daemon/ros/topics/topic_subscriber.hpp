@@ -5,9 +5,13 @@
 #include <ros/subscriber.h>
 
 #include <atomic>
+#include <chrono>
+#include <map>
 #include <memory>
 #include <mutex>
+#include <set>
 #include <string>
+#include <utility>
 
 #include "exchange/injector.hpp"
 #include "ros/roscpp/handles.hpp"
@@ -19,18 +23,41 @@ class NodeHandle;
 
 namespace rtcf::ros1 {
 
+/// Messages latched before a subscription: ROS 1 does not say when they were published, so they are
+/// old. A publisher that registers later latches what it publishes now.
+class LatchedBefore {
+   public:
+    /// @param publishers nodes that publish the topic at the moment
+    explicit LatchedBefore(std::set<std::string> publishers)
+        : publishers_(std::move(publishers)), until_(Clock::now() + kDelivery) {}
+
+    /// True if the message of a connection with this header is such a message. One thread.
+    bool includes(const std::map<std::string, std::string>& header);
+
+   private:
+    using Clock = std::chrono::steady_clock;
+    // Within this time, a connection is made and a latched message arrives.
+    static constexpr std::chrono::seconds kDelivery{2};
+
+    std::set<std::string> publishers_;  // that have sent nothing yet
+    const Clock::time_point until_;
+};
+
 /// Owned by Subscribing. open() and close() call the master; the thread of the callback queue
 /// delivers messages.
 class TopicSubscriber {
    public:
     explicit TopicSubscriber(std::shared_ptr<executor::Injector> injector);
 
+    const std::string& topic() const noexcept { return injector_->topic(); }
     /// Stops delivering messages. Any thread; returns at once.
     void mute() { *muted_ = true; }
 
     /// Subscribes the topic.
+    /// @param publishers nodes that publish it already
     /// @return false if that failed; the caller repeats it later
-    bool open(ros::NodeHandle& handle, ros::CallbackQueueInterface& queue);
+    bool open(ros::NodeHandle& handle, ros::CallbackQueueInterface& queue,
+              std::set<std::string> publishers);
     void close();
 
     bool isOpen() const;

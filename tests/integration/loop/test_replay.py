@@ -151,6 +151,18 @@ def test_a_full_disk_leaves_no_partial_bag(daemon: Daemon, tmp_path: Path) -> No
         subprocess.run(["umount", disk], check=True)
 
 
+def test_the_last_message_is_read_between_two_cycles_too(daemon: Daemon, tmp_path: Path) -> None:
+    for after_ns, cycles in ((2 * PERIOD_NS, 3), (2 * PERIOD_NS + 1, 4)):
+        messages: list[tuple[str, int, object]] = [
+            ("/G2_R2", 0, Float64(1.5)),
+            ("/G2_R2", after_ns, Float64(2.5)),
+        ]
+        done = daemon.ctl("replay", str(_write(tmp_path / "in.bag", messages)), "-o", "json")
+        assert (done.returncode, done.stderr) == (0, "")
+        assert json.loads(done.stdout)["cycles"] == cycles
+        assert daemon.ctl("get", "R2.in4").stdout.strip() == "2.5"
+
+
 def test_graph_changes_are_rejected_during_a_replay(daemon: Daemon) -> None:
     with rtcf.Client(daemon.socket) as client, client.replay() as replay:
         replay.run(control_pb2.ReplayRequest(begin=True, start_ns=START_NS))

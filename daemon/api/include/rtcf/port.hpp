@@ -2,6 +2,21 @@
 /// Ports: the inputs and outputs by which components exchange values. Declare them as members; they
 /// register themselves with their component. Inside a runner, a connection is a pointer to the
 /// writer's value: there is no copy.
+///
+/// A value belongs to the loop time at which it was written or arrived, its stamp:
+///
+///     written in                        stamp                            the first read() returns
+///     update(), safe()                  the cycle                        New
+///     start()                           the start                        New
+///     takeOver()                        just before the next cycle       New
+///     from outside, the loop runs       the cycle that takes it          New
+///     from outside, before the start    its arrival                      Old; queues drop it
+///     in place, without publish()       the last publish() or write()    as before the change
+///
+/// The rule for each input: it reads the value of its writer if there is one. While the writer has
+/// not written, the input keeps the value of an earlier writer, with its age. New means that this
+/// input has not read the value, so it does not depend on other readers; only values from outside
+/// that are older than the start or than the input's connection begin as Old.
 #pragma once
 
 #include <cmath>
@@ -45,7 +60,8 @@ class InputBase {
     /// Loop time since the newest value was written, ns; -1 if there is none. Real-time safe.
     /// @param owner the component, `this`
     std::int64_t age(const Component* owner) const noexcept RTCF_NONBLOCKING;
-    /// True if an output or a ROS topic feeds this input. Real-time safe.
+    /// True if there is a writer, an output or a ROS topic, even if it has not written yet: then
+    /// age() grows. Real-time safe.
     /// @param owner the component, `this`
     bool connected(const Component* owner) const noexcept RTCF_NONBLOCKING;
 
@@ -99,11 +115,9 @@ class InputPort {
     const SlotHeader& slot() const noexcept RTCF_NONBLOCKING { return *input_.source_; }
     /// Stamp of the value of the last read().
     std::int64_t seen() const noexcept RTCF_NONBLOCKING { return input_.seen_; }
-    /// Stamp of the awaited slot when the input was connected to it; 0 = none is awaited.
-    std::int64_t since() const noexcept RTCF_NONBLOCKING { return waiting() ? since_ : 0; }
 
-    /// Connects the input to an output's slot. If the input has a value, it keeps it until the new
-    /// writer writes, see connectWritten(); a queue has copies and does not wait.
+    /// Connects the input to an output's slot. If the writer has not written, the input keeps its
+    /// value until then, see connectWritten(); a queue has copies and does not wait.
     /// @param continued `source` is another slot with values of the same writer
     void connect(const SlotHeader* source, bool continued) noexcept RTCF_NONBLOCKING {
         connected_ = true;
@@ -116,20 +130,19 @@ class InputPort {
             return;
         }
         connectWritten();  // the value of the present writer, if it has written
-        if (queue_ != nullptr || input_.source_->stamp == 0) {
+        if (queue_ != nullptr || input_.source_->stamp == 0 || source->stamp != 0) {
             set(source, 0);
         } else {
             awaited_ = source;
-            since_ = source->stamp;
         }
     }
-    /// Connects the input to values from outside, of which `front` is the newest. If the input has
-    /// a value, it keeps it until inject().
+    /// Connects the input to values from outside, of which `front` is the newest: an old one. If
+    /// the input has a value, it keeps it until inject().
     void connectOutside(const SlotHeader* front) noexcept RTCF_NONBLOCKING {
         connected_ = true;
         connectWritten();
         awaited_ = nullptr;
-        if (queue_ != nullptr || input_.source_->stamp == 0) set(front, 0);
+        if (queue_ != nullptr || input_.source_->stamp == 0) injectOld(front);
     }
     /// Removes the writer; the value stays.
     void disconnect() noexcept RTCF_NONBLOCKING {
@@ -140,24 +153,26 @@ class InputPort {
     /// Sets a new value that arrived from outside the loop, in `source`. The slot of the previous
     /// value is free again.
     void inject(const SlotHeader* source) noexcept RTCF_NONBLOCKING { set(source, 0); }
-    /// Ends the wait for a new writer if it has written since the connection.
+    /// The same for a value that is not new to a reader: it arrived before the start.
+    void injectOld(const SlotHeader* source) noexcept RTCF_NONBLOCKING {
+        set(source, source->stamp);
+    }
+    /// Ends the wait for a new writer if it has written.
     void connectWritten() noexcept RTCF_NONBLOCKING {
         const SlotHeader* const awaited = awaited_;
-        if (awaited != nullptr && awaited->stamp != since_) set(awaited, 0);
+        if (awaited != nullptr && awaited->stamp != 0) set(awaited, 0);
     }
     /// Sets the value and the read position, to restore them.
     /// @param awaited slot of a new writer that has not written yet; null = none
-    void set(const SlotHeader* source, std::int64_t seen, const SlotHeader* awaited = nullptr,
-             std::int64_t since = 0) noexcept RTCF_NONBLOCKING {
+    void set(const SlotHeader* source, std::int64_t seen,
+             const SlotHeader* awaited = nullptr) noexcept RTCF_NONBLOCKING {
         input_.source_ = source;
         input_.seen_ = seen;
-        since_ = since;
         awaited_ = awaited;
     }
     /// Follows a move of the loop's time by `by` ns.
     void moveTime(std::int64_t by) noexcept RTCF_NONBLOCKING {
         input_.seen_ = movedStamp(input_.seen_, by);
-        since_ = movedStamp(since_, by);
     }
     /// @}
 
@@ -173,7 +188,6 @@ class InputPort {
     const TypeInfo& type_;
     QueueBase* queue_ = nullptr;
     bool connected_ = false;
-    std::int64_t since_ = 0;
     Shared<const SlotHeader*> awaited_ = nullptr;
 };
 
@@ -306,28 +320,31 @@ class OutputPort {
         type_.copy(*seen, *slot_);
         staged_ = std::exchange(slot_, std::move(seen));
     }
-    /// Publishes the written value to readers. Called after update(). Real-time safe if
-    /// TypeInfo::copy is.
-    /// @return false if the output is declared Finite and the value is not finite; readers keep the
-    /// previous value
+    /// True if commit() publishes the written value: it is finite, or need not be. Real-time safe.
+    bool valid() const noexcept {
+        if (!checked_) return true;
+        if (type_.is_double) return std::isfinite(static_cast<const Slot<double>&>(*staged_).value);
+        return type_.finite(*staged_);
+    }
+    /// Copies the written value to readers, also one that was changed in place without publish(),
+    /// see showsChangesInPlace(). Called after update(). Real-time safe if TypeInfo::copy is.
+    /// @return false if the output is declared Finite and the published value is not finite;
+    /// readers keep the previous value
     /// @throws any exception of a copy; readers then have the previous value or the new one
     bool commit() {
-        if (staged_->stamp == slot_->stamp) return true;
+        const bool published = staged_->stamp != slot_->stamp;
+        if (!published && !showsChangesInPlace(type_)) return true;
+        if (!valid()) {
+            discard();
+            return !published;
+        }
         if (type_.is_double) {
-            const double value = static_cast<const Slot<double>&>(*staged_).value;
-            if (checked_ && !std::isfinite(value)) {
-                discard();
-                return false;
-            }
-            static_cast<Slot<double>&>(*slot_).value = value;
+            static_cast<Slot<double>&>(*slot_).value =
+                static_cast<const Slot<double>&>(*staged_).value;
             slot_->stamp = staged_->stamp;
             return true;
         }
-        if (checked_ && !type_.finite(*staged_)) {
-            discard();
-            return false;
-        }
-        if (type_.flat) {
+        if (type_.flat || !published) {
             type_.copy(*slot_, *staged_);
             return true;
         }
@@ -389,7 +406,9 @@ class Output final : public OutputBase {
         stampWrite();
     }
 
-    /// The value in place: change it, then call publish(). Real-time safe.
+    /// The value in place: change it, then call publish(). Without publish(), all readers see the
+    /// changed value as Old, with the age of the last one; a value of variable size or above 4 KiB
+    /// they see only after publish(). Queues and ROS only get published values. Real-time safe.
     T& value() noexcept RTCF_NONBLOCKING { return static_cast<Slot<T>*>(raw_)->value; }
     /// Stamps the value changed in place as a new value. Real-time safe.
     void publish() noexcept RTCF_NONBLOCKING { stampWrite(); }

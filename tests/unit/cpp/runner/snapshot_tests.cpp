@@ -305,8 +305,6 @@ TEST_F(Snapshots, UnsuitableOneIsRejectedCompletely) {
                [&](Snapshot& other) { other.components[0].outputs[0].value.stamp = time; });
         expect("has the time " + std::to_string(time),
                [&](Snapshot& other) { other.components[0].inputs[0].seen = time; });
-        expect("has the time " + std::to_string(time),
-               [&](Snapshot& other) { other.components[0].inputs[0].since = time; });
     }
     expect("taken at 500 Hz", [](Snapshot& other) { other.period_ns = 2'000'000; });
     expect("and 3 more", [](Snapshot& other) {
