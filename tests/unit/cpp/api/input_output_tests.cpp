@@ -192,8 +192,18 @@ TEST_F(InputOutput, ReadIntoACopyHonoursCopyOld) {
     EXPECT_EQ(copy, 4.0);
 }
 
+TEST_F(InputOutput, RewiredInputReadsWhatTheNewWriterHasWritten) {
+    connect(first);
+    write(first, 1.0);
+    in.read();
+    write(second, 9.0);
+    connect(second);
+    EXPECT_FALSE(port().waiting());
+    EXPECT_EQ(read(), DataStatus::New);
+    EXPECT_EQ(in.value(), 9.0);
+}
+
 TEST_F(InputOutput, RewiredInputKeepsItsValueUntilTheNewWriterWrites) {
-    second.write(9.0);
     connect(first);
     write(first, 1.0);
     in.read();
@@ -269,7 +279,6 @@ TEST_F(InputOutput, ContinuedConnectionKeepsReadAndUnreadValues) {
 
 TEST_F(InputOutput, ContinuedConnectionKeepsAnEarlierWritersValueToo) {
     Output<double> copy{&component, "copy"};
-    second.write(9.0);
     connect(first);
     write(first, 1.0);
     in.read();

@@ -17,7 +17,7 @@
 namespace rtcf::test {
 namespace {
 
-constexpr int kChanges = 250;
+constexpr int kStampChanges = 250;
 
 class Stamps : public RunnerFixture {
    protected:
@@ -190,8 +190,9 @@ class StampsModel : public Stamps, public ::testing::WithParamInterface<unsigned
             const std::string component = "/" + name;
             ASSERT_EQ(value(component, "news"), hearer.news) << name;
             ASSERT_EQ(value(component, "status"), static_cast<double>(hearer.status)) << name;
-            if (hearer.status != DataStatus::None)
+            if (hearer.status != DataStatus::None) {
                 ASSERT_EQ(value(component, "value"), hearer.value) << name;
+            }
             ASSERT_EQ(value(component, "wired"), voice_ || mapped_ ? 1.0 : 0.0) << name;
         }
     }
@@ -280,7 +281,7 @@ TEST_P(StampsModel, EachReaderReadsWhatTheModelReads) {
         load(listener(name));
         hearers_[name].connect(said_);
     }
-    for (int i = 0; i < kChanges; ++i) {
+    for (int i = 0; i < kStampChanges; ++i) {
         SCOPED_TRACE("change " + std::to_string(i));
         changeSomething();
         ASSERT_FALSE(HasFatalFailure());
@@ -369,10 +370,12 @@ TEST_F(Stamps, QueueDropsMessagesOfTheTimeBeforeTheStartAndCountsThem) {
     EXPECT_EQ(value("/C", "dropped"), 7.0);
     int lines = 0;
     for (const LogEntry& entry : logged()) {
-        if (entry.text == "6 messages on /m from before the start were dropped") ++lines;
-        if (entry.text == "1 message on /m from before the start was dropped") ++lines;
+        if (entry.message == "6 messages on /m from before the start were dropped") ++lines;
+        if (entry.message == "1 message on /m from before the start was dropped") ++lines;
     }
-    EXPECT_EQ(lines, 2);
+    std::string all;
+    for (const LogEntry& entry : logged()) all += entry.message + "\n";
+    EXPECT_EQ(lines, 2) << all;
 }
 
 TEST_F(Stamps, QueueGetsWhatASuccessorWritesInStart) {
