@@ -44,7 +44,7 @@ def test_a_velocity_from_before_the_start_is_not_followed(
 def test_a_message_latched_before_the_subscription_is_old(
     ros_daemon: tuple[Daemon, rtcf.Client], master: Master
 ) -> None:
-    daemon, client = ros_daemon
+    _, client = ros_daemon
     # Identity passes on new values only.
     client.load(rtcf.component("rtcf_examples", "Identity", name="id", remaps=["in:=/chart"]))
     client.start()
