@@ -23,10 +23,10 @@ class Mimo final : public rtcf::Component {
         if (in3.read() == rtcf::DataStatus::New) sum += in3.value().data;
         if (in4.read() == rtcf::DataStatus::New) sum += in4.value().data;
         if (sum > kLimit) sum = 1.0;
-        out1.value().data = sum;
-        out1.publish();
-        out2.value().data = sum;
-        out2.publish();
+        Number out;
+        out.data = sum;
+        out1.write(out);
+        out2.write(out);
     }
 
     // Sums in a loop grow without bound: restart at 1 above this value.

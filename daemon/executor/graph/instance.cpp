@@ -216,7 +216,7 @@ void Instance::configure() {
 void Instance::freezePorts() {
     accessTo(*component_).freeze();
     accessTo(*component_).stageOutputs([this](const OutputPort& output) {
-        return definition_->optional || !showsChangesInPlace(output.type());
+        return definition_->optional || !isShared(output.type());
     });
     if (definition_->optional) statistics_->faults.taken_out.allocateText();
     if (!accessTo(*component_).stagedOutputs().empty()) statistics_->faults.unsafe.allocateText();

@@ -105,7 +105,8 @@ void Cycle::moveTime(std::int64_t by_ns) {
     for (const Step& step : schedule_->steps) {
         accessTo(*step.component)
             .setTime(std::max<std::int64_t>(1, step.component->time() + by_ns));
-        for (const OutputPort* output : accessTo(*step.component).outputs()) {
+        for (OutputPort* output : accessTo(*step.component).outputs()) {
+            output->moveDraft(by_ns);
             move(output->slot().get());
             move(output->written());
         }
@@ -370,6 +371,7 @@ void Cycle::makeSafe(Component& component, ComponentStatistics& statistics,
 // half-written values.
 void Cycle::putBack(const Step& step) noexcept {
     for (OutputPort* output : accessTo(*step.component).outputs()) {
+        output->dropDraft();
         if (!output->staged()) {
             frames_->putBack(output->slot().get());
             continue;

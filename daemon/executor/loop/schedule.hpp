@@ -82,10 +82,9 @@ struct Latch {
     const SlotHeader* from;
     const Component* writer;
 
-    /// Copies a value that was written, or changed in place. Real-time safe if TypeInfo::copy is.
-    /// @throws any exception of a copy
+    /// Real-time safe if TypeInfo::copy is. @throws any exception of a copy
     void copy() const {
-        if (to->stamp != from->stamp || showsChangesInPlace(*type)) type->copy(*to, *from);
+        if (to->stamp != from->stamp) type->copy(*to, *from);
     }
 };
 

@@ -84,8 +84,8 @@ struct AbiProbe {
              offsetof(OutputPort, name_), offsetof(OutputPort, unit_), offsetof(OutputPort, type_),
              offsetof(OutputPort, slot_), offsetof(OutputPort, staged_),
              offsetof(OutputPort, sample_), offsetof(OutputPort, written_),
-             offsetof(OutputPort, connected_), offsetof(OutputPort, checked_),
-             offsetof(OutputPort, policy_)});
+             offsetof(OutputPort, draft_), offsetof(OutputPort, connected_),
+             offsetof(OutputPort, checked_), offsetof(OutputPort, policy_)});
         add({sizeof(InputPort), offsetof(InputPort, input_), offsetof(InputPort, owner_),
              offsetof(InputPort, name_), offsetof(InputPort, type_), offsetof(InputPort, queue_),
              offsetof(InputPort, connected_), offsetof(InputPort, awaited_), sizeof(QueueBase),

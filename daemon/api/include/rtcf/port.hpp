@@ -11,7 +11,7 @@
 ///     takeOver()                        just before the next cycle       New
 ///     from outside, the loop runs       the cycle that takes it          New
 ///     from outside, before the start    its arrival                      Old; queues drop it
-///     in place, without publish()       the last publish() or write()    as before the change
+///     in place                          the cycle of publish()           New, not before
 ///
 /// The rule for each input: it reads the value of its writer if there is one. While the writer has
 /// not written, the input keeps the value of an earlier writer, with its age. New means that this
@@ -246,7 +246,7 @@ class OutputBase {
    protected:
     ~OutputBase();
 
-    OutputPort& port() noexcept { return *port_; }
+    OutputPort& port() const noexcept RTCF_NONBLOCKING { return *port_; }
     void stampWrite() noexcept RTCF_NONBLOCKING { raw_->stamp = *now_; }
 
     friend struct AbiProbe;
@@ -269,7 +269,9 @@ class OutputPort {
           unit_(std::move(unit)),
           type_(type),
           slot_(type.make_slot(nullptr)),
-          written_(slot_.get()) {
+          written_(slot_.get()),
+          draft_(isShared(type) ? type.make_slot(nullptr) : slot_) {
+        dropDraft();
         if (finite == nullptr) return;
         checked_ = true;
         policy_ = finite->policy;
@@ -295,6 +297,17 @@ class OutputPort {
     const std::shared_ptr<SlotHeader>& slot() const noexcept { return slot_; }
     /// The slot that the component writes: slot(), or the staged one. Real-time safe.
     SlotHeader* written() const noexcept RTCF_NONBLOCKING { return written_; }
+    /// The slot that the component changes in place until publish(). Real-time safe.
+    SlotHeader& draft() const noexcept RTCF_NONBLOCKING { return *draft_; }
+    /// Undoes changes in place that were not published. Real-time safe.
+    void dropDraft() noexcept RTCF_NONBLOCKING {
+        if (draft_.get() != written_) draft_->stamp = kNoDraft;
+    }
+    /// Follows a move of the loop's time by `by` ns. Real-time safe.
+    void moveDraft(std::int64_t by) noexcept RTCF_NONBLOCKING {
+        if (draft_.get() != written_ && draft_->stamp != kNoDraft)
+            draft_->stamp = movedStamp(draft_->stamp, by);
+    }
     /// A slot with the capacity set by reserve(), as the argument of TypeInfo::make_slot(). Not
     /// real-time.
     const SlotHeader* sample() const noexcept {
@@ -326,17 +339,16 @@ class OutputPort {
         if (type_.is_double) return std::isfinite(static_cast<const Slot<double>&>(*staged_).value);
         return type_.finite(*staged_);
     }
-    /// Copies the written value to readers, also one that was changed in place without publish(),
-    /// see showsChangesInPlace(). Called after update(). Real-time safe if TypeInfo::copy is.
-    /// @return false if the output is declared Finite and the published value is not finite;
-    /// readers keep the previous value
+    /// Publishes the written value to readers. Called after update(). Real-time safe if
+    /// TypeInfo::copy is.
+    /// @return false if the output is declared Finite and the value is not finite; readers keep the
+    /// previous value
     /// @throws any exception of a copy; readers then have the previous value or the new one
     bool commit() {
-        const bool published = staged_->stamp != slot_->stamp;
-        if (!published && !showsChangesInPlace(type_)) return true;
+        if (staged_->stamp == slot_->stamp) return true;
         if (!valid()) {
             discard();
-            return !published;
+            return false;
         }
         if (type_.is_double) {
             static_cast<Slot<double>&>(*slot_).value =
@@ -344,7 +356,7 @@ class OutputPort {
             slot_->stamp = staged_->stamp;
             return true;
         }
-        if (type_.flat || !published) {
+        if (type_.flat) {
             type_.copy(*slot_, *staged_);
             return true;
         }
@@ -366,6 +378,8 @@ class OutputPort {
 
    private:
     friend struct AbiProbe;
+    static constexpr std::int64_t kNoDraft = INT64_MIN;  // differs from each stamp
+
     const OutputBase& output_;
     std::string name_;
     std::string unit_;
@@ -374,6 +388,8 @@ class OutputPort {
     std::shared_ptr<SlotHeader> staged_;  // null = readers see written values at once
     std::shared_ptr<SlotHeader> sample_;  // null = reserve() was not called
     SlotHeader* const written_;
+    // Of a value that readers may share; otherwise written_.
+    const std::shared_ptr<SlotHeader> draft_;
     bool connected_ = false;
     bool checked_ = false;  // declared Finite
     OnNonFinite policy_ = OnNonFinite::Hold;
@@ -406,12 +422,23 @@ class Output final : public OutputBase {
         stampWrite();
     }
 
-    /// The value in place: change it, then call publish(). Without publish(), all readers see the
-    /// changed value as Old, with the age of the last one; a value of variable size or above 4 KiB
-    /// they see only after publish(). Queues and ROS only get published values. Real-time safe.
-    T& value() noexcept RTCF_NONBLOCKING { return static_cast<Slot<T>*>(raw_)->value; }
-    /// Stamps the value changed in place as a new value. Real-time safe.
-    void publish() noexcept RTCF_NONBLOCKING { stampWrite(); }
+    /// The value in place: change it, then call publish(). No reader sees a change before that. In
+    /// one cycle, use either this or write(), which is faster for a small value. Real-time safe.
+    T& value() noexcept RTCF_NONBLOCKING {
+        if constexpr (kHasDraft) {
+            // After write(), or a value that the executor has put back.
+            if (draft().stamp != raw_->stamp) draft() = *static_cast<const Slot<T>*>(raw_);
+            return draft().value;
+        } else {
+            return static_cast<Slot<T>*>(raw_)->value;
+        }
+    }
+    /// Writes the value changed in place. Real-time safe.
+    void publish() noexcept RTCF_NONBLOCKING {
+        if constexpr (kHasDraft) static_cast<Slot<T>*>(raw_)->value = value();
+        stampWrite();
+        if constexpr (kHasDraft) draft().stamp = raw_->stamp;
+    }
 
     /// Reserves memory for values up to the size of `sample`, so that writing them does not
     /// allocate. In the constructor or in configure(); not real-time safe.
@@ -420,6 +447,14 @@ class Output final : public OutputBase {
         SlotHeader* const seen = port().slot().get();
         static_cast<Slot<T>*>(seen)->value = sample;
         if constexpr (!PortType<T>::kFixedSize) port().setSample(typeInfo<T>().make_slot(seen));
+    }
+
+   private:
+    // As isShared().
+    static constexpr bool kHasDraft = PortType<T>::kFixedSize && sizeof(T) <= kLargestShared;
+
+    Slot<T>& draft() const noexcept RTCF_NONBLOCKING {
+        return static_cast<Slot<T>&>(port().draft());
     }
 };
 

@@ -102,14 +102,13 @@ inline bool isPrivate(const TypeInfo& type) noexcept {
 /// True if ports of the two types can be connected. Not real-time: it compares texts.
 bool sameType(const TypeInfo& a, const TypeInfo& b) noexcept;
 
-/// Largest output that its component can change in place in view of the readers, bytes.
-constexpr std::size_t kLargestInPlace = 4096;
+/// Largest value of fixed size whose readers have the writer's slot, bytes. Outputs of other values
+/// are staged, see OutputPort.
+constexpr std::size_t kLargestShared = 4096;
 
-/// True if all readers of an output see a value that was changed in place without publish(). If
-/// not, they see it after publish(), because copying it in each cycle would take too long.
-/// Real-time safe.
-inline bool showsChangesInPlace(const TypeInfo& type) noexcept RTCF_NONBLOCKING {
-    return type.fixed_size && type.size <= kLargestInPlace;
+/// True if readers of an output of this type may read the slot that write() fills. Real-time safe.
+inline bool isShared(const TypeInfo& type) noexcept RTCF_NONBLOCKING {
+    return type.fixed_size && type.size <= kLargestShared;
 }
 
 /// True if both the value and its message own memory. The message then has to be built from a copy,
