@@ -72,6 +72,6 @@ def test_a_heartbeat_from_before_the_start_is_no_beat(daemon: Daemon) -> None:
         client.write("hb.beat", 5)
         client.start()
         _run_on(client)
-        assert daemon.ctl("get", "hb.stopped").stdout.strip() == "true"
+        assert port_value(client, "hb", "stopped") == 1.0
         client.write("hb.beat", 6)
-        wait_for(lambda: daemon.ctl("get", "hb.stopped").stdout.strip() == "false", "the beat")
+        wait_for(lambda: port_value(client, "hb", "stopped") == 0.0, "the beat")
