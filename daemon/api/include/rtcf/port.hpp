@@ -23,10 +23,12 @@
 #include <cstdint>
 #include <memory>
 #include <string>
+#include <type_traits>
 #include <utility>
 
 #include "rtcf/any_type.hpp"
 #include "rtcf/arithmetic_type.hpp"
+#include "rtcf/component_memory.hpp"
 #include "rtcf/message_type.hpp"
 #include "rtcf/port_type.hpp"
 #include "rtcf/realtime.hpp"
@@ -270,7 +272,7 @@ class OutputPort {
           type_(type),
           slot_(type.make_slot(nullptr)),
           written_(slot_.get()),
-          draft_(isShared(type) ? type.make_slot(nullptr) : slot_) {
+          draft_(isShared(type) ? makeDraft(type) : slot_) {
         dropDraft();
         if (finite == nullptr) return;
         checked_ = true;
@@ -380,6 +382,11 @@ class OutputPort {
     friend struct AbiProbe;
     static constexpr std::int64_t kNoDraft = INT64_MIN;  // differs from each stamp
 
+    static std::shared_ptr<SlotHeader> makeDraft(const TypeInfo& type) {
+        const detail::ConstructionScope on_heap(nullptr);  // the slots of readers lie together
+        return type.make_slot(nullptr);
+    }
+
     const OutputBase& output_;
     std::string name_;
     std::string unit_;
@@ -450,8 +457,9 @@ class Output final : public OutputBase {
     }
 
    private:
-    // As isShared().
-    static constexpr bool kHasDraft = PortType<T>::kFixedSize && sizeof(T) <= kLargestShared;
+    // As isShared(). A copy that may throw is no part of value() and publish().
+    static constexpr bool kHasDraft = PortType<T>::kFixedSize && sizeof(T) <= kLargestShared &&
+                                      std::is_nothrow_copy_assignable_v<T>;
 
     Slot<T>& draft() const noexcept RTCF_NONBLOCKING {
         return static_cast<Slot<T>&>(port().draft());
