@@ -33,6 +33,7 @@ Publishers publishersAt(const std::string& caller) {
     request[0] = caller;
     if (!ros::master::execute("getSystemState", request, response, state, false)) return {};
     try {
+        // NOLINTBEGIN(modernize-loop-convert): its begin() is for structs
         XmlRpc::XmlRpcValue& topics = state[0];
         for (int topic = 0; topic < topics.size(); ++topic) {
             XmlRpc::XmlRpcValue& nodes = topics[topic][1];
@@ -40,6 +41,7 @@ Publishers publishersAt(const std::string& caller) {
             for (int node = 0; node < nodes.size(); ++node)
                 names.insert(static_cast<std::string&>(nodes[node]));
         }
+        // NOLINTEND(modernize-loop-convert)
     } catch (const XmlRpc::XmlRpcException&) {
         return {};  // not a master of ROS
     }
