@@ -13,9 +13,6 @@ namespace rtcf::executor {
 
 namespace {
 
-// Outputs up to this size are restored from the last frame if update() throws. For larger ones, a
-// copy after each write costs less per cycle.
-
 const ComponentRecord& findRecord(const Library& library, const ComponentDefinition& definition) {
     if (const ComponentRecord* record = library.find(definition.type)) return *record;
     std::string names;

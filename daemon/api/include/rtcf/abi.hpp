@@ -10,6 +10,7 @@
 #include <cstring>
 #include <initializer_list>
 
+#include "rtcf/component.hpp"  // if this header is included alone
 #include "rtcf/registration.hpp"
 #include "rtcf/version.hpp"
 
@@ -62,6 +63,7 @@ struct AbiProbe {
              offsetof(Context, disabled),
              offsetof(Context, recorder_slot),
              offsetof(Context, device),
+             offsetof(Context, faults),
              offsetof(Context, log),
              offsetof(Context, gate),
              offsetof(Context, remaps),

@@ -102,8 +102,9 @@ inline bool isPrivate(const TypeInfo& type) noexcept {
 /// True if ports of the two types can be connected. Not real-time: it compares texts.
 bool sameType(const TypeInfo& a, const TypeInfo& b) noexcept;
 
-/// Largest value of fixed size whose readers have the writer's slot, bytes. Outputs of other values
-/// are staged, see OutputPort.
+/// Largest value of fixed size whose readers have the writer's slot, bytes. If update() throws, the
+/// value is restored from the last frame. Larger ones are staged, see OutputPort: there, a copy
+/// after each write costs less per cycle.
 constexpr std::size_t kLargestShared = 4096;
 
 /// True if readers of an output of this type may read the slot that write() fills. Real-time safe.
