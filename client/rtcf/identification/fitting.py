@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from rtcf_shared.errors import RtcfError
-from scipy import optimize
+from scipy import optimize, signal
 
 from rtcf.identification.models import Array, Model, StateSpace, Transfer
 
-_GRID = 9  # start values of a time constant, and of the delay
+_GRID = 9  # start values of a time constant
 _STARTS = 3  # that are refined
 _LEAST_SAMPLES = 30
 _MOST_STATES = 8
 _HISTORY = 60  # cycles of the regression, at most
+_DEVIATIONS = 3.0  # standard deviations of the parameters of `others`
+_LARGEST_DEVIATION = 1.0  # of a parameter
+_MOST_CORRELATED = 0.99
 _CLOSE = 1.05  # of the smallest error: a model of lower order is preferred
 
 
@@ -28,12 +31,14 @@ class Fit:
     percent    100 (1 - |y - model| / |y - mean of y|): 100 is exact, 0 as good as a constant
     residuals  recorded minus simulated outputs
     offset     output of the plant at rest
+    others     models that the noise of the values does not distinguish from `model`
     """
 
     model: Model
     percent: float
     residuals: Array
     offset: float
+    others: tuple[Model, ...] = ()
 
 
 def fit_first_order(inputs: npt.ArrayLike, outputs: npt.ArrayLike, period: float) -> Fit:
@@ -136,39 +141,77 @@ def _fit(
     """
     u, y = _checked(inputs, outputs)
     longest = 0.5 * len(u) * period
+    y0 = y - y.mean()
+    scale = float(np.linalg.norm(y0))
 
     def linear(p: Any) -> tuple[float, Array]:
         unit = Transfer(1.0, denominator(p), max(float(p[-1]), 0.0) * period)
         x = unit.simulate(u, period)
-        x0, y0 = x - x.mean(), y - y.mean()
+        x0 = x - x.mean()
         power = float(x0 @ x0)
         gain = float(x0 @ y0) / power if power > 0 else 0.0
-        residuals: Array = y0 - gain * x0
+        residuals: Array = (y0 - gain * x0) / scale
         return gain, residuals
 
-    times = np.geomspace(period, 4.0 * longest, _GRID)
-    delays = np.concatenate([[0.0], np.geomspace(period, longest / 4.0, _GRID - 1)])
-    starts = [
-        (float(np.log(time)), *rest, float(delay / period))
-        for time in times
-        for rest in more
-        for delay in delays
-    ]
-    starts.sort(key=lambda p: float(np.linalg.norm(linear(p)[1])))
+    starts: list[tuple[float, tuple[float, ...]]] = []
+    for time in np.geomspace(period, 4.0 * longest, _GRID):
+        for rest in more:
+            p = (float(np.log(time)), *rest)
+            x = Transfer(1.0, denominator((*p, 0.0)), 0.0).simulate(u, period)
+            error, cycles = _best_delay(x, y0, len(u) // 2)
+            starts.append((error, (*p, float(cycles))))
+    starts.sort()
     low = [np.log(period / 20.0), *(np.log(1e-3) for _ in more[0]), 0.0]
     high = [np.log(100.0 * longest), *(np.log(1e3) for _ in more[0]), longest / period]
-    scale = float(np.linalg.norm(y - y.mean()))
     best: Any = None
-    for start in starts[:_STARTS]:
+    for _, start in starts[:_STARTS]:
         found = optimize.least_squares(
-            lambda p: linear(p)[1] / scale, np.clip(start, low, high), bounds=(low, high),
-            xtol=1e-12, ftol=1e-12, gtol=1e-14, x_scale="jac", max_nfev=200,
+            lambda p: linear(p)[1], np.clip(start, low, high), bounds=(low, high),
+            xtol=1e-10, ftol=1e-10, gtol=1e-14, x_scale="jac", max_nfev=100,
         )  # fmt: skip
         if best is None or found.cost < best.cost:
             best = found
-    gain = linear(best.x)[0]
-    model = Transfer(gain, denominator(best.x), float(best.x[-1]) * period)
-    return _judged(model, y, model.simulate(u, period))
+
+    def model_of(p: Any) -> Transfer:
+        clipped = np.clip(p, low, high)
+        delay = float(clipped[-1]) * period
+        return Transfer(linear(clipped)[0], denominator(clipped), delay)
+
+    model = model_of(best.x)
+    fit = _judged(model, y, model.simulate(u, period))
+    others = [model_of(best.x + each) for each in _deviations(best.jac, best.fun)]
+    return replace(fit, others=tuple(others))
+
+
+def _best_delay(x: Array, y: Array, most: int) -> tuple[float, int]:
+    """Return the smallest relative error of a delayed response, and its delay in cycles.
+
+    For each delay, the best gain and offset are known from sums over the overlap.
+    """
+    n = len(x)
+    products = signal.correlate(y, x, method="fft")[n - 1 : n - 1 + most]
+    counts = np.arange(n, n - most, -1)
+    sums, powers = np.cumsum(x)[counts - 1], np.cumsum(x * x)[counts - 1]
+    powers = powers - sums * sums / n
+    gained = np.where(powers > 0.0, products**2 / np.where(powers > 0.0, powers, 1.0), 0.0)
+    cycles = int(np.argmax(gained))
+    return 1.0 - float(gained[cycles] / (y @ y)), cycles
+
+
+def _deviations(jacobian: Array, residuals: Array) -> list[Array]:
+    """Return changes of the parameters along the axes of their covariance, both ways.
+
+    The residuals may be correlated: fewer of them count, as of an autoregression of first order.
+    """
+    power = float(residuals @ residuals)
+    correlation = float(residuals[1:] @ residuals[:-1]) / power if power > 0.0 else 0.0
+    correlation = min(max(correlation, 0.0), _MOST_CORRELATED)
+    inflated = power / len(residuals) * (1.0 + correlation) / (1.0 - correlation)
+    _, values, axes = np.linalg.svd(jacobian, full_matrices=False)
+    sizes = _DEVIATIONS * np.sqrt(inflated) / np.maximum(values, 1e-12 * values[0])
+    # A parameter that the values leave open, e.g. the time constant of an integrator, stays close.
+    sizes = np.minimum(sizes, _LARGEST_DEVIATION)
+    return [sign * size * axis for size, axis in zip(sizes, axes, strict=True) for sign in (1, -1)]
 
 
 def _markov_parameters(u: Array, y: Array, history: int, count: int) -> Array:

@@ -1,8 +1,13 @@
-"""Models of a plant: a transfer function with a delay, and a state space."""
+"""Models of a plant: a transfer function with a delay, and a state space.
+
+Both are sampled exactly: the input is constant during a cycle, and the output is that at the begin of
+a cycle. With q = exp(-i w period), `fraction` returns their frequency response as a numerator and a
+denominator, whose zeros in the disc |q| < 1 are the unstable poles.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,6 +15,17 @@ import numpy.typing as npt
 from scipy import linalg, signal
 
 Array = npt.NDArray[np.float64]
+
+_LIGHT = 0.3  # damping below which poles are a resonance
+_HIGHEST = 0.9  # of the Nyquist frequency, for a resonance
+
+
+@dataclass(frozen=True)
+class Resonance:
+    """A lightly damped pair of poles: natural frequency in Hz, and damping ratio."""
+
+    frequency: float
+    damping: float
 
 
 @dataclass(frozen=True)
@@ -33,10 +49,14 @@ class Transfer:
     @property
     def time_constants(self) -> tuple[float, ...]:
         """The time constants of real poles in s, largest first; empty if the poles are complex."""
-        poles = np.roots(self.denominator)
-        if np.any(np.abs(poles.imag) > 1e-9 * np.abs(poles)):
+        if self.order == 1:
+            return (self.denominator[0],)
+        product, total, _ = self.denominator
+        square = total * total - 4.0 * product
+        if square < -1e-9 * total * total:
             return ()
-        return tuple(sorted((float(-1.0 / each.real) for each in poles), reverse=True))
+        largest = (total + float(np.sqrt(max(square, 0.0)))) / 2.0
+        return (largest, product / largest)
 
     @property
     def natural_frequency(self) -> float:
@@ -48,10 +68,35 @@ class Transfer:
         """The damping ratio of a second-order model."""
         return self.denominator[1] * self.natural_frequency / 2.0
 
-    def response(self, omega: npt.ArrayLike) -> Any:
-        """Return the frequency response at angular frequencies in rad/s."""
-        s = 1j * np.asarray(omega, float)
-        return self.gain * np.exp(-s * self.delay) / np.polyval(self.denominator, s)
+    @property
+    def poles(self) -> Any:
+        """The poles in 1/s."""
+        if self.time_constants:
+            return -1.0 / np.array(self.time_constants, complex)
+        swing = 1j * np.sqrt(1.0 - self.damping**2)
+        return self.natural_frequency * np.array([swing - self.damping, -swing - self.damping])
+
+    @property
+    def damped(self) -> Transfer:
+        """The model with two equal time constants in place of complex poles."""
+        return replace(self, denominator=(self.denominator[0], 2.0 / self.natural_frequency, 1.0))
+
+    @property
+    def resonances(self) -> list[Resonance]:
+        """The lightly damped poles."""
+        if self.time_constants or self.damping > _LIGHT:
+            return []
+        return [Resonance(self.natural_frequency / (2.0 * np.pi), self.damping)]
+
+    def fraction(self, omega: npt.ArrayLike, period: float) -> tuple[Any, Any]:
+        """Return numerator and denominator at angular frequencies in rad/s, at most pi / period."""
+        w = np.asarray(omega, float)
+        numerator, _, cycles = self._discrete(period)
+        q = np.exp(-1j * w * period)
+        above = self.gain * q**cycles * np.polynomial.polynomial.polyval(q, numerator)
+        # 1 - pole q without cancellation, for slow poles at low frequencies.
+        below = -np.expm1((self.poles - 1j * w[..., None]) * period)
+        return above, below.prod(axis=-1)
 
     def simulate(self, inputs: npt.ArrayLike, period: float) -> Array:
         """Return the output at the beginning of each cycle, from rest.
@@ -63,21 +108,6 @@ class Transfer:
         delayed = np.asarray(inputs, float)
         delayed = np.concatenate([np.zeros(cycles), delayed])[: len(delayed)]
         found: Array = self.gain * signal.lfilter(numerator, denominator, delayed)
-        return found
-
-    def step(self, times: npt.ArrayLike) -> Array:
-        """Return the response to a step of 1 at time 0; times in s."""
-        since = np.asarray(times, float) - self.delay
-        poles = np.roots(self.denominator)
-        if self.order == 1:
-            free = np.exp(since * poles[0].real)
-        elif abs(poles[0] - poles[1]) < 1e-6 * abs(poles[0]):
-            pole = poles.mean().real
-            free = np.exp(pole * since) * (1.0 - pole * since)
-        else:
-            p, q = poles.astype(complex)
-            free = ((p * np.exp(q * since) - q * np.exp(p * since)) / (p - q)).real
-        found: Array = np.where(since > 0, self.gain * (1.0 - free), 0.0)
         return found
 
     def _discrete(self, period: float) -> tuple[Array, Array, int]:
@@ -130,22 +160,44 @@ class StateSpace:
         found = np.log(np.where(discrete == 0, 1e-300, discrete)) / self.period
         return found[np.lexsort((found.imag, np.abs(found)))]
 
-    def response(self, omega: npt.ArrayLike) -> Any:
-        """Return the frequency response at angular frequencies in rad/s, below pi / period."""
-        z = np.exp(1j * np.asarray(omega, float) * self.period)
-        systems = z[..., None, None] * np.eye(self.order) - self.a
-        inputs = np.broadcast_to(self.b[:, None], (*z.shape, self.order, 1))
-        return (np.linalg.solve(systems, inputs)[..., 0] * self.c).sum(axis=-1)
+    @property
+    def resonances(self) -> list[Resonance]:
+        """The lightly damped poles that dominate the response at their frequency, lowest first."""
+        values, vectors = np.linalg.eig(self.a.astype(complex))
+        residues = (self.c @ vectors) * np.linalg.solve(vectors, self.b.astype(complex))
+        found = []
+        for pole, residue in zip(values, residues, strict=True):
+            angle = float(np.angle(pole))
+            if not 0.0 < angle < _HIGHEST * np.pi:
+                continue
+            rate = -float(np.log(abs(pole)))
+            size = float(np.hypot(rate, angle))
+            z = np.exp(1j * angle)
+            mode = residue / (z - pole) + np.conj(residue) / (z - np.conj(pole))
+            rest = (residues / (z - values)).sum() - mode
+            if rate < _LIGHT * size and abs(mode) > abs(rest):
+                found.append(Resonance(size / (2.0 * np.pi * self.period), rate / size))
+        return sorted(found, key=lambda each: each.frequency)
+
+    def fraction(self, omega: npt.ArrayLike, period: float | None = None) -> tuple[Any, Any]:
+        """Return numerator and denominator at angular frequencies in rad/s, at most pi / period."""
+        del period  # that of the model
+        w = np.asarray(omega, float)
+        systems = np.exp(1j * w * self.period)[..., None, None] * np.eye(self.order) - self.a
+        inputs = np.broadcast_to(self.b[:, None], (*w.shape, self.order, 1))
+        below = (1.0 - np.linalg.eigvals(self.a) * np.exp(-1j * w * self.period)[..., None]).prod(-1)
+        return below * (np.linalg.solve(systems, inputs)[..., 0] * self.c).sum(axis=-1), below
 
     def simulate(self, inputs: npt.ArrayLike, period: float | None = None) -> Array:
         """Return the output at the beginning of each cycle, from rest."""
         del period  # that of the model
         u = np.asarray(inputs, float)
-        state = np.zeros(self.order)
-        found = np.empty(len(u))
-        for k, each in enumerate(u):
-            found[k] = self.c @ state
-            state = self.a @ state + self.b * each
+        states, power = self.b[:, None], self.a
+        while states.shape[1] < len(u):  # B, A B, A² B ...: the response to a pulse of 1
+            states = np.concatenate([states, power @ states], axis=1)
+            power = power @ power
+        pulse = np.concatenate([[0.0], self.c @ states])[: len(u)]
+        found: Array = signal.fftconvolve(u, pulse)[: len(u)]
         return found
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
@@ -88,3 +89,14 @@ def complete(recorded: Recorded, excitation: str) -> None:
     """Raise RtcfError if an excitation has ended early."""
     if recorded.why:
         raise rtcf.RtcfError(f"the excitation by {excitation} ended early: {recorded.why}")
+
+
+def plain(value: Any) -> Any:
+    """Return data whose numbers are all finite: JSON has no others; null replaces them."""
+    if isinstance(value, dict):
+        return {name: plain(each) for name, each in value.items()}
+    if isinstance(value, list):
+        return [plain(each) for each in value]
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    return value

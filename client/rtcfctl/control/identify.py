@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from rtcf.identification.experiment import Recorded
     from rtcf.identification.fitting import Fit
     from rtcf.identification.result import Identified, Proposal
+    from rtcf.identification.tuning import Notch
 
 _SHAPES = ("prbs", "step", "relay", "chirp", "multisine")
 _METHODS = ("simc", "lambda", "relay")
@@ -103,15 +104,34 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     excited.complete(recorded, experiment.excitation)
     relay = args.shape == "relay"
     found = identify(recorded, order=args.order, relay=relay, hysteresis=args.hysteresis)
-    proposal = found.propose(args.method or ("relay" if relay else "simc"), args.closed_loop_time)
+    method = args.method or ("relay" if relay else "simc")
+    proposals, reason = _proposals(found, method, args.closed_loop_time)
     if output.for_people:
-        _print(recorded, found, proposal, args, output)
+        _print(recorded, found, proposals, reason, args, output)
     else:
-        output.data(_data(recorded, found, proposal))
+        output.data(_data(recorded, found, method, proposals, reason))
     if args.file is not None:
         plots.draw(recorded, found, args.file)
     if args.apply:
-        _apply(client, proposal, args, output)
+        if proposals[None] is None:
+            raise rtcf.RtcfError(f"{reason}; {args.apply} keeps its gains")
+        found.require_stable(proposals[None].gains)
+        _apply(client, proposals[None], args, output)
+
+
+def _proposals(
+    found: Identified, method: str, time: float | None
+) -> tuple[dict[Notch | None, Proposal | None], str]:
+    """Return proposals without a notch, and with the one for the resonance, and why one is None."""
+    proposals: dict[Notch | None, Proposal | None] = {}
+    reason = ""
+    for notch in dict.fromkeys((None, found.notch)):
+        try:
+            proposals[notch] = found.propose(method, time, notch)
+        except rtcf.RtcfError as error:
+            proposals[notch] = None
+            reason = reason or str(error)
+    return proposals, reason
 
 
 def _check(args: argparse.Namespace) -> None:
@@ -156,10 +176,9 @@ def _require_pid(client: rtcf.Client, args: argparse.Namespace) -> None:
 
 
 def settings(proposal: Proposal) -> list[str]:
-    """Return the parameters of a Pid as words, with four digits."""
+    """Return the parameters of a Pid as words."""
     names = ("kp", "ki", "kd", "filter_time") if proposal.gains.kd else ("kp", "ki", "kd")
-    # Not as an integer, which is another type of parameter.
-    return [f"{name}:={float(f'{getattr(proposal.gains, name):.4g}')!r}" for name in names]
+    return [f"{name}:={getattr(proposal.gains, name)!r}" for name in names]
 
 
 def _apply(
@@ -205,7 +224,8 @@ def figure4(number: float) -> str:
 def _print(
     recorded: Recorded,
     found: Identified,
-    proposal: Proposal,
+    proposals: dict[Notch | None, Proposal | None],
+    reason: str,
     args: argparse.Namespace,
     output: Output,
 ) -> None:
@@ -218,11 +238,7 @@ def _print(
         ("model", "numbers", "fit"),
         [
             (name, describe(fit), f"{fit.percent:.1f} %")
-            for name, fit in (
-                ("first order", found.first),
-                ("second order", found.second),
-                ("state space", found.space),
-            )
+            for name, fit in found.fits.items()
         ],
         ["fit"],
     )
@@ -233,23 +249,51 @@ def _print(
         )
     for line in plots.lines(recorded, found):
         output.line(line)
-    margins = proposal.margins
     output.line("")
-    output.line(
-        f"{proposal.method}: gain margin {figure(round(margins.gain, 2))}, "
-        f"phase margin {margins.phase:.1f}°, delay margin {figure4(margins.delay)} s, "
-        f"largest sensitivity {margins.sensitivity:.2f}"
-    )
-    if not margins.stable:
-        output.line("the loop would be unstable: set a longer --closed-loop-time", "bold red")
-    if not args.apply:
-        output.line(f"rtcfctl set PID {' '.join(settings(proposal))}")
+    if found.resonance is not None:
+        output.line(
+            f"resonance at {figure4(found.resonance.frequency)} Hz, "
+            f"damping {figure4(found.resonance.damping)}"
+        )
+    for notch, proposal in proposals.items():
+        if proposal is None:
+            continue
+        margins = proposal.margins
+        filtered = "" if notch is None else " with the notch"
+        output.line(
+            f"{proposal.method}{filtered}: gain margin {figure(round(margins.gain, 2))}, "
+            f"phase margin {figure(round(margins.phase, 1))}°, "
+            f"delay margin {figure4(margins.delay)} s, "
+            f"largest sensitivity {margins.sensitivity:.2f}"
+        )
+        if proposal.slower > 1.0:
+            output.line(
+                f"slower than the rule by the factor {proposal.slower:.2f}, for a sensitivity of at "
+                "most 2 with all models"
+            )
+        if notch is not None:
+            output.line(
+                "rtcfctl load rtcf_control Biquads --name notch "
+                f"--param \"sections:='{notch.sections}'\", between PID and plant"
+            )
+        if notch is not None or not args.apply:
+            output.line(f"rtcfctl set PID {' '.join(settings(proposal))}")
+    if reason:
+        output.line(reason, "bold red")
 
 
-def _data(recorded: Recorded, found: Identified, proposal: Proposal) -> dict[str, Any]:
+def _data(
+    recorded: Recorded,
+    found: Identified,
+    method: str,
+    proposals: dict[Notch | None, Proposal | None],
+    reason: str,
+) -> Any:
     from rtcf.identification.models import StateSpace
 
-    def model(fit: Fit) -> dict[str, Any]:
+    def model(fit: Fit | None) -> dict[str, Any] | None:
+        if fit is None:
+            return None
         if isinstance(fit.model, StateSpace):
             poles = [{"real": float(p.real), "imaginary": float(p.imag)} for p in fit.model.poles]
             return {"fit": fit.percent, "order": fit.model.order, "poles": poles,
@@ -258,8 +302,16 @@ def _data(recorded: Recorded, found: Identified, proposal: Proposal) -> dict[str
         return {"fit": fit.percent, "gain": fit.model.gain, "delay": fit.model.delay,
                 "denominator": list(fit.model.denominator)}  # fmt: skip
 
-    gains, margins = proposal.gains, proposal.margins
-    return {
+    def numbers(proposal: Proposal | None) -> dict[str, Any]:
+        if proposal is None:
+            return {"gains": None, "margins": None, "slower": None}
+        return {"gains": vars(proposal.gains), "margins": vars(proposal.margins),
+                "slower": proposal.slower}  # fmt: skip
+
+    filtered = None
+    if found.notch is not None:
+        filtered = {"sections": found.notch.sections} | numbers(proposals[found.notch])
+    return excited.plain({
         "cycles": len(recorded.time),
         "interpolated": recorded.filled,
         "period": recorded.period,
@@ -267,7 +319,9 @@ def _data(recorded: Recorded, found: Identified, proposal: Proposal) -> dict[str
         "second_order": model(found.second),
         "state_space": model(found.space),
         "relay": None if found.relay is None else vars(found.relay),
-        "method": proposal.method,
-        "gains": vars(gains),
-        "margins": vars(margins) | {"stable": margins.stable},
-    }
+        "resonance": None if found.resonance is None else vars(found.resonance),
+        "method": method,
+        **numbers(proposals[None]),
+        "reason": reason or None,
+        "notch": filtered,
+    })  # fmt: skip

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 _FORMATS = (".svg", ".png")
 _POINTS = 144  # of a curve in the terminal
-_NAMES = {"first": "first order", "second": "second order", "space": "state space"}
 _STEP_BY_TIME = 6.0  # length of a step response by the longest time constant
 
 
@@ -30,7 +29,7 @@ def require_format(file: Path) -> None:
 
 def lines(recorded: Recorded, found: Identified) -> list[str]:
     """Return the plots of the best model for a terminal."""
-    name = next(title for field, title in _NAMES.items() if getattr(found, field) is found.best)
+    name = next(title for title, fit in found.fits.items() if fit is found.best)
     f, estimate = estimated_response(recorded)
     grid = np.geomspace(f[0], f[-1], _POINTS)
     model = fitted_response(found.best, grid, recorded.period)
@@ -74,8 +73,7 @@ def draw(recorded: Recorded, found: Identified, file: Path) -> None:
     grid = np.geomspace(f[0], f[-1], 500)
     axes[0].semilogx(f, 20.0 * np.log10(np.abs(estimate)), ".", color="grey", label="measured")
     axes[1].semilogx(f, np.degrees(np.unwrap(np.angle(estimate))), ".", color="grey")
-    for field, name in _NAMES.items():
-        fit = getattr(found, field)
+    for name, fit in found.fits.items():
         response = fitted_response(fit, grid, recorded.period)
         label = f"{name}, {fit.percent:.1f} %"
         axes[0].semilogx(grid, 20.0 * np.log10(np.abs(response)), label=label)

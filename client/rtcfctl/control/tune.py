@@ -85,6 +85,7 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
             delay=args.duration, duration=args.duration,
         )  # fmt: skip
         found = [_step(experiment, args)]
+        worse = ""
         if settings:
             client.set_parameters(name, settings, args.runner, output.progress)
             try:
@@ -94,14 +95,34 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
                 if isinstance(error, rtcf.RtcfError):
                     raise rtcf.RtcfError(f"{error}; the parameters were set back") from None
                 raise
-            if args.undo:
+            worse = _worse(*(measures for _, measures in found))
+            if args.undo or worse:
                 client.undo_parameters(name, args.runner, output.progress)
     if output.for_people:
-        _print(found, name, args, output)
+        _print(found, name, args, output, bool(worse))
     else:
         names = ("before", "after")
-        output.data({each: asdict(measures) for each, (_, measures) in
-                     zip(names, found, strict=False)})  # fmt: skip
+        output.data(excited.plain({each: asdict(measures) for each, (_, measures) in
+                                   zip(names, found, strict=False)}))  # fmt: skip
+    if worse:
+        raise rtcf.RtcfError(f"{worse}: the parameters of {name} were set back")
+
+
+def _worse(before: StepResponse, after: StepResponse) -> str:
+    """Return why the second step is worse; empty if it is not.
+
+    The settling time decides; if neither step settles, the overshoot.
+    """
+    if after.settling_time > before.settling_time:
+        then = _value(before.settling_time, "s")
+        return f"after is worse: it settles in {_value(after.settling_time, 's')}, before in {then}"
+    if not math.isfinite(after.settling_time) and not after.overshoot <= before.overshoot:
+        then = _value(before.overshoot, "%")
+        return (
+            f"after is worse: neither settles, and the overshoot is "
+            f"{_value(after.overshoot, '%')}, before {then}"
+        )
+    return ""
 
 
 def _check(args: argparse.Namespace) -> None:
@@ -142,6 +163,7 @@ def _print(
     name: str,
     args: argparse.Namespace,
     output: Output,
+    worse: bool,
 ) -> None:
     rows = [
         (title, *(_value(getattr(measures, field), unit) for _, measures in found))
@@ -157,7 +179,7 @@ def _print(
         ends = {0.0: "0 s", 1.0: f"{time[-1]:.3g} s"}
         for line in drawn(title, [list(value)], ends):
             output.line(line)
-    if len(found) > 1:
+    if len(found) > 1 and not worse:
         output.line("")
         output.line(_outcome(args.parameters, name, args.undo))
 
