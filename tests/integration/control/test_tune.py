@@ -71,6 +71,21 @@ def test_a_step_that_leaves_its_limits_is_undone(controlled: Daemon, client: rtc
     assert controlled.ctl("get", "pid.setpoint").stdout == "10\n"
 
 
+@pytest.mark.parametrize("output", [(), ("--output", "json")])
+def test_a_worse_step_is_undone_and_fails(
+    controlled: Daemon, client: rtcf.Client, output: tuple[str, ...]
+) -> None:
+    done = controlled.ctl(*TUNE, "--param", "kp:=0.0002", *output)
+    assert done.returncode == 1
+    assert len(done.stderr.splitlines()) == 1
+    assert done.stderr.startswith("rtcfctl: after is worse: ")
+    assert done.stderr.endswith(": the parameters of /pid were set back\n")
+    assert "overshoot" in done.stdout
+    if output:
+        assert json.loads(done.stdout)["after"]["settling_time"] is None
+    assert gains(client) == SLOW
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
