@@ -160,8 +160,8 @@ class Identified:
         models = [each.model for each in fits if each.percent >= LEAST_FIT]
         if not models:
             raise RtcfError(
-                f"no gains by {method}: the model that it needs describes {fits[0].percent:.1f} % of "
-                f"the output, {LEAST_FIT:g} % are needed"
+                f"no gains by {method}: the model that it needs describes {fits[0].percent:.1f} % "
+                f"of the output, {LEAST_FIT:g} % are needed"
             )
         rules: list[Callable[..., Gains]] = []
         for model in models:

@@ -245,7 +245,7 @@ def test_relay_tuning_has_its_phase_margin_at_the_ultimate_frequency() -> None:
     assert omega * td - 1.0 / (omega * 4.0 * td) == pytest.approx(np.tan(np.pi / 4.0))
     ideal = Gains(found.kp, found.ki, found.kd)
     loop = response(ideal, np.array([omega]), 1e-7)[0] * -1.0 / 8.0
-    assert loop == pytest.approx(np.exp(1j * (np.pi + np.pi / 4.0)), rel=1e-5)
+    assert loop == pytest.approx(np.exp(1.25j * np.pi), rel=1e-5)
 
 
 def test_a_relay_finds_the_ultimate_gain_and_period() -> None:
