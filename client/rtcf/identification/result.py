@@ -115,8 +115,8 @@ class Identified:
         if not found:
             raise RtcfError(
                 f"no gains: no loop by {method} is stable with a sensitivity of at most "
-                f"{MOST_SENSITIVITY:g} for all models that describe the values: record more cycles, "
-                "or set a larger --amplitude"
+                f"{MOST_SENSITIVITY:g} for all models that describe the values: record more "
+                "cycles, or set a larger --amplitude"
             )
         gains, slower = max(found, key=lambda each: abs(each[0].ki))
         loops = [plant.margins(gains) for plant in plants]

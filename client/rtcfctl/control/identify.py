@@ -268,8 +268,8 @@ def _print(
         )
         if proposal.slower > 1.0:
             output.line(
-                f"slower than the rule by the factor {proposal.slower:.2f}, for a sensitivity of at "
-                "most 2 with all models"
+                f"slower than the rule by the factor {proposal.slower:.2f}, for a sensitivity of "
+                "at most 2 with all models"
             )
         if notch is not None:
             output.line(
