@@ -74,16 +74,14 @@ class SampledPlant:
         self._omega = np.unique(omega[(omega >= 0.0) & (omega <= nyquist)])
         self._grid = self._fraction(self._omega)
 
-    def meets(self, gains: Gains, sensitivity: float) -> bool:
-        """Return whether a loop is stable, and its largest sensitivity is at most a limit."""
+    def sensitivity(self, gains: Gains, most: float = float("inf")) -> float:
+        """Return the largest sensitivity of a loop; infinite if it is unstable, or if it is above
+        `most`."""
         above, below = self._on_grid(gains)
         function = above + below
-        if np.any(np.abs(below) > sensitivity * np.abs(function)):
-            return False
-        return (
-            self._is_stable(gains, function)
-            and self._sensitivity(gains, np.abs(below / function)) <= sensitivity
-        )
+        if np.any(np.abs(below) > most * np.abs(function)) or not self._is_stable(gains, function):
+            return float("inf")
+        return self._sensitivity(gains, np.abs(below / function))
 
     def margins(self, gains: Gains) -> Margins:
         """Return the margins of a loop; `gains` with the sign of feedback of setpoint - measured."""

@@ -119,13 +119,12 @@ class Identified:
                 "cycles, or set a larger --amplitude"
             )
         gains, slower = max(found, key=lambda each: abs(each[0].ki))
-        loops = [plant.margins(gains) for plant in plants]
-        sensitivity = max(each.sensitivity for each in loops)
-        return Proposal(method, gains, loops[0], sensitivity, slower, notch)
+        sensitivity = max(each.sensitivity(gains) for each in plants)
+        return Proposal(method, gains, plants[0].margins(gains), sensitivity, slower, notch)
 
     def require_stable(self, gains: Gains) -> None:
         """Raise RtcfError unless a loop with these gains is as propose() requires it."""
-        if not all(each.meets(gains, MOST_SENSITIVITY) for each in self._plants(None)):
+        if not all(_suits(gains, each) for each in self._plants(None)):
             raise RtcfError(
                 f"kp = {gains.kp:g}, ki = {gains.ki:g}, kd = {gains.kd:g} are not stable with a "
                 f"sensitivity of at most {MOST_SENSITIVITY:g} for all models: not set"
@@ -177,6 +176,10 @@ class Identified:
         return rules
 
 
+def _suits(gains: Gains, plant: SampledPlant) -> bool:
+    return plant.sensitivity(gains, MOST_SENSITIVITY) <= MOST_SENSITIVITY
+
+
 def _slowed(
     rule: Callable[..., Gains], plants: list[SampledPlant]
 ) -> tuple[Gains, float] | None:
@@ -185,7 +188,7 @@ def _slowed(
     for attempt in range(_ATTEMPTS):
         slower = _SLOWER**attempt
         gains = rule(slower=slower).rounded()
-        failed = next((each for each in order if not each.meets(gains, MOST_SENSITIVITY)), None)
+        failed = next((each for each in order if not _suits(gains, each)), None)
         if failed is None:
             return gains, slower
         # It probably fails next time, too.
