@@ -40,6 +40,15 @@ class Fit:
     offset: float
     others: tuple[Model, ...] = ()
 
+    @property
+    def systematic(self) -> float:
+        """The part of the output in percent that neither the model nor white noise explains.
+
+        E.g. friction, or an unknown resonance: the part of the residuals that is correlated from
+        cycle to cycle, by the same measure as `percent`.
+        """
+        return (100.0 - self.percent) * float(np.sqrt(_correlation(self.residuals)))
+
 
 def fit_first_order(inputs: npt.ArrayLike, outputs: npt.ArrayLike, period: float) -> Fit:
     """Fit K exp(-delay s) / (T s + 1).
@@ -163,14 +172,16 @@ def _fit(
     starts.sort()
     low = [np.log(period / 20.0), *(np.log(1e-3) for _ in more[0]), 0.0]
     high = [np.log(100.0 * longest), *(np.log(1e3) for _ in more[0]), longest / period]
-    best: Any = None
-    for _, start in starts[:_STARTS]:
-        found = optimize.least_squares(
+
+    def refined(start: Any, tolerance: float) -> Any:
+        return optimize.least_squares(
             lambda p: linear(p)[1], np.clip(start, low, high), bounds=(low, high),
-            xtol=1e-10, ftol=1e-10, gtol=1e-14, x_scale="jac", max_nfev=100,
+            xtol=tolerance, ftol=tolerance, gtol=1e-14, x_scale="jac", max_nfev=100,
         )  # fmt: skip
-        if best is None or found.cost < best.cost:
-            best = found
+
+    rough = [refined(start, 1e-4) for _, start in starts[:_STARTS]]
+    costs = [float(each.cost) for each in rough]
+    best = refined(rough[int(np.argmin(costs))].x, 1e-10)
 
     def model_of(p: Any) -> Transfer:
         clipped = np.clip(p, low, high)
@@ -198,15 +209,21 @@ def _best_delay(x: Array, y: Array, most: int) -> tuple[float, int]:
     return 1.0 - float(gained[cycles] / (y @ y)), cycles
 
 
+def _correlation(residuals: Array) -> float:
+    """Return the correlation of neighbours; 0 if it is negative."""
+    power = float(residuals @ residuals)
+    return max(float(residuals[1:] @ residuals[:-1]) / power, 0.0) if power > 0.0 else 0.0
+
+
 def _deviations(jacobian: Array, residuals: Array) -> list[Array]:
     """Return changes of the parameters along the axes of their covariance, both ways.
 
     The residuals may be correlated: fewer of them count, as of an autoregression of first order.
     """
-    power = float(residuals @ residuals)
-    correlation = float(residuals[1:] @ residuals[:-1]) / power if power > 0.0 else 0.0
-    correlation = min(max(correlation, 0.0), _MOST_CORRELATED)
-    inflated = power / len(residuals) * (1.0 + correlation) / (1.0 - correlation)
+    correlation = min(_correlation(residuals), _MOST_CORRELATED)
+    inflated = (
+        float(residuals @ residuals) / len(residuals) * (1.0 + correlation) / (1.0 - correlation)
+    )
     _, values, axes = np.linalg.svd(jacobian, full_matrices=False)
     sizes = _DEVIATIONS * np.sqrt(inflated) / np.maximum(values, 1e-12 * values[0])
     # A parameter that the values leave open, e.g. the time constant of an integrator, stays close.

@@ -1,7 +1,7 @@
 """Margins of stability of a loop of a PID controller and a model, in the z domain.
 
-The loop is that which runs: the sampled plant of models.py and the law of a cycle of the controller,
-see Gains.fraction().  With q = 1 / z, the zeros of the characteristic function
+The loop is that which runs: the sampled plant of models.py, and the law of a cycle of the
+controller, see Gains.fraction().  With q = 1 / z, the zeros of the characteristic function
 
     F(q) = D(q) Dc(q) + N(q) Nc(q),   plant N / D, controller Nc / Dc
 
@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from rtcf.identification.models import Array, Model
 from rtcf.identification.tuning import Gains, Notch
@@ -84,7 +83,7 @@ class SampledPlant:
         return self._sensitivity(gains, np.abs(below / function))
 
     def margins(self, gains: Gains) -> Margins:
-        """Return the margins of a loop; `gains` with the sign of feedback of setpoint - measured."""
+        """Return the margins of a loop, with feedback of setpoint - measured."""
         above, below = self._on_grid(gains)
         function = above + below
         stable = self._is_stable(gains, function)
@@ -100,9 +99,7 @@ class SampledPlant:
             gain = np.min(factors[factors > 1.0], initial=np.inf)
         else:
             gain = np.max(factors[factors <= 1.0], initial=0.0)
-        crossings = self._crossings(
-            lambda w: np.log(np.abs(self._loop(gains, w))), omega, decibels
-        )
+        crossings = self._crossings(lambda w: np.log(np.abs(self._loop(gains, w))), omega, decibels)
         phase = delay = crossover = float("inf")
         if len(crossings):
             angles = np.angle(-self._loop(gains, crossings))  # distances to -180 degrees

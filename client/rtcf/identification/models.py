@@ -1,8 +1,8 @@
 """Models of a plant: a transfer function with a delay, and a state space.
 
-Both are sampled exactly: the input is constant during a cycle, and the output is that at the begin of
-a cycle. With q = exp(-i w period), `fraction` returns their frequency response as a numerator and a
-denominator, whose zeros in the disc |q| < 1 are the unstable poles.
+Both are sampled exactly: the input is constant during a cycle, and the output is that at the begin
+of a cycle. With q = exp(-i w period), `fraction` returns their frequency response as a numerator
+and a denominator, whose zeros in the disc |q| < 1 are the unstable poles.
 """
 
 from __future__ import annotations
@@ -95,7 +95,7 @@ class Transfer:
         w = np.asarray(omega, float)
         numerator, _, cycles = _discrete(self.denominator, self.delay, period)
         q = np.exp(-1j * w * period)
-        above = self.gain * q**cycles * np.polynomial.polynomial.polyval(q, numerator)
+        above = self.gain * q**cycles * np.polyval(numerator[::-1], q)
         # 1 - pole q without cancellation, for slow poles at low frequencies.
         below = -np.expm1((self.poles - 1j * w[..., None]) * period)
         return above, below.prod(axis=-1)
@@ -159,7 +159,8 @@ class StateSpace:
         w = np.asarray(omega, float)
         systems = np.exp(1j * w * self.period)[..., None, None] * np.eye(self.order) - self.a
         inputs = np.broadcast_to(self.b[:, None], (*w.shape, self.order, 1))
-        below = (1.0 - np.linalg.eigvals(self.a) * np.exp(-1j * w * self.period)[..., None]).prod(-1)
+        poles = np.linalg.eigvals(self.a)
+        below = (1.0 - poles * np.exp(-1j * w * self.period)[..., None]).prod(axis=-1)
         return below * (np.linalg.solve(systems, inputs)[..., 0] * self.c).sum(axis=-1), below
 
     def simulate(self, inputs: npt.ArrayLike, period: float | None = None) -> Array:

@@ -22,6 +22,7 @@ from rtcf.identification.tuning import Gains, Notch, RelayPoint
 METHODS = ("simc", "lambda", "relay")
 MOST_SENSITIVITY = 2.0  # of a proposal, with each model that describes the values
 LEAST_FIT = 50.0  # percent, of a model that is used for gains
+MOST_SYSTEMATIC = 10.0  # percent of the output, see Fit.systematic
 _BETTER = 1.0  # percent by which a model must be better to be used
 _CREDIBLE = 1.2  # residuals by the smallest ones, of models that a loop must be stable with
 _SLOWER = 1.25  # from one attempt to the next
@@ -81,7 +82,7 @@ class Identified:
     def resonance(self) -> Resonance | None:
         """The least damped resonance of the best model, if its fit is sufficient."""
         found = self.best.model.resonances if self.best.percent >= LEAST_FIT else []
-        return min(found, key=lambda each: each.damping, default=None)
+        return min(found, key=lambda each: each.damping) if found else None
 
     @property
     def notch(self) -> Notch | None:
@@ -108,6 +109,12 @@ class Identified:
             raise RtcfError(
                 f"no gains: the best model describes {self.best.percent:.1f} % of the output, "
                 f"{LEAST_FIT:g} % are needed: set a larger --amplitude, or wider limits"
+            )
+        if self.best.systematic > MOST_SYSTEMATIC:
+            raise RtcfError(
+                f"no gains: {self.best.systematic:.1f} % of the output is neither noise nor "
+                f"described by a model, {MOST_SYSTEMATIC:g} % are permitted: excite away from "
+                "friction, backlash and limits"
             )
         rules = self._rules(method, closed_loop_time)
         plants = self._plants(notch)
@@ -180,9 +187,7 @@ def _suits(gains: Gains, plant: SampledPlant) -> bool:
     return plant.sensitivity(gains, MOST_SENSITIVITY) <= MOST_SENSITIVITY
 
 
-def _slowed(
-    rule: Callable[..., Gains], plants: list[SampledPlant]
-) -> tuple[Gains, float] | None:
+def _slowed(rule: Callable[..., Gains], plants: list[SampledPlant]) -> tuple[Gains, float] | None:
     """Return the fastest gains of a rule that suit all plants, and `slower`."""
     order = list(plants)
     for attempt in range(_ATTEMPTS):

@@ -88,7 +88,11 @@ class RelayPoint:
 
 
 def simc(
-    model: Transfer, closed_loop_time: float | None = None, *, period: float = 0.0, slower: float = 1
+    model: Transfer,
+    closed_loop_time: float | None = None,
+    *,
+    period: float = 0.0,
+    slower: float = 1,
 ) -> Gains:
     """Return gains by SIMC.
 
@@ -127,7 +131,11 @@ def simc(
 
 
 def integral_tuning(
-    model: Transfer, closed_loop_time: float | None = None, *, period: float = 0.0, slower: float = 1
+    model: Transfer,
+    closed_loop_time: float | None = None,
+    *,
+    period: float = 0.0,
+    slower: float = 1,
 ) -> Gains:
     """Return an integral controller by SIMC's rule for a plant that is only a delay.
 
@@ -138,7 +146,11 @@ def integral_tuning(
 
 
 def lambda_tuning(
-    model: Transfer, closed_loop_time: float | None = None, *, period: float = 0.0, slower: float = 1
+    model: Transfer,
+    closed_loop_time: float | None = None,
+    *,
+    period: float = 0.0,
+    slower: float = 1,
 ) -> Gains:
     """Return the gains of a PI controller by lambda tuning, which cancels the time constant.
 

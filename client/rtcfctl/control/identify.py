@@ -113,10 +113,11 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     if args.file is not None:
         plots.draw(recorded, found, args.file)
     if args.apply:
-        if proposals[None] is None:
+        proposal = proposals[None]
+        if proposal is None:
             raise rtcf.RtcfError(f"{reason}; {args.apply} keeps its gains")
-        found.require_stable(proposals[None].gains)
-        _apply(client, proposals[None], args, output)
+        found.require_stable(proposal.gains)
+        _apply(client, proposal, args, output)
 
 
 def _proposals(
@@ -173,6 +174,11 @@ def _require_pid(client: rtcf.Client, args: argparse.Namespace) -> None:
     names = {each.name for each in found.parameters}
     if not {"kp", "ki", "kd"} <= names:
         raise rtcf.RtcfError(f"--apply {args.apply}: it has no parameters kp, ki and kd")
+    if found.spec.every > 1:
+        raise rtcf.RtcfError(
+            f"--apply {args.apply}: it runs once in {found.spec.every} cycles, but the gains are for "
+            "a controller of each cycle: omit --apply, or load it without --every"
+        )
 
 
 def settings(proposal: Proposal) -> list[str]:
@@ -236,10 +242,7 @@ def _print(
     output.line(f"{counted(cycles, 'cycle')} of {recorded.period * 1e3:g} ms{filled}")
     output.table(
         ("model", "numbers", "fit"),
-        [
-            (name, describe(fit), f"{fit.percent:.1f} %")
-            for name, fit in found.fits.items()
-        ],
+        [(name, describe(fit), f"{fit.percent:.1f} %") for name, fit in found.fits.items()],
         ["fit"],
     )
     if found.relay is not None:
@@ -264,7 +267,8 @@ def _print(
             f"{proposal.method}{filtered}: gain margin {figure(round(margins.gain, 2))}, "
             f"phase margin {figure(round(margins.phase, 1))}°, "
             f"delay margin {figure4(margins.delay)} s, "
-            f"largest sensitivity {margins.sensitivity:.2f}"
+            f"largest sensitivity {margins.sensitivity:.2f} "
+            f"({proposal.sensitivity:.2f} with all models)"
         )
         if proposal.slower > 1.0:
             output.line(
@@ -305,7 +309,8 @@ def _data(
     def numbers(proposal: Proposal | None) -> dict[str, Any]:
         if proposal is None:
             return {"gains": None, "margins": None, "slower": None}
-        return {"gains": vars(proposal.gains), "margins": vars(proposal.margins),
+        margins = vars(proposal.margins) | {"worst_sensitivity": proposal.sensitivity}
+        return {"gains": vars(proposal.gains), "margins": margins,
                 "slower": proposal.slower}  # fmt: skip
 
     filtered = None

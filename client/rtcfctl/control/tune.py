@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Iterable
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import rtcf
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 _DURATION_S = 2.0
 _TOLERANCE = 0.05
+_WORSE = 1.05  # criterion after the change by that before it, from which it is worse
 _BASELINE = 0.2  # share of the time before the step from which its initial value is taken
 _ROWS = (
     ("rise time", "rise_time", "s"),
@@ -29,6 +30,21 @@ _ROWS = (
     ("overshoot", "overshoot", "%"),
     ("final error", "final_error", ""),
 )
+
+
+@dataclass(frozen=True)
+class Step:
+    """A closed-loop step: times in s since the step, values, and measures.
+
+    itae  criterion of the comparison: the integral of time by absolute error, in s², of a step of 1
+          (Graham & Lathrop, The synthesis of optimum transient response, Transactions of the AIEE
+          72, 1953)
+    """
+
+    time: Any
+    value: Any
+    measures: StepResponse
+    itae: float
 
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
@@ -85,7 +101,7 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
             delay=args.duration, duration=args.duration,
         )  # fmt: skip
         found = [_step(experiment, args)]
-        worse = ""
+        worse = False
         if settings:
             client.set_parameters(name, settings, args.runner, output.progress)
             try:
@@ -95,34 +111,25 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
                 if isinstance(error, rtcf.RtcfError):
                     raise rtcf.RtcfError(f"{error}; the parameters were set back") from None
                 raise
-            worse = _worse(*(measures for _, measures in found))
+            worse = not found[1].itae <= _WORSE * found[0].itae
             if args.undo or worse:
                 client.undo_parameters(name, args.runner, output.progress)
     if output.for_people:
-        _print(found, name, args, output, bool(worse))
+        _print(found, name, args, output, worse)
     else:
         names = ("before", "after")
-        output.data(excited.plain({each: asdict(measures) for each, (_, measures) in
-                                   zip(names, found, strict=False)}))  # fmt: skip
+        output.data(
+            excited.plain(
+                {title: asdict(each.measures) | {"itae": each.itae}
+                 for title, each in zip(names, found, strict=False)}
+            )
+        )  # fmt: skip
     if worse:
-        raise rtcf.RtcfError(f"{worse}: the parameters of {name} were set back")
-
-
-def _worse(before: StepResponse, after: StepResponse) -> str:
-    """Return why the second step is worse; empty if it is not.
-
-    The settling time decides; if neither step settles, the overshoot.
-    """
-    if after.settling_time > before.settling_time:
-        then = _value(before.settling_time, "s")
-        return f"after is worse: it settles in {_value(after.settling_time, 's')}, before in {then}"
-    if not math.isfinite(after.settling_time) and not after.overshoot <= before.overshoot:
-        then = _value(before.overshoot, "%")
-        return (
-            f"after is worse: neither settles, and the overshoot is "
-            f"{_value(after.overshoot, '%')}, before {then}"
+        before, after = (f"{each.itae:.4g} s²" for each in found)
+        raise rtcf.RtcfError(
+            f"after is worse: its ITAE is {after}, before {before}: the parameters of {name} were "
+            "set back"
         )
-    return ""
 
 
 def _check(args: argparse.Namespace) -> None:
@@ -135,14 +142,14 @@ def _check(args: argparse.Namespace) -> None:
         raise ValueError("--undo requires --param")
 
 
-def _step(experiment: Experiment, args: argparse.Namespace) -> tuple[tuple[Any, Any], StepResponse]:
-    """Return time and value of a closed-loop step, and its measures."""
+def _step(experiment: Experiment, args: argparse.Namespace) -> Step:
+    """Step the closed loop, and measure it."""
     recorded = experiment.run(stepped=args.stepped)
     excited.complete(recorded, experiment.excitation)
     return _measured(recorded, args)
 
 
-def _measured(recorded: Recorded, args: argparse.Namespace) -> tuple[tuple[Any, Any], StepResponse]:
+def _measured(recorded: Recorded, args: argparse.Namespace) -> Step:
     from rtcf.testing import step_response
 
     begin = int((recorded.signal != 0).argmax())
@@ -155,29 +162,27 @@ def _measured(recorded: Recorded, args: argparse.Namespace) -> tuple[tuple[Any, 
     initial = float(before[-max(int(_BASELINE * len(before)), 1) :].mean())
     time, value = recorded.time[begin:] - recorded.time[begin], recorded.outputs[begin:]
     target = float(recorded.inputs[-1])
-    return (time, value), step_response(time, value, target, initial, args.tolerance)
+    itae = float((time * abs(target - value)).sum()) * recorded.period / abs(args.size)
+    return Step(time, value, step_response(time, value, target, initial, args.tolerance), itae)
 
 
 def _print(
-    found: list[tuple[tuple[Any, Any], StepResponse]],
-    name: str,
-    args: argparse.Namespace,
-    output: Output,
-    worse: bool,
+    found: list[Step], name: str, args: argparse.Namespace, output: Output, worse: bool
 ) -> None:
     rows = [
-        (title, *(_value(getattr(measures, field), unit) for _, measures in found))
+        (title, *(_value(getattr(each.measures, field), unit) for each in found))
         for title, field, unit in _ROWS
     ]
+    rows.append(("ITAE", *(_value(each.itae, "s²") for each in found)))
     columns = ("step", "before", "after") if len(found) > 1 else ("step", "now")
     output.table(columns, rows, columns[1:])
-    for title, (_, measures) in zip(columns[1:], found, strict=False):
-        if measures.unsettled:
-            output.line(f"{title}, settling time: {measures.unsettled}")
-    for title, ((time, value), _) in zip(columns[1:], found, strict=True):
+    for title, each in zip(columns[1:], found, strict=True):
+        if each.measures.unsettled:
+            output.line(f"{title}, settling time: {each.measures.unsettled}")
+    for title, each in zip(columns[1:], found, strict=True):
         output.line("")
-        ends = {0.0: "0 s", 1.0: f"{time[-1]:.3g} s"}
-        for line in drawn(title, [list(value)], ends):
+        ends = {0.0: "0 s", 1.0: f"{each.time[-1]:.3g} s"}
+        for line in drawn(title, [list(each.value)], ends):
             output.line(line)
     if len(found) > 1 and not worse:
         output.line("")

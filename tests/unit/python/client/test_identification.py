@@ -409,65 +409,6 @@ def test_a_proposal_is_stable(method: str) -> None:
     assert 1.0 < found.margins.sensitivity < 2.0
 
 
-KINDS = ("first", "second", "integrating", "double integrating", "lightly damped")
-
-
-def random_plant(random: np.random.Generator, kind: str) -> tuple[list[float], int]:
-    """Return the denominator in s and the delay in cycles of a plant."""
-    time = float(10.0 ** random.uniform(-1.5, 0.3))
-    delay = int(random.integers(0, 60))
-    damping = float(random.uniform(0.02, 0.3))
-    below = {
-        "first": [time, 1.0],
-        "second": np.polymul([time, 1.0], [time * random.uniform(0.05, 1.0), 1.0]).tolist(),
-        "integrating": [time, 1.0, 0.0],
-        "double integrating": [1.0, 0.0, 0.0],
-        "lightly damped": [time**2, 2.0 * damping * time, 1.0],
-    }[kind]
-    return below, delay
-
-
-@pytest.mark.parametrize(
-    "count", [4, pytest.param(10_000, marks=pytest.mark.long)], ids=["few", "many"]
-)
-def test_no_proposal_for_a_random_plant_is_unstable(count: int) -> None:
-    random = np.random.default_rng(47)
-    largest: dict[str, list[float]] = {kind: [] for kind in KINDS}
-    said: dict[str, list[str]] = {kind: [] for kind in KINDS}
-    for n in range(count):
-        kind = KINDS[n % len(KINDS)]
-        below, delay = random_plant(random, kind)
-        b, a, _ = signal.cont2discrete(([1.0], below), PERIOD, "zoh")
-        inputs = BITS.copy()
-        friction = random.choice([0.0, 0.1])
-        moved = inputs - friction * np.sign(inputs)
-        y = signal.lfilter(b.ravel(), a, np.r_[np.zeros(delay), moved])[: len(inputs)]
-        y += random.choice([0.0, 0.01, 0.05]) * y.std() * random.normal(size=len(y))
-        step = random.choice([0.0, 0.01]) * y.std()
-        y = np.round(y / step) * step if step else y
-        time = (np.arange(len(inputs)) * PERIOD).astype(np.float64)
-        run = Recorded(PERIOD, time, inputs, inputs, y, COMPLETED, 0)
-        try:
-            gains = identify(run).propose("simc").gains
-        except RtcfError as error:
-            said[kind].append(str(error))
-            continue
-        context = f"plant {n}: {below}, {delay} cycles, {gains}"
-        assert spectral_radius(gains, delay, b.ravel(), a) < 1.0, context
-        omega = np.geomspace(1e-5, np.pi / PERIOD, 20_000)
-        z = np.exp(1j * omega * PERIOD)
-        slope = (1.0 - 1.0 / z) / (gains.filter_time * (1.0 - 1.0 / z) + PERIOD)
-        law = gains.kp + gains.ki * PERIOD / (z - 1.0) + gains.kd * slope
-        loop = law * np.polyval(b.ravel(), z) / np.polyval(a, z) * z**-delay
-        largest[kind].append(float(np.max(1.0 / np.abs(1.0 + loop))))
-    for kind in KINDS:
-        tried = len(largest[kind]) + len(said[kind])
-        spread = np.quantile(largest[kind], [0.05, 0.5, 0.95, 1.0]) if largest[kind] else "-"
-        print(f"{kind}: {len(largest[kind])} of {tried} proposals, sensitivity {spread}")
-        for text in sorted(set(said[kind])):
-            print(f"  {said[kind].count(text)} x {text}")
-
-
 def test_proposals_reject_what_does_not_apply() -> None:
     found = identify(recorded(FIRST))
     with pytest.raises(RtcfError, match="the method relay needs an excitation by --shape relay"):
