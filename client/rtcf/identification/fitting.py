@@ -13,7 +13,7 @@ from scipy import optimize, signal
 
 from rtcf.identification.models import Array, Model, StateSpace, Transfer
 
-_GRID = 9  # start values of a time constant
+_GRID = 24  # start values of a time constant
 _STARTS = 3  # that are refined
 _LEAST_SAMPLES = 30
 _MOST_STATES = 8

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from rtcf.identification.models import Array, Model
+from rtcf.identification.models import Array, Model, Transfer
 from rtcf.identification.tuning import Gains, Notch
 
 _POINTS = 1500  # of a grid in the logarithm of the frequency
@@ -70,7 +70,9 @@ class SampledPlant:
                 near.ravel(),
             ]
         )
-        self._omega = np.unique(omega[(omega >= 0.0) & (omega <= nyquist)])
+        # An identified integrator is a pole near 1: at 0, a state space is only rounding errors.
+        lowest = 0.0 if isinstance(model, Transfer) else nyquist * 10.0**-_DECADES
+        self._omega = np.unique(omega[(omega >= lowest) & (omega <= nyquist)])
         self._grid = self._fraction(self._omega)
 
     def sensitivity(self, gains: Gains, most: float = float("inf")) -> float:

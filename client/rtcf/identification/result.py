@@ -22,7 +22,10 @@ from rtcf.identification.tuning import Gains, Notch, RelayPoint
 METHODS = ("simc", "lambda", "relay")
 MOST_SENSITIVITY = 2.0  # of a proposal, with each model that describes the values
 LEAST_FIT = 50.0  # percent, of a model that is used for gains
-MOST_SYSTEMATIC = 10.0  # percent of the output, see Fit.systematic
+MOST_SYSTEMATIC = 4.0  # percent of the output, see Fit.systematic
+# Likewise, of a plant that integrates or oscillates: dry friction looks like damping, and is none for
+# small motions.
+MOST_SYSTEMATIC_UNDAMPED = 1.0
 _BETTER = 1.0  # percent by which a model must be better to be used
 _CREDIBLE = 1.2  # residuals by the smallest ones, of models that a loop must be stable with
 _SLOWER = 1.25  # from one attempt to the next
@@ -110,11 +113,12 @@ class Identified:
                 f"no gains: the best model describes {self.best.percent:.1f} % of the output, "
                 f"{LEAST_FIT:g} % are needed: set a larger --amplitude, or wider limits"
             )
-        if self.best.systematic > MOST_SYSTEMATIC:
+        most = MOST_SYSTEMATIC_UNDAMPED if self._is_undamped else MOST_SYSTEMATIC
+        if self.best.systematic > most:
             raise RtcfError(
                 f"no gains: {self.best.systematic:.1f} % of the output is neither noise nor "
-                f"described by a model, {MOST_SYSTEMATIC:g} % are permitted: excite away from "
-                "friction, backlash and limits"
+                f"described by a model, {most:g} % are permitted: begin at rest, and excite away "
+                "from friction, backlash and limits"
             )
         rules = self._rules(method, closed_loop_time)
         plants = self._plants(notch)
@@ -136,6 +140,14 @@ class Identified:
                 f"kp = {gains.kp:g}, ki = {gains.ki:g}, kd = {gains.kd:g} are not stable with a "
                 f"sensitivity of at most {MOST_SENSITIVITY:g} for all models: not set"
             )
+
+    @property
+    def _is_undamped(self) -> bool:
+        """Whether the plant integrates during the experiment, or oscillates."""
+        model = max((self.first, self.second), key=lambda each: each.percent).model
+        assert isinstance(model, Transfer)
+        duration = len(self.first.residuals) * self.period
+        return not model.time_constants or model.time_constants[0] > duration
 
     def _plants(self, notch: Notch | None) -> list[SampledPlant]:
         """Return the models that describe the values, the best one first."""

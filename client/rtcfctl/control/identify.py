@@ -176,7 +176,7 @@ def _require_pid(client: rtcf.Client, args: argparse.Namespace) -> None:
         raise rtcf.RtcfError(f"--apply {args.apply}: it has no parameters kp, ki and kd")
     if found.spec.every > 1:
         raise rtcf.RtcfError(
-            f"--apply {args.apply}: it runs once in {found.spec.every} cycles, but the gains are for "
+            f"--apply {args.apply}: it runs once in {found.spec.every} cycles, but gains are for "
             "a controller of each cycle: omit --apply, or load it without --every"
         )
 
