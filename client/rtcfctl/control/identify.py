@@ -278,7 +278,7 @@ def _print(
         if notch is not None:
             output.line(
                 "rtcfctl load rtcf_control Biquads --name notch "
-                f"--param \"sections:='{notch.sections}'\", between PID and plant"
+                f'--param sections:="{notch.sections}", between PID and plant'
             )
         if notch is not None or not args.apply:
             output.line(f"rtcfctl set PID {' '.join(settings(proposal))}")

@@ -153,6 +153,42 @@ def test_an_excitation_in_a_closed_loop_keeps_its_parameters(
     assert gains(client)["kp"] == 0.004
 
 
+RESONANCE = {"A": "0 1; -400 -4", "B": "0; 400", "C": "1 0"}  # 20 rad/s, damping 0.1
+
+
+def test_the_notch_for_a_resonance_permits_the_gains_for_it(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    load(client, "StateSpace", "plant", {"in1": "/command", "out1": "/y"}, **RESONANCE)
+    words = ("plant.in1", "plant.out1", "--lower", "-1", "--upper", "1")
+    found = identify(daemon, *words)
+    assert found["resonance"]["frequency"] == pytest.approx(20.0 / (2.0 * np.pi), rel=MODEL)
+    assert found["resonance"]["damping"] == pytest.approx(0.1, rel=MODEL)
+    notch = found["notch"]
+    assert notch["gains"]["ki"] > 2.0 * found["gains"]["ki"]
+    printed = daemon.ctl("identify", *words, "--step").stdout
+    assert f'--param sections:="{notch["sections"]}"' in printed
+    assert "resonance at 3.183 Hz, damping 0.1" in printed
+    # With both, a step of the setpoint settles.
+    load(client, "Biquads", "notch", {"in": "/effort", "out": "/command"},
+         sections=notch["sections"])  # fmt: skip
+    load(client, "Pid", "pid", {"measured": "/y", "effort": "/effort"}, breaks=["measured"],
+         **notch["gains"])  # fmt: skip
+    client.write("pid.setpoint", 1.0)
+    client.step(5000)
+    assert float(value(daemon, "plant.out1")) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_controller_of_another_rate_is_refused(daemon: Daemon, client: rtcf.Client) -> None:
+    motor(client, **LAG)
+    client.load(rtcf.component("rtcf_control", "Pid", name="pid", every=4))
+    done = daemon.ctl("identify", "motor.command", "motor.velocity", *LIMITS, "--step", "--apply",
+                      "pid")  # fmt: skip
+    assert done.returncode == 1
+    assert "--apply pid: it runs once in 4 cycles" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
 @pytest.mark.parametrize("kind", ["json", "yaml"])
 def test_a_plant_that_is_not_described_has_no_gains(
     daemon: Daemon, client: rtcf.Client, kind: str

@@ -80,6 +80,7 @@ def test_a_worse_step_is_undone_and_fails(
     assert len(done.stderr.splitlines()) == 1
     assert done.stderr.startswith("rtcfctl: after is worse: ")
     assert done.stderr.endswith(": the parameters of /pid were set back\n")
+    assert "its ITAE is " in done.stderr
     assert "overshoot" in done.stdout
     if output:
         assert json.loads(done.stdout)["after"]["settling_time"] is None
