@@ -7,6 +7,7 @@
 #include <rtcf/component.hpp>
 #include <rtcf/design_period.hpp>
 
+#include "measurement_watch.hpp"
 #include "waveform.hpp"
 
 namespace rtcf_control {
@@ -21,7 +22,7 @@ enum class Progress : std::int32_t {
     Running = 1,
     Completed = 2,   // the duration is over
     Stopped = 3,     // by run, stop, or the end of the loop
-    LeftLimits = 4,  // by the measured value, or a value that is not finite
+    LeftLimits = 4,  // by the measured value, or it is lost, or a value is not finite
     LeaseEnded = 5,  // run has not been renewed
     NotBegun = 6,    // in or measured is outside its limits, or there are none
 };
@@ -147,6 +148,7 @@ class Excitation final : public rtcf::Component {
     rtcf::State<std::uint32_t> register_{this, "register", kPrbsStart,
                                          rtcf::Doc("shift register of PRBS")};
     rtcf::Derived<double> peak_{this, 1.0};  // of the multisine
+    MeasurementWatch<1> watch_{this, {"measured"}, "the excitation ends"};
     rtcf::DesignPeriod design_period_{this};
     bool is_configured_ = false;
 
@@ -185,6 +187,7 @@ class Excitation final : public rtcf::Component {
     bool start() override {
         set(Progress::Ready);
         armed_ = false;
+        watch_.begin();
         return true;
     }
 
@@ -196,7 +199,11 @@ class Excitation final : public rtcf::Component {
 
     void update() override {
         const double command = base();
-        const bool has_measured = measured.read() != rtcf::DataStatus::None;
+        const rtcf::DataStatus measurement = measured.read();
+        const bool has_measured = measurement != rtcf::DataStatus::None;
+        const bool is_new = measurement == rtcf::DataStatus::New;
+        const char* const fault =
+            has_measured ? watch_.note(0, measured.value(), is_new, elapsed()) : nullptr;
         const rtcf::DataStatus told = run.read();
         const bool wanted = told != rtcf::DataStatus::None && run.value();
         const bool renewed = wanted && told == rtcf::DataStatus::New;
@@ -209,6 +216,7 @@ class Excitation final : public rtcf::Component {
             } else if (lease > 0.0 && age_ > nanoseconds(lease)) {
                 set(Progress::LeaseEnded);
             } else if (!std::isfinite(command) || !inside(has_measured)) {
+                if (fault != nullptr) reportFault(fault);
                 set(Progress::LeftLimits);
             } else if (since_ >= nanoseconds(delay) + nanoseconds(duration)) {
                 set(Progress::Completed);
@@ -230,12 +238,12 @@ class Excitation final : public rtcf::Component {
     bool runs() const noexcept { return progress_ == static_cast<std::int32_t>(Progress::Running); }
     void set(Progress progress) noexcept { progress_ = static_cast<std::int32_t>(progress); }
 
-    // The measured value is within its limits, or not needed.
+    // The measured value is within its limits and not lost, or not needed.
     bool inside(bool has_measured) const noexcept {
         const bool needed = shape == ExcitationShape::Relay || std::isfinite(measured_lower) ||
                             std::isfinite(measured_upper);
         return !needed ||
-               (has_measured && std::isfinite(measured.value()) &&
+               (has_measured && !watch_.lost(0) && std::isfinite(measured.value()) &&
                 measured.value() >= measured_lower && measured.value() <= measured_upper);
     }
 
@@ -249,8 +257,8 @@ class Excitation final : public rtcf::Component {
             set(Progress::NotBegun);
         } else if (!inside(has_measured)) {
             RTCF_WARN(this,
-                      "not begun: measured has no value, or is outside measured_lower = {} to "
-                      "measured_upper = {}",
+                      "not begun: measured has no value or is lost, or is outside "
+                      "measured_lower = {} to measured_upper = {}",
                       measured_lower.value(), measured_upper.value());
             set(Progress::NotBegun);
         } else {

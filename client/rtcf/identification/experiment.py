@@ -31,7 +31,7 @@ Array = npt.NDArray[np.float64]
 READY, RUNNING, COMPLETED, STOPPED, LEFT_LIMITS, LEASE_ENDED, NOT_BEGUN = range(7)
 _WHY = {
     STOPPED: "it was stopped",
-    LEFT_LIMITS: "the measured value left its limits, or a value was not finite",
+    LEFT_LIMITS: "the measured value left its limits or was lost, or a value was not finite",
     LEASE_ENDED: "this program did not renew it in time",
     NOT_BEGUN: "it did not begin: a value is outside its limits, see `rtcfctl logs`",
 }

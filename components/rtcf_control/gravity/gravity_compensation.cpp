@@ -20,6 +20,7 @@
 
 #include "gravity/robot_chain.hpp"
 #include "joint_names.hpp"
+#include "measurement_watch.hpp"
 #include "words.hpp"
 
 namespace rtcf_control {
@@ -108,6 +109,7 @@ class GravityCompensation final : public rtcf::Component {
                                  rtcf::Doc("time of the transition after a change of parameters "
                                            "or robot; 0 = at once")};
     rtcf::Derived<Setup> setup_{this};
+    MeasurementWatch<1> watch_{this, {"measured"}, "command holds the robot at its last positions"};
 
     rtcf::State<Identity> identity_{this, "identity", {}, rtcf::Doc("robot and joints")};
     rtcf::State<bool> begun_{this, "begun", false, rtcf::Doc("the positions are known")};
@@ -166,19 +168,18 @@ class GravityCompensation final : public rtcf::Component {
     bool start() override {
         begun_ = false;
         rejected_ = 0;
+        watch_.begin();
         return true;
     }
 
     void update() override {
         adoptState();
-        if (measured.read() == rtcf::DataStatus::New && !follow(measured.value())) {
-            ++rejected_;
-            rejected.write(rejected_);
-            return;
-        }
+        const bool is_new = measured.read() == rtcf::DataStatus::New;
+        const bool is_good = is_new && follow(measured.value());
+        if (begun_) watch(is_good);
+        if (is_new && !is_good) ++rejected_;
         rejected.write(rejected_);
-        if (!begun_) return;
-        write();
+        if (begun_ && (is_good || !is_new)) write();
     }
 
     // Runs in the last cycle, too: without this effort, the robot falls.
@@ -282,6 +283,13 @@ class GravityCompensation final : public rtcf::Component {
         RTCF_WARN_THROTTLE(this, 1.0, "measured rejected: joint {}: {}", chain_->joints()[joint],
                            why);
         return false;
+    }
+
+    // Effort 0 is no safe output: the robot would fall.
+    void watch(bool is_new) noexcept {
+        double sum = 0.0;  // changes with any position
+        for (std::size_t i = 0; i < count(); ++i) sum += position_.value()[i];
+        if (const char* const fault = watch_.note(0, sum, is_new, elapsed())) reportFault(fault);
     }
 
     Law now() const noexcept { return {{gravity_x, gravity_y, gravity_z}, share}; }

@@ -39,7 +39,7 @@ class Progress(enum.IntEnum):
     running = 1
     completed = 2  # the duration is over
     stopped = 3  # by run, stop_now, or the end of the loop
-    left_limits = 4  # by the measured value, or a value that is not finite
+    left_limits = 4  # by the measured value, or it is lost, or a value is not finite
     lease_ended = 5  # run has not been renewed
     not_begun = 6  # u or measured is outside its limits, or there are none
 
@@ -114,6 +114,15 @@ class Excitation(Component):
         doc="distance of measured from its first value at which a relay switches",
     )
     idle: Parameter[float] = Parameter(0.0, doc="y until u has a value")
+    measurement_timeout: Parameter[float] = Parameter(
+        0.2,
+        min=0.0,
+        unit="s",
+        doc="longest time without a new finite measured value, then: the excitation ends",
+    )
+    frozen_timeout: Parameter[float] = Parameter(
+        math.inf, min=0.0, unit="s", doc="the same for a measured value that does not change"
+    )
 
     progress: State[Progress] = State(doc="last value of state")
     armed: State[bool] = State(False, doc="run was false: the next true begins")
@@ -126,6 +135,11 @@ class Excitation(Component):
     played: State[int] = State(0, unit="ns", doc="time since the signal began")
     phase: State[float] = State(0.0, doc="phase of the wave, from 0 to 1")
     bits: State[int] = State(PRBS_START, doc="shift register of PRBS")
+    measured_age: State[int] = State(
+        0, unit="ns", doc="time since the last new finite measured value"
+    )
+    unchanged: State[int] = State(0, unit="ns", doc="time since its last change")
+    last_finite: State[float] = State(math.nan, doc="last finite measured value; NaN = none")
     peak: Derived[float]  # of the multisine
 
     def prepare(self):
@@ -146,6 +160,9 @@ class Excitation(Component):
     def start(self):
         self.progress = Progress.ready
         self.armed = False
+        self.measured_age = 0
+        self.unchanged = 0
+        self.last_finite = math.nan
 
     @property
     def elapsed(self):
@@ -156,8 +173,27 @@ class Excitation(Component):
         """Return the value without excitation."""
         return self.u.value if self.u.valid else self.idle
 
+    def watch(self):
+        """Note the measured value of a cycle."""
+        if not self.measured.valid:
+            return
+        value = self.measured.value
+        arrived = self.measured.new and math.isfinite(value)
+        changed = arrived and value != self.last_finite
+        self.measured_age = 0 if arrived else self.measured_age + self.elapsed
+        self.unchanged = 0 if changed else self.unchanged + self.elapsed
+        if arrived or (math.isfinite(value) and math.isnan(self.last_finite)):
+            self.last_finite = value  # also an old value, if it is the first one
+
+    def lost(self):
+        """Return whether the measured value is too old, or frozen."""
+        return (
+            self.measured_age > 1e9 * self.measurement_timeout
+            or self.unchanged > 1e9 * self.frozen_timeout
+        )
+
     def inside(self):
-        """Return whether the measured value is within its limits, or not needed."""
+        """Return whether the measured value is within its limits and not lost, or not needed."""
         if (
             self.shape is not Shape.relay
             and not math.isfinite(self.measured_lower)
@@ -167,6 +203,7 @@ class Excitation(Component):
         value = self.measured.value
         return (
             self.measured.valid
+            and not self.lost()
             and math.isfinite(value)
             and self.measured_lower <= value <= self.measured_upper
         )
@@ -185,8 +222,8 @@ class Excitation(Component):
             )
         elif not self.inside():
             self.warn(
-                "not begun: measured has no value, or is outside measured_lower = {} to "
-                "measured_upper = {}",
+                "not begun: measured has no value or is lost, or is outside "
+                "measured_lower = {} to measured_upper = {}",
                 self.measured_lower,
                 self.measured_upper,
             )
@@ -265,6 +302,7 @@ class Excitation(Component):
 
     def update(self):
         command = self.command()
+        self.watch()
         wanted = self.run.valid and self.run.value
         renewed = wanted and self.run.new
         stopped = self.stop_now.valid and self.stop_now.value

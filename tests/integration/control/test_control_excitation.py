@@ -124,6 +124,43 @@ def test_a_measured_value_outside_its_limits_stops_at_once(blocks: Blocks, bad: 
     assert (found["state"][100:] == LEFT_LIMITS).all()
 
 
+@pytest.mark.parametrize("kind", ["late", "NaN", "frozen"])
+@pytest.mark.parametrize("needed", [{"measured_upper": 1.5}, {"shape": "relay"}])
+def test_a_lost_measured_value_ends_it(blocks: Blocks, kind: str, needed: dict[str, Any]) -> None:
+    measured = only(IN, range(100)) if kind == "late" else IN.copy()
+    if kind == "frozen":
+        measured[100:] = measured[99]
+    elif kind == "NaN":
+        measured[100] = np.nan
+    limit = {"frozen_timeout": 0.15} if kind == "frozen" else {"measurement_timeout": 0.15}
+    found = excite(blocks, {"in": IN, "measured": measured}, **needed, **limit)
+    ended = 100 if kind == "NaN" else 250
+    assert (found["state"][10:ended] == RUNNING).all()
+    assert (found["state"][ended:] == LEFT_LIMITS).all()
+    assert found["out"][ended:].tolist() == IN[ended:].tolist()
+    # Without limits, it is not needed.
+    found = excite(blocks, {"in": IN, "measured": measured}, **limit)
+    assert (found["state"][310:] == COMPLETED).all()
+
+
+def test_a_lost_measured_value_is_named(stepped: Bench) -> None:
+    excitation = Stepped(stepped, "Excitation", **WAYS, measured_upper=1.0)
+    try:
+        excitation.step(2, run=False, measured=0.0)
+        excitation.step(1, run=True)
+        excitation.step(250)
+        fault = stepped.client.get_component("/stepped/block").fault
+        assert fault == (
+            "measured has no new value within measurement_timeout: the excitation ends"
+        )
+        # It does not begin again.
+        excitation.step(2, run=False)
+        assert excitation.step(2, run=True)["progress"] == NOT_BEGUN
+    finally:
+        excitation.unload()
+        stepped.client.stop()
+
+
 def test_run_false_and_stop_end_it(blocks: Blocks) -> None:
     run = ON & (np.arange(STEPS) < 50)
     found = blocks.run("Excitation", {"run": run, "in": IN}, **WAYS)
@@ -193,7 +230,7 @@ def test_the_last_cycle_passes_the_command_before(stepped: Bench) -> None:
     [
         ({"upper": -10.0}, {}, "not begun: set lower and upper, the limits of out"),
         ({"upper": 0.4}, {"in": IN}, "is outside lower = -10 to upper = 0.4"),
-        ({"measured_upper": 1.0}, {}, "not begun: measured has no value, or is outside"),
+        ({"measured_upper": 1.0}, {}, "not begun: measured has no value or is lost, or is outside"),
         ({"measured_upper": 1.0}, {"measured": np.full(STEPS, 2.0)}, "not begun: measured has no"),
         ({"shape": "relay"}, {}, "not begun: measured has no value"),
     ],

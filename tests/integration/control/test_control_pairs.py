@@ -31,6 +31,9 @@ _MASKED: Any = np.ma
 RUN = _MASKED.array(CYCLE % 500 >= 20, mask=(CYCLE % 20 > 0) | ((CYCLE > 1200) & (CYCLE < 1500)))
 # A source that is slower than the loop for a while, and then stops.
 SLOW = _MASKED.array(SIGNAL, mask=((CYCLE > 500) & (CYCLE % 10 > 0)) | (CYCLE > 1600))
+# A sensor that is silent or frozen for a while.
+SEEN = _MASKED.array(np.sin(0.02 * np.where(CYCLE % 900 < 600, CYCLE, 600)),
+                     mask=(CYCLE > 200) & (CYCLE < 480))  # fmt: skip
 LAW: dict[str, Any] = {"coulomb": 2.0, "breakaway": 3.5, "viscous": 0.8, "stribeck_velocity": 0.05}
 MOTOR: dict[str, Any] = {"inertia": 0.05, "viscous": 0.5, "step": 5e-4}
 ELASTIC: dict[str, Any] = {**MOTOR, "load_inertia": 0.1, "stiffness": 200.0, "damping": 0.5}
@@ -75,6 +78,7 @@ PAIRS: list[tuple[str, str, Mapping[str, Any], Mapping[str, Any] | None]] = [
     ("Motor", "Motor", {**ELASTIC, **DRY, **WINDING, "inductance": 0.01}, None),
     ("Excitation", "Excitation", {**EXCITED, "shape": "step", "delay": 0.05}, None),
     ("Excitation", "Excitation", {**EXCITED, "shape": "relay", "hysteresis": 0.3}, None),
+    ("Excitation", "Excitation", {**EXCITED, "shape": "relay", "frozen_timeout": 0.05}, None),
     ("Excitation", "Excitation", {**EXCITED, "shape": "step", "mode": "replace", "lease": 0.1,
      "measured_lower": -0.9}, None),
     ("Excitation", "Excitation", {**EXCITED, "shape": "multisine", "lines": 7}, None),
@@ -101,7 +105,7 @@ INPUTS: dict[str, dict[str, tuple[str, Any]]] = {
     "Motor": {"command": ("command", SIGNAL), "load_torque": ("load_torque", LOAD)},
     "Excitation": {
         "in": ("u", SIGNAL),
-        "measured": ("measured", np.sin(0.02 * CYCLE)),
+        "measured": ("measured", SEEN),
         "run": ("run", RUN),
         "stop": ("stop_now", CYCLE % 900 > 890),
     },

@@ -12,10 +12,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+import rtcf
 from block_bench import Blocks, Stepped, Values
 from pages import TREE
 from rtcf.testing import Bench
 from rtcf.v1 import graph_pb2
+from rtcf_shared.value_text import parse
 
 DT = 0.001
 LENGTH = 900
@@ -77,7 +79,9 @@ CASES = {
         {**PLANT, "role": "lqg", "C": "1 0", "fade": 0.0}, holds=True,
     ),
 }  # fmt: skip
-TYPES = ("Pid", "JointLimiter", "FrictionCompensation", "StateSpace", "KalmanFilter")
+TYPES = (
+    "Pid", "JointLimiter", "FrictionCompensation", "StateSpace", "KalmanFilter", "Excitation"
+)  # fmt: skip
 
 
 def dead(values: Any, begin: int) -> Any:
@@ -217,11 +221,53 @@ def test_the_lost_sensor_is_named_with_its_reason(stepped: Bench) -> None:
         block.unload()
 
 
+GRAVITY = "GravityCompensation"
+PENDULUM = """<robot name="pendulum"><link name="base"/>
+<link name="rod"><inertial><origin xyz="1 0 0"/><mass value="2"/>
+<inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/></inertial></link>
+<joint name="pivot" type="continuous"><parent link="base"/><child link="rod"/><axis xyz="0 -1 0"/>
+</joint></robot>"""
+
+
+def load_gravity(client: rtcf.Client) -> None:
+    client.load(rtcf.component("rtcf_control", GRAVITY, name=GRAVITY, ns=f"/{GRAVITY}",
+                               parameters=[f"urdf:={PENDULUM}"]))  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["late", "NaN", "frozen"])
+def test_gravity_without_a_sensor_holds_the_last_positions(stepped: Bench, kind: str) -> None:
+    client = stepped.client
+    load_gravity(client)
+    name = f"/{GRAVITY}/{GRAVITY}"
+    try:
+        if kind == "frozen":
+            client.set_parameters(name, ["frozen_timeout:=0.2"])
+        sent = {"late": [], "NaN": [float("nan")], "frozen": [0.5]}[kind]
+        for position in (0.4, 0.5):
+            client.write(f"{name}.measured", {"position": [position]})
+            client.step(1)
+        for cycle in range(202):
+            if sent:
+                client.write(f"{name}.measured", {"position": sent})
+            client.step(1)
+            found = client.get_component(name)
+            assert bool(found.fault) == (cycle >= 200)
+            effort = next(parse(each.value) for each in found.states if each.name == "last")[0]
+            assert effort == pytest.approx(2.0 * 9.80665 * np.cos(0.5))
+        reason = "changed within frozen_timeout" if kind == "frozen" else "no new value within"
+        assert reason in found.fault
+        assert found.fault.endswith(": command holds the robot at its last positions")
+    finally:
+        client.unload([name])
+        client.stop()
+
+
 def test_the_table_in_the_docs_names_these_defaults(blocks: Blocks) -> None:
     text = (TREE / "docs" / "control" / "index.md").read_text()
     section = text.partition("## Lost sensors")[2].partition("\n## ")[0]
     rows = re.findall(r"^\| `(\w+)`[^|]*\|[^|]*\| ([\d.]+|none) \|", section, re.MULTILINE)
-    assert {name for name, _ in rows} == set(TYPES)
+    assert {name for name, _ in rows} == {*TYPES, GRAVITY}
+    load_gravity(blocks.client)
     for name, limit in rows:
         component = blocks.client.get_component(f"/{name}/{name}")
         default = {each.name: each.default_value.double_value for each in component.parameters}
