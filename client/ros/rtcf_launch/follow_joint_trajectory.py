@@ -41,6 +41,7 @@ _SIGNALS = (
     "done", "halted", "last_trajectory_number", "rejections", "position", "commanded_velocity"
 )  # fmt: skip
 _ACCEPT_CYCLES = 2000  # longest wait until a trajectory is accepted or rejected
+_END_S = 5.0  # longest wait for the stop of the joints at the end of the node
 
 
 @dataclass(frozen=True)
@@ -100,6 +101,8 @@ class Server:
             execute_cb=self._execute, auto_start=False,
         )  # fmt: skip
         self._server.start()
+        # A goal is aborted, and its client told, before the node leaves the master.
+        rospy.on_shutdown(lambda: self._server.execute_thread.join(_END_S))
         rospy.loginfo(
             "follows trajectories of %s with %s", ", ".join(self._joints), self._generator
         )
@@ -188,9 +191,13 @@ class Server:
             self._await_goal(samples, goal)
 
     def _samples(self, stream: Any) -> Iterator[_Sample]:
-        """Yield the values of each cycle; raises _FailedError at the end of the loop."""
+        """Yield the values of each cycle; raises _FailedError at the end of the loop or node."""
+        import rospy
+
         count = len(self._joints)
         for batch in stream:
+            if rospy.is_shutdown():
+                raise _FailedError("INVALID_GOAL", "the node follow_joint_trajectory ends")
             columns = {name: batch[f"{self._generator}.{name}"] for name in _SIGNALS}
             for row in range(len(batch)):
                 yield _Sample(

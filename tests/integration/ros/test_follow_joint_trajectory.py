@@ -4,13 +4,14 @@ import json
 import subprocess
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
 from actionlib_msgs.msg import GoalStatus
 from daemon_process import wait_for
-from launch_processes import Launching
+from launch_processes import Launching, Process
 from pages import SUPPORT
 from ros_processes import Master
 from rtcf_launch import control_messages
@@ -19,6 +20,7 @@ from values import port_value
 JOINTS = [f"joint{i}" for i in range(1, 7)]
 READY = [0.0, 0.3, 1.6, 0.0, 1.24, 0.0]
 STANDS = [0.0] * 6
+FAR = [[5.0, [2.0, *READY[1:]], STANDS]]
 # As in the package control_msgs.
 MD5 = {
     "FollowJointTrajectoryAction": "bc4f9b743838566551c0390c65f1a248",
@@ -34,10 +36,11 @@ MD5 = {
 class Peer:
     """The action's client."""
 
-    def __init__(self, environment: dict[str, str]) -> None:
+    def __init__(
+        self, environment: dict[str, str], node: str = "/follow_joint_trajectory"
+    ) -> None:
         self._process = subprocess.Popen(
-            ["/usr/bin/python3", SUPPORT / "action_peer.py",
-             "/follow_joint_trajectory/follow_joint_trajectory"],
+            ["/usr/bin/python3", SUPPORT / "action_peer.py", f"{node}/follow_joint_trajectory"],
             env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
         )  # fmt: skip
         assert self._process.stdout is not None
@@ -82,6 +85,25 @@ def peer(launching: Launching) -> Iterator[Peer]:
     peer.end()
 
 
+@contextmanager
+def another_node(launching: Launching, name: str, *words: str) -> Iterator[tuple[Process, Peer]]:
+    """Yield another node for the same arm, and a client of it."""
+    node = launching.node("follow_joint_trajectory", f"__name:={name}", *words)
+    node.wait_for_output("follows trajectories of joint1, ")
+    peer = Peer(launching.environment, f"/{name}")
+    try:
+        yield node, peer
+    finally:
+        peer.end()
+        node.end()
+
+
+def require_standing(launching: Launching) -> None:
+    """Check that the arm stands soon, before the end of a path of joint 1 to 2 rad."""
+    wait_for(lambda: abs(measured(launching, "joint1_velocity")) < 1e-3, "the arm to stand")
+    assert -0.1 < measured(launching, "joint1_position") < 1.5
+
+
 def measured(launching: Launching, port: str) -> float:
     """Return the newest value of a port of the robot."""
     with launching.client() as (client, runner):
@@ -107,10 +129,9 @@ def test_the_arm_follows_a_trajectory_with_joints_in_any_order(
 
 def test_a_cancelled_goal_stops_the_arm(launching: Launching, peer: Peer) -> None:
     peer.send([[1.5, READY, STANDS]])
-    result = peer.send([[5.0, [2.0, *READY[1:]], STANDS]], cancel=1.5)
+    result = peer.send(FAR, cancel=1.5)
     assert result["state"] == GoalStatus.PREEMPTED
-    wait_for(lambda: abs(measured(launching, "joint1_velocity")) < 1e-3, "the arm to stand")
-    assert 0.0 < measured(launching, "joint1_position") < 1.5
+    require_standing(launching)
 
 
 def test_a_new_goal_replaces_the_present_one(launching: Launching, peer: Peer) -> None:
@@ -145,11 +166,47 @@ def test_a_goal_that_is_not_reached_says_why(
 
 def test_a_goal_that_is_aborted_stops_the_arm(launching: Launching, peer: Peer) -> None:
     peer.send([[1.5, READY, STANDS]])
-    far = [[5.0, [2.0, *READY[1:]], STANDS]]
-    result = peer.send(far, path={"joint1": 1e-9})
+    result = peer.send(FAR, path={"joint1": 1e-9})
     assert result["state"] == GoalStatus.ABORTED
-    wait_for(lambda: abs(measured(launching, "joint1_velocity")) < 1e-3, "the arm to stand")
-    assert measured(launching, "joint1_position") < 1.5
+    require_standing(launching)
+
+
+def test_a_goal_without_measured_positions_is_aborted_and_the_arm_stands(
+    launching: Launching, peer: Peer
+) -> None:
+    peer.send([[1.5, READY, STANDS]])
+    with another_node(launching, "blind", "_joint_states:=nobody") as (_, blind):
+        result = blind.send(FAR, path={"joint1": 0.5})
+    assert (result["state"], result["code"]) == (GoalStatus.ABORTED, -4)
+    assert result["text"] == "joint joint1 has no measured position"
+    require_standing(launching)
+
+
+def test_the_arm_stands_at_the_end_of_the_node(launching: Launching, peer: Peer) -> None:
+    peer.send([[1.5, READY, STANDS]])
+    with another_node(launching, "brief") as (node, other), ThreadPoolExecutor() as pool:
+        sent = pool.submit(other.send, FAR)
+        wait_for(lambda: measured(launching, "joint1_velocity") > 0.1, "the arm to move")
+        node.end()
+        result = sent.result(timeout=30.0)
+    assert result["state"] == GoalStatus.ABORTED
+    assert result["text"] == "the node follow_joint_trajectory ends"
+    require_standing(launching)
+
+
+def test_a_new_limit_in_front_of_the_arm_aborts_the_goal(launching: Launching, peer: Peer) -> None:
+    peer.send([[1.5, READY, STANDS]])
+    with launching.client() as (client, runner), ThreadPoolExecutor() as pool:
+        sent = pool.submit(peer.send, FAR)
+        wait_for(lambda: measured(launching, "joint1_velocity") > 0.1, "the arm to move")
+        client.set_parameters("/trajectory", [f"upper:={' '.join(['1.8'] * 6)}"], runner)
+        try:
+            result = sent.result(timeout=30.0)
+        finally:
+            client.undo_parameters("/trajectory", runner)
+    assert (result["state"], result["code"]) == (GoalStatus.ABORTED, -4)
+    assert "/trajectory has stopped at a limit" in result["text"]
+    require_standing(launching)
 
 
 @pytest.mark.parametrize(
@@ -159,17 +216,16 @@ def test_an_invalid_goal_in_place_of_another_one_stops_the_arm(
     launching: Launching, peer: Peer, position: float, joints: Any
 ) -> None:
     peer.send([[1.5, READY, STANDS]])
-    peer.send([[5.0, [2.0, *READY[1:]], STANDS]], replace=1.0)
+    peer.send(FAR, replace=1.0)
     result = peer.send([[1.0, [position, *READY[1:]], STANDS]], joints)
     assert result["state"] == GoalStatus.ABORTED
-    wait_for(lambda: abs(measured(launching, "joint1_velocity")) < 1e-3, "the arm to stand")
-    assert measured(launching, "joint1_position") < 1.5
+    require_standing(launching)
 
 
 def test_a_halt_aborts_the_goal_and_the_arm_stands(launching: Launching, peer: Peer) -> None:
     peer.send([[1.5, READY, STANDS]])
     with launching.client() as (client, runner), ThreadPoolExecutor() as pool:
-        sent = pool.submit(peer.send, [[5.0, [2.0, *READY[1:]], STANDS]])
+        sent = pool.submit(peer.send, FAR)
         wait_for(lambda: measured(launching, "joint1_velocity") > 0.1, "the arm to move")
         client.write("/trajectory.halt", True, runner)
         try:
@@ -178,8 +234,7 @@ def test_a_halt_aborts_the_goal_and_the_arm_stands(launching: Launching, peer: P
             client.write("/trajectory.halt", False, runner)
     assert result["state"] == GoalStatus.ABORTED
     assert "/trajectory is halted" in result["text"]
-    wait_for(lambda: abs(measured(launching, "joint1_velocity")) < 1e-3, "the arm to stand")
-    assert 0.0 < measured(launching, "joint1_position") < 1.5
+    require_standing(launching)
 
 
 def test_a_component_that_is_no_generator_is_rejected(launching: Launching) -> None:
@@ -196,3 +251,19 @@ def test_help_names_the_parameters(launching: Launching) -> None:
     assert node.wait(60.0) == 0
     assert "goal_time" in node.output()
     assert Path(node.command.split()[0]).name == "follow_joint_trajectory"
+
+
+def test_the_end_of_the_loop_aborts_the_goal(launching: Launching, peer: Peer) -> None:
+    peer.send([[1.5, READY, STANDS]])
+    with launching.client() as (client, runner), ThreadPoolExecutor() as pool:
+        sent = pool.submit(peer.send, FAR)
+        wait_for(lambda: measured(launching, "joint1_velocity") > 0.1, "the arm to move")
+        client.stop(runner)
+        result = sent.result(timeout=30.0)
+        assert result["state"] == GoalStatus.ABORTED
+        assert result["text"].startswith("the loop has ended")
+        # The goal does not go on in the next loop.
+        client.start(runner)
+        before = measured(launching, "joint1_position")
+        require_standing(launching)
+        assert measured(launching, "joint1_position") == pytest.approx(before, abs=0.1)
