@@ -11,10 +11,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+import rtcf
 from block_bench import Blocks, Stepped, rejection
 from hypothesis import given, seed, settings
 from hypothesis import strategies as st
 from rtcf.testing import Bench
+from rtcf_shared.value_text import parse
 
 DT = 0.001
 ROUNDING = 1e-9
@@ -180,6 +182,31 @@ def test_a_standstill_begins_with_the_first_command(blocks: Blocks) -> None:
     assert np.isnan(values["out"][:20]).all()
     assert (values["out"][20:60] == wanted[20]).all()
     assert values["out"][60:].tolist() == wanted[60:].tolist()
+
+
+@pytest.mark.parametrize("stopped", [False, True], ids=["in motion", "on the way to a standstill"])
+def test_the_last_cycle_holds_a_position_where_it_is(stepped: Bench, stopped: bool) -> None:
+    client = stepped.client
+    block = Stepped(stepped, "EStop", start_stopped=False, mode="standstill", deceleration=5.0)
+    client.load(rtcf.component("rtcf_examples", "Identity", name="reader", ns="/reader",
+                               remaps=["in:=/stepped/out"]))  # fmt: skip
+    try:
+        for cycle in range(100):
+            block.step(**{"in": 0.8 + 0.002 * cycle, "stop1": stopped and cycle > 90})
+        last = client.get_component("/reader/reader")
+        client.stop()
+        found = client.get_component("/reader/reader")
+        before, after = (next(str(each.value) for each in info.ports if each.name == "out")
+                         for info in (last, found))  # fmt: skip
+        assert after == before
+        position = float(before.removeprefix("data: "))
+        assert position == pytest.approx(0.8 + 0.002 * 99, abs=0.01 if stopped else ROUNDING)
+        states = {each.name: parse(each.value) for each in
+                  client.get_component("/stepped/block").states}  # fmt: skip
+        assert states["speed"] == 0.0
+    finally:
+        client.unload(["/reader/reader"])
+        block.unload()
 
 
 def test_torque_stays_on_in_stop_category_2(blocks: Blocks) -> None:
