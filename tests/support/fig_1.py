@@ -42,15 +42,14 @@ def mimo_sum(
     return 1.0 if total > 1e20 else total
 
 
-def simulate(g2: float | None = None) -> Iterator[dict[str, float]]:
-    """Yield the values that the components write in each cycle; G2's value is new in the first."""
+def simulate() -> Iterator[dict[str, float]]:
+    """Yield the values that the components write in each cycle, without a new value of G2."""
     r1: float | None = None
     r3: float | None = None
     while True:
         h1 = mimo_sum(r3, r1)  # of the previous cycle
         f1 = mimo_sum(h1, None)
         r1 = mimo_sum(h1, None)
-        r2 = mimo_sum(f1, h1, r1, g2)
+        r2 = mimo_sum(f1, h1, r1)
         r3 = mimo_sum(f1, r2)
-        g2 = None  # no longer new
         yield {"H1": h1, "F1": f1, "R1": r1, "R2": r2, "R3": r3}

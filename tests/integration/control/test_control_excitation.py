@@ -150,9 +150,8 @@ def test_a_lost_measured_value_is_named(stepped: Bench) -> None:
         excitation.step(1, run=True)
         excitation.step(250)
         fault = stepped.client.get_component("/stepped/block").fault
-        assert fault == (
-            "measured has no new value within measurement_timeout: the excitation ends"
-        )
+        said = "measured has no new value within measurement_timeout: the excitation ends"
+        assert fault == f"iteration 201: {said}"
         # It does not begin again.
         excitation.step(2, run=False)
         assert excitation.step(2, run=True)["progress"] == NOT_BEGUN

@@ -241,7 +241,7 @@ def test_gravity_without_a_sensor_holds_the_last_positions(stepped: Bench, kind:
     name = f"/{GRAVITY}/{GRAVITY}"
     try:
         if kind == "frozen":
-            client.set_parameters(name, ["frozen_timeout:=0.2"])
+            client.set_parameters(name, [rtcf.parse_parameter("frozen_timeout:=0.2")])
         sent = {"late": [], "NaN": [float("nan")], "frozen": [0.5]}[kind]
         for position in (0.4, 0.5):
             client.write(f"{name}.measured", {"position": [position]})

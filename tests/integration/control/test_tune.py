@@ -64,8 +64,8 @@ def test_a_step_that_leaves_its_limits_is_undone(controlled: Daemon, client: rtc
     )
     assert done.returncode == 1
     assert done.stderr == (
-        "rtcfctl: the excitation by /excitation ended early: the measured value left its limits, "
-        "or a value was not finite; the parameters were set back\n"
+        "rtcfctl: the excitation by /excitation ended early: the measured value left its limits or "
+        "was lost, or a value was not finite; the parameters were set back\n"
     )
     assert gains(client) == SLOW
     assert controlled.ctl("get", "pid.setpoint").stdout == "10\n"

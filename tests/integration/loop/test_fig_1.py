@@ -50,7 +50,8 @@ def test_ros_receives_each_value_of_an_independent_simulation(
         fig_1.load(client, ("R3", "F1", "R2", "H1", "R1"))
         g1 = master.node("record", "/R1_H1R2")
         g2 = master.node("record", "/R3_G2H1")
-        # A value that needs all digits of a double.
+        # A value that needs all digits of a double. It comes before the start, so it is not new in
+        # the loop.
         latched = master.node("latch", "/G2_R2", "0.1")
         for node in (g1, g2, latched):
             node.wait_until_connected()
@@ -69,7 +70,7 @@ def test_ros_receives_each_value_of_an_independent_simulation(
         wait_until_it_is(
             2 * cycles - lost, lambda: len(g1.values()) + len(g2.values()), "the values received"
         )
-        wanted = list(itertools.islice(fig_1.simulate(g2=0.1), cycles))
+        wanted = list(itertools.islice(fig_1.simulate(), cycles))
         assert is_among(g2.values(), [values["R3"] for values in wanted])
         assert is_among(g1.values(), [values["R1"] for values in wanted])
         # The sums grow and restart repeatedly, so the values differ.

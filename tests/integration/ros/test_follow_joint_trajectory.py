@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import rtcf
 from actionlib_msgs.msg import GoalStatus
 from daemon_process import wait_for
 from launch_processes import Launching, Process
@@ -199,7 +200,8 @@ def test_a_new_limit_in_front_of_the_arm_aborts_the_goal(launching: Launching, p
     with launching.client() as (client, runner), ThreadPoolExecutor() as pool:
         sent = pool.submit(peer.send, FAR)
         wait_for(lambda: measured(launching, "joint1_velocity") > 0.1, "the arm to move")
-        client.set_parameters("/trajectory", [f"upper:={' '.join(['1.8'] * 6)}"], runner)
+        upper = rtcf.parse_parameter(f"upper:={' '.join(['1.8'] * 6)}")
+        client.set_parameters("/trajectory", [upper], runner)
         try:
             result = sent.result(timeout=30.0)
         finally:
