@@ -266,10 +266,11 @@ class Biquads final : public rtcf::Component {
             return;
         }
         // The last cycle may be a new period ago, or still an old one, as in a running loop.
-        if (begun_ && period_ != period() && elapsed() == period()) design();
+        const bool same = identity_ == analog_->identity;
+        if (begun_ && same && period_ != period() && elapsed() == period()) design();
         if (!begun_) {
             begin(x);
-        } else if (identity_ != analog_->identity) {
+        } else if (!same) {
             redesign(x);
         }
         Motions next = motion_;

@@ -139,6 +139,8 @@ class Excitation final : public rtcf::Component {
     rtcf::State<std::int64_t> since_{this, "since", 0, rtcf::Unit("ns"),
                                      rtcf::Doc("time since the begin")};
     rtcf::State<double> base_{this, "base", 0.0, rtcf::Doc("in at the begin")};
+    rtcf::State<double> last_in_{this, "last_in", std::numeric_limits<double>::quiet_NaN(),
+                                 rtcf::Doc("last finite in; NaN = none")};
     rtcf::State<double> reference_{this, "reference", 0.0, rtcf::Doc("measured at the begin")};
     rtcf::State<bool> high_{this, "high", true, rtcf::Doc("the relay is at amplitude")};
     rtcf::State<bool> begun_{this, "begun", false, rtcf::Doc("the signal runs")};
@@ -187,6 +189,7 @@ class Excitation final : public rtcf::Component {
     bool start() override {
         set(Progress::Ready);
         armed_ = false;
+        last_in_ = std::numeric_limits<double>::quiet_NaN();
         watch_.begin();
         return true;
     }
@@ -199,11 +202,10 @@ class Excitation final : public rtcf::Component {
 
     void update() override {
         const double command = base();
-        const rtcf::DataStatus measurement = measured.read();
-        const bool has_measured = measurement != rtcf::DataStatus::None;
-        const bool is_new = measurement == rtcf::DataStatus::New;
+        const bool has_measured = measured.read() != rtcf::DataStatus::None;
         const char* const fault =
-            has_measured ? watch_.note(0, measured.value(), is_new, elapsed()) : nullptr;
+            has_measured ? watch_.note(0, measured.value(), measured.age(this), elapsed())
+                         : nullptr;
         const rtcf::DataStatus told = run.read();
         const bool wanted = told != rtcf::DataStatus::None && run.value();
         const bool renewed = wanted && told == rtcf::DataStatus::New;
@@ -232,7 +234,9 @@ class Excitation final : public rtcf::Component {
     }
 
     double base() noexcept {
-        return in.read() != rtcf::DataStatus::None ? in.value() : idle.value();
+        const double command = in.read() != rtcf::DataStatus::None ? in.value() : idle.value();
+        if (std::isfinite(command)) last_in_ = command;
+        return command;
     }
 
     bool runs() const noexcept { return progress_ == static_cast<std::int32_t>(Progress::Running); }
@@ -298,7 +302,9 @@ class Excitation final : public rtcf::Component {
     }
 
     void pass(double command) noexcept {
-        out.write(command);  // rejected if it is not finite
+        if (!std::isfinite(command))
+            reportFault("in is not finite: out is its last finite value");
+        out.write(last_in_);  // rejected if there was no finite one
         signal.write(0.0);
         publish();
     }

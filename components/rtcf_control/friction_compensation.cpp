@@ -119,7 +119,7 @@ class FrictionCompensation final : public rtcf::Component {
         const rtcf::DataStatus status = velocity.read();
         if (status == rtcf::DataStatus::None) return;
         const double v = velocity.value();
-        const char* const fault = watch_.note(0, v, status == rtcf::DataStatus::New, elapsed());
+        const char* const fault = watch_.note(0, v, velocity.age(this), elapsed());
         if (fault != nullptr) {
             reportFault(fault);
             if (watch_.lost(0)) safe();

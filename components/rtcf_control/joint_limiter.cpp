@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 #include <rtcf/component.hpp>
@@ -86,6 +87,9 @@ class JointLimiter final : public rtcf::Component {
     rtcf::State<double> pace_{this, "pace", 0.0, rtcf::Unit("rad/s"),
                               rtcf::Doc("velocity of the last position or velocity command")};
     rtcf::State<double> wanted_{this, "last_wanted", 0.0, rtcf::Doc("last wanted position")};
+    rtcf::State<double> travel_{this, "travel", 0.0, rtcf::Unit("rad"),
+                                rtcf::Doc("way of the joint since the last position, estimated")};
+    rtcf::State<std::int32_t> kind_{this, "kind", -1, rtcf::Doc("command of the last cycle")};
     rtcf::State<bool> begun_{this, "begun", false, rtcf::Doc("the last output is valid")};
 
     bool prepare(const rtcf::Values& proposed) override {
@@ -115,38 +119,37 @@ class JointLimiter final : public rtcf::Component {
     bool start() override {
         begun_ = false;
         pace_ = 0.0;
+        travel_ = 0.0;
         watch_.begin();
         return true;
     }
 
     void update() override {
+        const auto kind = static_cast<std::int32_t>(command.value());
+        begun_ = begun_ && kind_ == kind;  // the last output is another quantity
+        kind_ = kind;
+        const rtcf::DataStatus seen = position.read();
         const bool has_position =
-            note(position, 0, command != Command::Position && needsPosition());
+            note(position, 0, command == Command::Position ? !begun_ : needsPosition());
         const bool has_velocity = note(velocity, 1, command == Command::Effort && needsVelocity());
+        travel(seen == rtcf::DataStatus::New && std::isfinite(position.value()));
         if (in.read() == rtcf::DataStatus::None) return;
-        const double wanted = in.value();
+        double wanted = in.value();
         if (!std::isfinite(wanted)) {
-            out.write(wanted);  // rejected as not finite: readers keep the last output
-            return;
+            reportFault("in is not finite: the last output or target counts");
+            if (!begun_) return;
+            wanted = command == Command::Position ? wanted_ : last_;
         }
         switch (command.value()) {
             case Command::Position:
-                if (!begun_) {
-                    // Begins at the measured position, so that the joint does not jump.
-                    if (has_position && !std::isfinite(position.value())) {
-                        reportFault("position is not finite: out begins at the measured position");
-                        return;
-                    }
-                    last_ = has_position ? position.value() : Range{lower, upper}.limit(wanted);
-                    wanted_ = Range{lower, upper}.limit(wanted);
-                }
+                if (!begun_ && !begin(wanted)) return;
                 write(wanted, followed(wanted, last_));
                 return;
             case Command::Velocity:
                 if (needsPosition() && !has_position) return;
                 write(wanted, needsPosition() && watch_.lost(0)
                                   ? slower()
-                                  : velocities(watch_.last(0)).limit(wanted));
+                                  : velocities(place()).limit(wanted));
                 pace_ = last_.value();
                 return;
             case Command::Effort: {
@@ -154,7 +157,8 @@ class JointLimiter final : public rtcf::Component {
                     return;
                 const bool lost =
                     (needsPosition() && watch_.lost(0)) || (needsVelocity() && watch_.lost(1));
-                write(wanted, lost ? 0.0 : efforts(watch_.last(0), watch_.last(1)).limit(wanted));
+                write(wanted, lost ? 0.0 : efforts(place(), watch_.last(1)).limit(wanted));
+                pace_ = 0.0;
                 return;
             }
         }
@@ -178,13 +182,34 @@ class JointLimiter final : public rtcf::Component {
     // Reads a measured input; watches it if it is needed.
     // @return it has a value; a needed one: it has had a finite value
     bool note(rtcf::Input<double>& measured, std::size_t i, bool needed) {
-        const rtcf::DataStatus status = measured.read();
-        if (status == rtcf::DataStatus::None) return false;
+        if (measured.read() == rtcf::DataStatus::None) return false;
         if (!needed) return true;
         const char* const fault =
-            watch_.note(i, measured.value(), status == rtcf::DataStatus::New, elapsed());
+            watch_.note(i, measured.value(), measured.age(this), elapsed());
         if (fault != nullptr) reportFault(fault);
         return watch_.valid(i);
+    }
+
+    // Begins at the measured position, so that the joint does not jump.
+    // @return false if the position is not finite, or too old
+    bool begin(double wanted) {
+        wanted_ = last_ = Range{lower, upper}.limit(wanted);
+        if (position.read() == rtcf::DataStatus::None) return true;
+        if (!std::isfinite(position.value()) || watch_.lost(0)) return false;
+        last_ = position.value();
+        return true;
+    }
+
+    // Estimates the way of the joint since the last position, which may be slower than the loop or
+    // dead.
+    void travel(bool is_new) {
+        const double v = command == Command::Effort ? watch_.last(1) : pace_.value();
+        travel_ = is_new || !std::isfinite(v) ? 0.0 : travel_ + v * dt();
+    }
+    // Where the joint may be.
+    Range place() const {
+        const double x = watch_.last(0);
+        return {std::min(x, x + travel_), std::max(x, x + travel_)};
     }
 
     void write(double wanted, double value) {
@@ -213,7 +238,7 @@ class JointLimiter final : public rtcf::Component {
             const double approach = brakingVelocity(std::abs(distance), deceleration, periodOf());
             speed = drift + std::copysign(approach, distance);
         }
-        const double v = velocities(from).limit(speed);
+        const double v = velocities({from, from}).limit(speed);
         // Exactly there if only rounding is left.
         const double rest = std::abs(target - from - v * h);
         const double next = rest <= 1e-12 * std::abs(target - from) ? target : from + v * h;
@@ -226,9 +251,9 @@ class JointLimiter final : public rtcf::Component {
 
     double periodOf() const { return std::max(1e-9 * static_cast<double>(period()), dt()); }
 
-    // Range of the velocity of a command at a position. Where limits disagree, braking before lower
+    // Range of the velocity of a command at a place. Where limits disagree, braking before lower
     // and upper comes first, then the acceleration, then soft limits and max_velocity.
-    Range velocities(double x) const {
+    Range velocities(Range x) const {
         const double step = deceleration * dt();
         const Range reachable{pace_ - step, pace_ + step};
         const Range wanted = softened(x);
@@ -239,8 +264,8 @@ class JointLimiter final : public rtcf::Component {
 
     // Range of the velocity within the braking distances before lower and upper.
     // @param pace velocity of the last command
-    Range brakingRange(double x, double pace) const {
-        return {-towards(x - lower, -pace), towards(upper - x, pace)};
+    Range brakingRange(Range x, double pace) const {
+        return {-towards(x.low - lower, -pace), towards(upper - x.high, pace)};
     }
 
     // Largest velocity towards a limit.
@@ -258,12 +283,12 @@ class JointLimiter final : public rtcf::Component {
     }
 
     // Range of the velocity within max_velocity and the soft limits.
-    Range softened(double x) const {
+    Range softened(Range x) const {
         const double h = periodOf();
         // A larger factor would cross the soft limit in one period.
         const double factor = std::min(k_position.value(), 1.0 / h);
-        const auto towardsSoft = [&](double limit) {
-            const double distance = limit - x;
+        const auto towardsSoft = [&](double limit, double from) {
+            const double distance = limit - from;
             if (std::isinf(limit)) return limit;
             // Slows down by at most `deceleration`: proportional near the limit, before it along
             // the braking parabola that continues this line.
@@ -274,11 +299,12 @@ class JointLimiter final : public rtcf::Component {
             return std::copysign(speed, distance);
         };
         const Range fastest{-max_velocity, max_velocity};
-        return {fastest.limit(towardsSoft(soft_lower)), fastest.limit(towardsSoft(soft_upper))};
+        return {fastest.limit(towardsSoft(soft_lower, x.low)),
+                fastest.limit(towardsSoft(soft_upper, x.high))};
     }
 
     // Range of the effort: it drives the velocity back into its range.
-    Range efforts(double x, double v) const {
+    Range efforts(Range x, double v) const {
         const double largest = max_effort;
         if (k_velocity == 0.0) return {-largest, largest};
         const Range wanted = softened(x);

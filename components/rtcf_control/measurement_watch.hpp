@@ -33,7 +33,7 @@ class MeasurementWatch {
           frozen_timeout_(owner, "frozen_timeout", kInfinity, rtcf::Min(0.0), rtcf::Unit("s"),
                           rtcf::Doc("the same for a measured value that does not change")),
           silence_(owner, "silence", Times::Zero(), rtcf::Unit("ns"),
-                   rtcf::Doc("time since the last new finite value of each measured input")),
+                   rtcf::Doc("age of the last finite value of each measured input")),
           unchanged_(owner, "unchanged", Times::Zero(), rtcf::Unit("ns"),
                      rtcf::Doc("time since the last change of each measured input")),
           last_(owner, "last_finite", none(),
@@ -52,28 +52,27 @@ class MeasurementWatch {
         last_ = none();
     }
     /// Notes the value of a cycle. Once per cycle for each input that is in use and has a value.
-    /// @param is_new   it was written since the last cycle
+    /// @param age      of the value, Input::age(), ns
     /// @param elapsed  of the component, ns
     /// @return the text of a fault, null = none
-    const char* note(std::size_t i, double value, bool is_new, std::int64_t elapsed) noexcept {
+    const char* note(std::size_t i, double value, std::int64_t age, std::int64_t elapsed) noexcept {
         const auto at = static_cast<Eigen::Index>(i);
-        const bool arrived = is_new && std::isfinite(value);
-        const bool changed = arrived && value != last_.value()[at];
+        const bool finite = std::isfinite(value);
+        const bool changed = finite && value != last_.value()[at];
         std::int64_t& silence = silence_.value()[at];
         std::int64_t& unchanged = unchanged_.value()[at];
-        silence = arrived ? 0 : silence + elapsed;
-        unchanged = changed ? 0 : unchanged + elapsed;
-        // Also an old value, if it is the first one.
-        if (arrived || (std::isfinite(value) && !valid(i))) last_.value()[at] = value;
+        silence = finite ? age : silence + elapsed;
+        unchanged = changed ? age : unchanged + elapsed;
+        if (finite) last_.value()[at] = value;
         if (late(i)) return late_[i].c_str();
         if (frozen(i)) return frozen_[i].c_str();
-        return std::isfinite(value) ? nullptr : not_finite_[i].c_str();
+        return finite ? nullptr : not_finite_[i].c_str();
     }
     /// True if an input is lost: too old, or frozen.
     bool lost(std::size_t i) const noexcept { return late(i) || frozen(i); }
-    /// Time since the last new finite value, s.
-    double silence(std::size_t i) const noexcept {
-        return 1e-9 * static_cast<double>(silence_.value()[static_cast<Eigen::Index>(i)]);
+    /// Age of the last finite value, ns.
+    std::int64_t silence(std::size_t i) const noexcept {
+        return silence_.value()[static_cast<Eigen::Index>(i)];
     }
     /// True if an input has had a finite value.
     bool valid(std::size_t i) const noexcept { return std::isfinite(last(i)); }

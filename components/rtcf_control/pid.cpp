@@ -189,10 +189,11 @@ class Pid final : public rtcf::Component {
                                 std::isfinite(actual.value());
         const double r = setpoint.value();
         const double y = measured.value();
-        const double silence = watch_.silence(0);
+        const std::int64_t silence = watch_.silence(0);
         const bool is_new = measurement == rtcf::DataStatus::New && std::isfinite(y);
-        const char* fault =
-            measurement != rtcf::DataStatus::None ? watch_.note(0, y, is_new, elapsed()) : nullptr;
+        const char* fault = measurement != rtcf::DataStatus::None
+                                ? watch_.note(0, y, measured.age(this), elapsed())
+                                : nullptr;
         if (fault == nullptr && !std::isfinite(r + y + forward + schedule))
             fault = notFinite(r, forward);
         const bool complete = has_setpoint && watch_.valid(0);
@@ -207,7 +208,8 @@ class Pid final : public rtcf::Component {
             return;
         }
         const double step = dt();
-        follow(r, y, is_new ? silence + step : 0.0, by_hand && setpoint_tracking, step);
+        const std::int64_t since = is_new ? silence + elapsed() - watch_.silence(0) : 0;
+        follow(r, y, 1e-9 * static_cast<double>(since), by_hand && setpoint_tracking, step);
         adoptGains(schedule);
         const double rest = terms(gains_) + forward;
         if (!std::isfinite(rest)) {
@@ -267,7 +269,7 @@ class Pid final : public rtcf::Component {
     }
 
     // Moves the followed setpoint and the filtered slopes by one cycle.
-    // since: time since the last new measured value, s; 0 = this one is not new
+    // since: from the last measured value to this one, s; 0 = this one is not new
     void follow(double r, double y, double since, bool track, double elapsed) {
         if (!begun_) {
             setpoint_ = track ? y : r;
@@ -291,7 +293,7 @@ class Pid final : public rtcf::Component {
                 (filter_time * measured_slope_ + y - measured_) / (filter_time + since);
             measured_ = y;
             interval_ = since;
-        } else if (watch_.silence(0) > 2.0 * interval_) {
+        } else if (1e-9 * static_cast<double>(watch_.silence(0)) > 2.0 * interval_) {
             measured_slope_ *= filter_time / (filter_time + elapsed);
         }
     }

@@ -546,7 +546,7 @@ class StateSpace final : public rtcf::Component {
             values[i] = port.value();
             if (status == rtcf::DataStatus::None) continue;
             const char* const fault =
-                watch_.note(at, port.value(), status == rtcf::DataStatus::New, elapsed());
+                watch_.note(at, port.value(), port.age(this), elapsed());
             if (fault != nullptr) reportFault(fault);
             lost = lost || watch_.lost(at);
         }

@@ -2,6 +2,8 @@
 
 peer.py record TOPIC       prints each std_msgs/Float64 it receives, exactly (hexadecimal)
 peer.py latch TOPIC VALUE  publishes one std_msgs/Float64, latched
+peer.py told TOPIC         publishes each number of its input as std_msgs/Float64, latched; the line
+                           `drop` closes its connections, like a network that fails
 peer.py text TOPIC SIZE    publishes one std_msgs/String of SIZE characters, latched
 peer.py sizes TOPIC        prints the length in characters of each std_msgs/String it receives
 peer.py numbers TOPIC       prints each std_msgs/Int32 it receives
@@ -20,6 +22,7 @@ The others print `connected` when they are connected to their peers.
 import json
 import os
 import sys
+import threading
 import time
 from typing import Any
 
@@ -106,6 +109,15 @@ def _stay(*peers: Any, publisher: str = "") -> None:
     os._exit(0)
 
 
+def _do_as_told(publisher: rospy.Publisher) -> None:
+    for line in sys.stdin:
+        if line == "drop\n":
+            for connection in list(publisher.impl.connections):
+                connection.close()
+        else:
+            publisher.publish(float(line))
+
+
 def main() -> None:
     """Run the command of the command line until the end of the node."""
     action, topic, *values = sys.argv[1:] if len(sys.argv) > 2 else [sys.argv[1], ""]
@@ -131,6 +143,10 @@ def main() -> None:
         _tune(topic, values[0])
     elif action == "any":
         _stay(*(rospy.Subscriber(each, rospy.AnyMsg) for each in [topic, *values]))
+    elif action == "told":
+        publisher = rospy.Publisher(topic, Float64, latch=True, queue_size=1)
+        threading.Thread(target=_do_as_told, args=(publisher,), daemon=True).start()
+        _stay(publisher)
     elif action == "text":
         publisher = rospy.Publisher(topic, String, latch=True, queue_size=1)
         publisher.publish("x" * int(values[0]))

@@ -166,7 +166,9 @@ class Node:
                 [sys.executable, str(_PEER), *arguments],
                 env=environment,
                 cwd=folder,
+                stdin=subprocess.PIPE,
                 stdout=output,
+                text=True,
             )
 
     @property
@@ -189,6 +191,12 @@ class Node:
     def records(self) -> list[dict[str, Any]]:
         """Return the log records received so far."""
         return [json.loads(line) for line in self._lines() if line.startswith("{")]
+
+    def tell(self, line: str) -> None:
+        """Give it a line of input."""
+        assert self._process.stdin is not None
+        self._process.stdin.write(line + "\n")
+        self._process.stdin.flush()
 
     def end(self) -> None:
         """End it."""

@@ -196,7 +196,8 @@ class Server:
 
         count = len(self._joints)
         for batch in stream:
-            if rospy.is_shutdown():
+            # is_shutdown() is false until the hooks of on_shutdown() have returned.
+            if rospy.core.is_shutdown_requested() or rospy.is_shutdown():
                 raise _FailedError("INVALID_GOAL", "the node follow_joint_trajectory ends")
             columns = {name: batch[f"{self._generator}.{name}"] for name in _SIGNALS}
             for row in range(len(batch)):

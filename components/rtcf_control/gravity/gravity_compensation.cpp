@@ -289,7 +289,10 @@ class GravityCompensation final : public rtcf::Component {
     void watch(bool is_new) noexcept {
         double sum = 0.0;  // changes with any position
         for (std::size_t i = 0; i < count(); ++i) sum += position_.value()[i];
-        if (const char* const fault = watch_.note(0, sum, is_new, elapsed())) reportFault(fault);
+        // A message that was rejected does not count.
+        const std::int64_t age = is_new || !watch_.valid(0) ? measured.age(this)
+                                                            : watch_.silence(0) + elapsed();
+        if (const char* const fault = watch_.note(0, sum, age, elapsed())) reportFault(fault);
     }
 
     Law now() const noexcept { return {{gravity_x, gravity_y, gravity_z}, share}; }

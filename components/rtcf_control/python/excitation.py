@@ -129,6 +129,7 @@ class Excitation(Component):
     silence: State[int] = State(0, unit="ns", doc="time since the last true on run")
     since: State[int] = State(0, unit="ns", doc="time since the begin")
     base: State[float] = State(0.0, doc="u at the begin")
+    last_u: State[float] = State(math.nan, doc="last finite u; NaN = none")
     reference: State[float] = State(0.0, doc="measured at the begin")
     high: State[bool] = State(True, doc="the relay is at amplitude")
     playing: State[bool] = State(False, doc="the signal has begun")
@@ -136,7 +137,7 @@ class Excitation(Component):
     phase: State[float] = State(0.0, doc="phase of the wave, from 0 to 1")
     bits: State[int] = State(PRBS_START, doc="shift register of PRBS")
     measured_age: State[int] = State(
-        0, unit="ns", doc="time since the last new finite measured value"
+        0, unit="ns", doc="age of the last finite measured value"
     )
     unchanged: State[int] = State(0, unit="ns", doc="time since its last change")
     last_finite: State[float] = State(math.nan, doc="last finite measured value; NaN = none")
@@ -160,6 +161,7 @@ class Excitation(Component):
     def start(self):
         self.progress = Progress.ready
         self.armed = False
+        self.last_u = math.nan
         self.measured_age = 0
         self.unchanged = 0
         self.last_finite = math.nan
@@ -171,19 +173,23 @@ class Excitation(Component):
 
     def command(self):
         """Return the value without excitation."""
-        return self.u.value if self.u.valid else self.idle
+        value = self.u.value if self.u.valid else self.idle
+        if math.isfinite(value):
+            self.last_u = value
+        return value
 
     def watch(self):
         """Note the measured value of a cycle."""
         if not self.measured.valid:
             return
         value = self.measured.value
-        arrived = self.measured.new and math.isfinite(value)
-        changed = arrived and value != self.last_finite
-        self.measured_age = 0 if arrived else self.measured_age + self.elapsed
-        self.unchanged = 0 if changed else self.unchanged + self.elapsed
-        if arrived or (math.isfinite(value) and math.isnan(self.last_finite)):
-            self.last_finite = value  # also an old value, if it is the first one
+        finite = math.isfinite(value)
+        changed = finite and value != self.last_finite
+        age = self.measured.age
+        self.measured_age = age if finite else self.measured_age + self.elapsed
+        self.unchanged = age if changed else self.unchanged + self.elapsed
+        if finite:
+            self.last_finite = value
 
     def lost(self):
         """Return whether the measured value is too old, or frozen."""
@@ -295,7 +301,7 @@ class Excitation(Component):
 
     def send(self, value, signal):
         """Write all outputs."""
-        self.y.write(value)  # rejected if it is not finite
+        self.y.write(value)
         self.signal.write(signal)
         self.state.write(self.progress)
         self.running.write(self.progress is Progress.running)
@@ -321,7 +327,7 @@ class Excitation(Component):
             self.begin(command)
         self.armed = not wanted or (self.armed and stopped)
         if self.progress is not Progress.running:
-            self.send(command, 0.0)
+            self.send(self.last_u, 0.0)  # rejected if there was no finite one
             return
         unit = 0.0
         if self.since >= nanoseconds(self.delay):
@@ -337,4 +343,5 @@ class Excitation(Component):
         """End the excitation, and pass on the safe command of an upstream component."""
         if self.progress is Progress.running:
             self.progress = Progress.stopped
-        self.send(self.command(), 0.0)
+        self.command()
+        self.send(self.last_u, 0.0)

@@ -62,7 +62,7 @@ class FrictionCompensation(Component):
     frozen_timeout: Parameter[float] = Parameter(
         math.inf, min=0.0, unit="s", doc="the same for a measured value that does not change"
     )
-    silence: State[int] = State(0, unit="ns", doc="time since the last new finite velocity")
+    silence: State[int] = State(0, unit="ns", doc="age of the last finite velocity")
     unchanged: State[int] = State(0, unit="ns", doc="time since the last change of the velocity")
     last_finite: State[float] = State(math.nan, doc="last finite velocity; NaN = none")
     law: State[np.float64, 7] = State(doc="parameters of the last cycle")
@@ -85,12 +85,13 @@ class FrictionCompensation(Component):
     def lost(self):
         """Return whether the velocity is too old, or frozen. Once per cycle."""
         v = self.velocity.value
-        arrived = self.velocity.new and math.isfinite(v)
+        finite = math.isfinite(v)
         step = round(1e9 * self.dt)
-        self.silence = 0 if arrived else self.silence + step
-        self.unchanged = 0 if arrived and v != self.last_finite else self.unchanged + step
-        if arrived or (math.isfinite(v) and math.isnan(self.last_finite)):
-            self.last_finite = v  # also an old value, if it is the first one
+        changed = finite and v != self.last_finite
+        self.silence = self.velocity.age if finite else self.silence + step
+        self.unchanged = self.velocity.age if changed else self.unchanged + step
+        if finite:
+            self.last_finite = v
         return (
             self.silence > 1e9 * self.measurement_timeout
             or self.unchanged > 1e9 * self.frozen_timeout

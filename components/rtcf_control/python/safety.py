@@ -188,8 +188,12 @@ class JointLimiter(Component):
         0.0, unit="rad/s", doc="velocity of the last position or velocity command"
     )
     last_wanted: State[float] = State(0.0, doc="last wanted position")
+    travel: State[float] = State(
+        0.0, unit="rad", doc="way of the joint since the last position, estimated"
+    )
+    kind: State[int] = State(-1, doc="command of the last cycle")
     silence: State[np.int64, 2] = State(
-        unit="ns", doc="time since the last new finite value of each measured input"
+        unit="ns", doc="age of the last finite value of each measured input"
     )
     unchanged: State[np.int64, 2] = State(
         unit="ns", doc="time since the last change of each measured input"
@@ -219,6 +223,7 @@ class JointLimiter(Component):
     def start(self):
         self.last = None
         self.pace = 0.0
+        self.travel = 0.0
         self.silence[:] = 0
         self.unchanged[:] = 0
         self.last_finite[:] = math.nan
@@ -243,19 +248,14 @@ class JointLimiter(Component):
         """Return the period in s, or the time of a longer cycle."""
         return max(1e-9 * self.period, self.dt)
 
-    def note(self, i, value, is_new):
+    def note(self, i, value, age):
         """Note a measured value that is needed."""
         step = round(1e9 * self.dt)
-        self.silence[i] += step
-        self.unchanged[i] += step
-        if not math.isfinite(value):
-            return
-        if is_new:
-            self.silence[i] = 0
-            if value != self.last_finite[i]:
-                self.unchanged[i] = 0
-        # Also an old value, if it is the first one.
-        if is_new or math.isnan(self.last_finite[i]):
+        finite = math.isfinite(value)
+        changed = finite and value != self.last_finite[i]
+        self.silence[i] = age if finite else self.silence[i] + step
+        self.unchanged[i] = age if changed else self.unchanged[i] + step
+        if finite:
             self.last_finite[i] = value
 
     def lost(self, i):
@@ -296,28 +296,29 @@ class JointLimiter(Component):
             return slower
         return max(allowed, pace - 0.5 * pace * pace * h / distance)
 
-    def limited_velocity(self, speed, x):
-        """Return a velocity within the limits at a position. Where they disagree, braking before
-        lower and upper comes first, then the acceleration, then soft limits and max_velocity.
+    def limited_velocity(self, speed, below, above):
+        """Return a velocity within the limits at a place, between two positions. Where they
+        disagree, braking before lower and upper comes first, then the acceleration, then soft
+        limits and max_velocity.
         """
         step = self.deceleration * self.dt
         slowest = self.pace - step
         fastest = self.pace + step
-        low = np.clip(self.softened(self.soft_lower, x), slowest, fastest)
-        high = np.clip(self.softened(self.soft_upper, x), slowest, fastest)
-        down = -self.towards(x - self.lower, -self.pace)
-        up = self.towards(self.upper - x, self.pace)
+        low = np.clip(self.softened(self.soft_lower, below), slowest, fastest)
+        high = np.clip(self.softened(self.soft_upper, above), slowest, fastest)
+        down = -self.towards(below - self.lower, -self.pace)
+        up = self.towards(self.upper - above, self.pace)
         return np.clip(speed, np.clip(low, down, up), np.clip(high, down, up))
 
-    def efforts(self, x, v):
+    def efforts(self, below, above, v):
         """Return the range of the effort: it drives the velocity back into its range."""
         most = self.max_effort
         if self.k_velocity == 0.0:
             return -most, most
-        down = -self.towards(x - self.lower, 0.0)
-        up = self.towards(self.upper - x, 0.0)
-        low = np.clip(self.softened(self.soft_lower, x), down, up)
-        high = np.clip(self.softened(self.soft_upper, x), down, up)
+        down = -self.towards(below - self.lower, 0.0)
+        up = self.towards(self.upper - above, 0.0)
+        low = np.clip(self.softened(self.soft_lower, below), down, up)
+        high = np.clip(self.softened(self.soft_upper, above), down, up)
         return (
             np.clip(-self.k_velocity * (v - low), -most, most),
             np.clip(-self.k_velocity * (v - high), -most, most),
@@ -336,7 +337,7 @@ class JointLimiter(Component):
         if math.isfinite(self.deceleration):
             approach = braking_velocity(abs(distance), self.deceleration, self.longest_period)
             speed = drift + np.copysign(approach, distance)
-        v = self.limited_velocity(speed, start)
+        v = self.limited_velocity(speed, start, start)
         # Exactly there if only rounding is left.
         rest = abs(target - start - v * h)
         following = target if rest <= 1e-12 * abs(target - start) else start + v * h
@@ -360,47 +361,72 @@ class JointLimiter(Component):
         self.limited.write(value != wanted)
         self.last = value
 
+    def begin(self, wanted):
+        """Begin at the measured position, so that the joint does not jump; return whether it is
+        known.
+        """
+        self.last_wanted = np.clip(wanted, self.lower, self.upper)
+        if not self.position.valid:
+            self.last = self.last_wanted
+            return True
+        x = self.position.value
+        if not math.isfinite(x) or self.lost(0):
+            return False
+        self.last = x
+        return True
+
     def update(self):
         x = self.position.value
         v = self.velocity.value
-        if self.command is not Command.position and self.needs_position and self.position.valid:
-            self.note(0, x, self.position.new)
+        if self.kind != self.command:
+            self.last = None  # another quantity
+        self.kind = self.command
+        needed = self.last is None if self.command is Command.position else self.needs_position
+        if needed and self.position.valid:
+            self.note(0, x, self.position.age)
         if self.command is Command.effort and self.needs_velocity and self.velocity.valid:
-            self.note(1, v, self.velocity.new)
+            self.note(1, v, self.velocity.age)
+        pace = self.last_finite[1] if self.command is Command.effort else self.pace
+        if (self.position.new and math.isfinite(x)) or not math.isfinite(pace):
+            self.travel = 0.0
+        else:
+            self.travel += pace * self.dt
         if not self.u.valid:
             return
         wanted = self.u.value
+        last = self.last
         if not math.isfinite(wanted):
-            self.y.write(wanted)  # rejected as not finite: readers keep the last output
-            return
+            if last is None:
+                return
+            # The last output or target counts.
+            wanted = self.last_wanted if self.command is Command.position else last
         if self.command is Command.position:
-            start = self.last
-            if start is None:
-                # Begins at the measured position, so that the joint does not jump.
-                start = np.clip(wanted, self.lower, self.upper)
-                self.last_wanted = start
-                if self.position.valid:
-                    if not math.isfinite(x):
-                        return
-                    start = x
-            self.send(wanted, self.followed(wanted, start))
+            if last is None:
+                if not self.begin(wanted):
+                    return
+                last = self.last
+            if last is not None:
+                self.send(wanted, self.followed(wanted, last))
             return
         if self.needs_position and not math.isfinite(self.last_finite[0]):
             return
         position_lost = self.needs_position and self.lost(0)
+        below = min(self.last_finite[0], self.last_finite[0] + self.travel)
+        above = max(self.last_finite[0], self.last_finite[0] + self.travel)
         if self.command is Command.velocity:
             if position_lost:
                 self.send(wanted, self.slower())
             else:
-                self.send(wanted, self.limited_velocity(wanted, self.last_finite[0]))
+                self.send(wanted, self.limited_velocity(wanted, below, above))
             self.pace = self.last if self.last is not None else 0.0
             return
         if self.needs_velocity and not math.isfinite(self.last_finite[1]):
             return
+        self.pace = 0.0
         if position_lost or (self.needs_velocity and self.lost(1)):
             self.send(wanted, 0.0)
             return
-        low, high = self.efforts(self.last_finite[0], self.last_finite[1])
+        low, high = self.efforts(below, above, self.last_finite[1])
         self.send(wanted, np.clip(wanted, low, high))
 
     def safe(self):

@@ -44,6 +44,16 @@ Cycle::Cycle(FlightRecorder& recorder, std::shared_ptr<Attention> attention)
 }
 
 void Cycle::announce(Pace pace) {
+    setClock(pace);
+    // Messages of components from before the start; those of its hooks come afterwards.
+    for (QueueBase* queue : schedule_->queues) {
+        queue->noteDropped(queue->size());
+        queue->clear();
+        queue->skip();
+    }
+}
+
+void Cycle::setClock(Pace pace) {
     const bool monotonic = pace == Pace::RealTime;
     const std::int64_t time_ns = monotonic ? monotonicNow() : 0;
     // The time between two loops counts only if one clock has measured it.
@@ -56,7 +66,7 @@ void Cycle::announce(Pace pace) {
 }
 
 void Cycle::begin(std::int64_t period_ns, std::uint64_t warmup_cycles, Pace pace) {
-    announce(pace);
+    setClock(pace);
     if (pace != Pace::Steps) takeOld();
     clock_.period_ns = period_ns;
     clock_.elapsed_ns = period_ns;
@@ -83,6 +93,7 @@ void Cycle::takeOld() {
     const std::int64_t now = monotonicNow();
     for (const Feed& feed : schedule_->feeds) {
         Injector& injector = *feed.injector;
+        injector.deliverUntil(now, 0.0);  // waiting for a simulated clock
         const bool fresh = injector.adopt(clock_);
         injector.setAge(now - injector.arrived(), clock_.time_ns);
         for (InputPort* input : feed.readers) {

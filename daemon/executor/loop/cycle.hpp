@@ -54,8 +54,8 @@ class Cycle {
 
     /// @name Graph thread
     /// @{
-    /// Sets the clock before the start hooks, so that what they write belongs to the start. While
-    /// no cycle runs. If CLOCK_MONOTONIC is not the loop time, or was not before, all values keep
+    /// Sets the clock before the start hooks, so that what they write belongs to the start, and
+    /// empties the queues of components. While no cycle runs. If CLOCK_MONOTONIC is not the loop time, or was not before, all values keep
     /// the ages of the last cycle.
     void announce(Pace pace);
     /// Resets clock and counters, so that the next cycle is number 0. Unless it is a step, takes
@@ -126,6 +126,7 @@ class Cycle {
         clock_.time_ns = time_ns;
         clock_.stamp_ns = time_ns + stamp_offset_ns_.load(std::memory_order_relaxed);
     }
+    void setClock(Pace pace);
     void moveTime(std::int64_t by_ns);
     void takeOld();
     void changeComponents(Adoption& adoption) noexcept;

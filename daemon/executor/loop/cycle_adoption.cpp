@@ -115,6 +115,9 @@ bool Cycle::restore(Restoration& restoration) noexcept {
     }
     for (const StateCopy& state : restoration.states) state.copy();
     for (const Restoration::Value& value : restoration.values) value.put();
+    for (const Step& step : schedule_->steps) {
+        for (OutputPort* output : accessTo(*step.component).outputs()) output->dropDraft();
+    }
     const ClockState& saved = restoration.clock;
     const std::int64_t later = restoration.sets_time ? 0 : clock_.time_ns - saved.time_ns;
     for (SlotHeader* header : restoration.headers) header->stamp = movedStamp(header->stamp, later);

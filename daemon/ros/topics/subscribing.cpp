@@ -6,7 +6,9 @@
 #include <xmlrpcpp/XmlRpcValue.h>
 
 #include <algorithm>
+#include <optional>
 #include <set>
+#include <utility>
 
 #include "ros/threads/quiet_thread.hpp"
 #include "ros/topics/topic_subscriber.hpp"
@@ -23,15 +25,16 @@ Connection connection(const executor::Injector& injector) {
 
 using Publishers = std::map<std::string, std::set<std::string>>;  // nodes by topic
 
-// The publishers that the master knows; none without an answer. Calls the master.
+// The publishers that the master knows; unset without an answer. Calls the master.
 // @param caller this node's name
-Publishers publishersAt(const std::string& caller) {
+std::optional<Publishers> publishersAt(const std::string& caller) {
     Publishers publishers;
     XmlRpc::XmlRpcValue request;
     XmlRpc::XmlRpcValue response;
     XmlRpc::XmlRpcValue state;
     request[0] = caller;
-    if (!ros::master::execute("getSystemState", request, response, state, false)) return {};
+    if (!ros::master::execute("getSystemState", request, response, state, false))
+        return std::nullopt;
     try {
         // NOLINTBEGIN(modernize-loop-convert): its begin() is for structs
         XmlRpc::XmlRpcValue& topics = state[0];
@@ -43,7 +46,7 @@ Publishers publishersAt(const std::string& caller) {
         }
         // NOLINTEND(modernize-loop-convert)
     } catch (const XmlRpc::XmlRpcException&) {
-        return {};  // not a master of ROS
+        return std::nullopt;  // not a master of ROS
     }
     return publishers;
 }
@@ -112,11 +115,12 @@ Reconciled Subscribing::reconcileTopics(ros::NodeHandle& handle, bool master) {
     // Without the lock, because closing waits for callbacks.
     for (const auto& subscriber : closing_first) subscriber->close();
     Reconciled result = Reconciled::Done;
-    Publishers publishers;
+    std::optional<Publishers> publishers;
     if (!opening.empty()) publishers = publishersAt(ros::this_node::getName());
     for (const auto& subscriber : opening) {
-        if (!subscriber->open(handle, queue_, publishers[subscriber->topic()]))
-            result = Reconciled::Later;
+        std::optional<std::set<std::string>> before;
+        if (publishers) before = (*publishers)[subscriber->topic()];
+        if (!subscriber->open(handle, queue_, std::move(before))) result = Reconciled::Later;
     }
     for (const auto& subscriber : closing) subscriber->close();
     return result;
@@ -155,7 +159,11 @@ std::string Subscribing::problem() const {
 }
 
 void Subscribing::run() {
-    while (!stop_) queue_.callAvailable(ros::WallDuration(0.1));
+    while (!stop_) {
+        queue_.callAvailable(ros::WallDuration(0.1));
+        const std::lock_guard lock(mutex_);
+        for (const auto& [injector, subscriber] : subscribers_) subscriber->watchConnections();
+    }
 }
 
 }  // namespace rtcf::ros1

@@ -11,25 +11,41 @@ namespace rtcf::ros1 {
 TopicSubscriber::TopicSubscriber(std::shared_ptr<executor::Injector> injector)
     : injector_(std::move(injector)), muted_(std::make_shared<std::atomic<bool>>(false)) {}
 
-bool LatchedBefore::includes(const std::map<std::string, std::string>& header) {
-    if (publishers_.empty()) return false;
-    if (Clock::now() > until_) {
-        publishers_.clear();
-        return false;
-    }
-    const auto sender = header.find("callerid");
-    if (sender == header.end() || publishers_.erase(sender->second) == 0) return false;
-    const auto latching = header.find("latching");
-    return latching != header.end() && latching->second == "1";
+LatchedBefore::LatchedBefore(std::optional<std::set<std::string>> publishers)
+    : publishers_(std::move(publishers)) {
+    // Without a master, only publishers that are connected already send.
+    if (!publishers_) until_ = Clock::now() + kDelivery;
+}
+
+bool LatchedBefore::includes(const Header& header) {
+    if (header == nullptr) return false;
+    const auto sender = header->find("callerid");
+    if (sender == header->end()) return false;
+    const auto heard = heard_.find(sender->second);
+    if (heard != heard_.end() && heard->second == header) return false;
+    // The first message of a connection. If the publisher has sent one by an earlier connection,
+    // it was published before this one.
+    bool was_before = heard != heard_.end();
+    if (waits()) was_before = was_before || !publishers_ || publishers_->count(sender->second) != 0;
+    if (heard_.size() >= kMostHeard) heard_.clear();  // nodes with names of their own each time
+    heard_[sender->second] = header;
+    const auto latching = header->find("latching");
+    return was_before && latching != header->end() && latching->second == "1";
+}
+
+bool LatchedBefore::waits() const { return !until_ || Clock::now() <= *until_; }
+
+void LatchedBefore::noteConnections(std::size_t count) {
+    if (!until_ && count >= publishers_->size()) until_ = Clock::now() + kDelivery;
 }
 
 bool TopicSubscriber::open(ros::NodeHandle& handle, ros::CallbackQueueInterface& queue,
-                           std::set<std::string> publishers) {
+                           std::optional<std::set<std::string>> publishers) {
     using Event = ros::MessageEvent<const RawBytes>;
+    const auto latched = std::make_shared<LatchedBefore>(std::move(publishers));
     const boost::function<void(const Event&)> deliver =
-        [injector = injector_, muted = muted_,
-         latched = std::make_shared<LatchedBefore>(std::move(publishers))](const Event& event) {
-            const bool is_old = latched->includes(event.getConnectionHeader());
+        [injector = injector_, muted = muted_, latched](const Event& event) {
+            const bool is_old = latched->includes(event.getConnectionHeaderPtr());
             const RawBytes& message = *event.getConstMessage();
             if (*muted) return;
             injector->deliver(message.bytes.get(), message.size, executor::monotonicNow(), is_old);
@@ -56,6 +72,7 @@ bool TopicSubscriber::open(ros::NodeHandle& handle, ros::CallbackQueueInterface&
     }
     const std::lock_guard lock(mutex_);
     subscriber_ = subscriber;
+    latched_ = latched;
     problem_ = problem;
     retry_.note(subscriber_ != nullptr);
     return subscriber_ != nullptr;
@@ -71,6 +88,12 @@ void TopicSubscriber::close() {
 bool TopicSubscriber::isOpen() const {
     const std::lock_guard lock(mutex_);
     return subscriber_ != nullptr;
+}
+
+void TopicSubscriber::watchConnections() {
+    const std::lock_guard lock(mutex_);
+    if (subscriber_ == nullptr || !latched_->waits()) return;
+    latched_->noteConnections(subscriber_.getNumPublishers());
 }
 
 bool TopicSubscriber::hasPeers() const {

@@ -9,9 +9,11 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
-#include <utility>
+
+#include <boost/shared_ptr.hpp>
 
 #include "exchange/injector.hpp"
 #include "ros/roscpp/handles.hpp"
@@ -23,24 +25,34 @@ class NodeHandle;
 
 namespace rtcf::ros1 {
 
-/// Messages latched before a subscription: ROS 1 does not say when they were published, so they are
-/// old. A publisher that registers later latches what it publishes now.
+/// Messages latched before a subscription or a connection: ROS 1 does not say when they were
+/// published, so they are old. A publisher that registers later latches what it publishes now. One
+/// thread.
 class LatchedBefore {
    public:
-    /// @param publishers nodes that publish the topic at the moment
-    explicit LatchedBefore(std::set<std::string> publishers)
-        : publishers_(std::move(publishers)), until_(Clock::now() + kDelivery) {}
+    /// Header of a connection.
+    using Header = boost::shared_ptr<std::map<std::string, std::string>>;
 
-    /// True if the message of a connection with this header is such a message. One thread.
-    bool includes(const std::map<std::string, std::string>& header);
+    /// @param publishers nodes that publish the topic at the moment; unset = unknown
+    explicit LatchedBefore(std::optional<std::set<std::string>> publishers);
+
+    /// True if the message of a connection is such a message.
+    bool includes(const Header& header);
+    /// True until the publishers of that moment have had time to send their messages.
+    bool waits() const;
+    /// Notes the number of publishers that are connected.
+    void noteConnections(std::size_t count);
 
    private:
     using Clock = std::chrono::steady_clock;
-    // Within this time, a connection is made and a latched message arrives.
+    // Within this time after the connection, a latched message arrives.
     static constexpr std::chrono::seconds kDelivery{2};
+    // Connections that are kept in mind.
+    static constexpr std::size_t kMostHeard = 256;
 
-    std::set<std::string> publishers_;  // that have sent nothing yet
-    const Clock::time_point until_;
+    std::optional<std::set<std::string>> publishers_;
+    std::optional<Clock::time_point> until_;  // unset = some are not connected yet
+    std::map<std::string, Header> heard_;     // by sender: its last connection
 };
 
 /// Owned by Subscribing. open() and close() call the master; the thread of the callback queue
@@ -54,12 +66,14 @@ class TopicSubscriber {
     void mute() { *muted_ = true; }
 
     /// Subscribes the topic.
-    /// @param publishers nodes that publish it already
+    /// @param publishers nodes that publish it already; unset = unknown
     /// @return false if that failed; the caller repeats it later
     bool open(ros::NodeHandle& handle, ros::CallbackQueueInterface& queue,
-              std::set<std::string> publishers);
+              std::optional<std::set<std::string>> publishers);
     void close();
 
+    /// Notes which publishers are connected. Thread of the callback queue.
+    void watchConnections();
     bool isOpen() const;
     /// True if a peer that publishes the topic is connected. Any thread.
     bool hasPeers() const;
@@ -73,6 +87,7 @@ class TopicSubscriber {
     std::shared_ptr<std::atomic<bool>> muted_;  // shared with running callbacks
     mutable std::mutex mutex_;                  // protects all members below
     ros::Subscriber subscriber_;
+    std::shared_ptr<LatchedBefore> latched_;
     std::string problem_;
     Retry retry_;  // watch thread
 };

@@ -1,6 +1,9 @@
 """Messages from before a start or a subscription are values, and no commands."""
 
 import math
+import os
+import signal
+import time
 
 import rtcf
 from daemon_process import Daemon, wait_for
@@ -75,3 +78,63 @@ def test_a_heartbeat_from_before_the_start_is_no_beat(daemon: Daemon) -> None:
         assert port_value(client, "hb", "stopped") == 1.0
         client.write("hb.beat", 6)
         wait_for(lambda: port_value(client, "hb", "stopped") == 0.0, "the beat")
+
+
+def test_a_latched_message_that_comes_again_by_a_new_connection_is_old(
+    ros_daemon: tuple[Daemon, rtcf.Client], master: Master
+) -> None:
+    _, client = ros_daemon
+    client.load(rtcf.component("rtcf_examples", "Identity", name="id", remaps=["in:=/chart"]))
+    client.start()
+    _map(client, "/chart")
+    first = master.node("told", "/chart")
+    first.wait_until_connected()
+    first.tell("7.0")
+    wait_for(lambda: port_value(client, "/id", "out") == 7.0, "the message")
+    other = master.node("latch", "/chart", "8.0")
+    wait_for(lambda: port_value(client, "/id", "out") == 8.0, "a message of another node")
+    first.tell("drop")
+    wait_for(lambda: port_value(client, "/id", "in") == 7.0, "the first message again")
+    _run_on(client)
+    assert port_value(client, "/id", "out") == 8.0
+    first.tell("9.0")
+    wait_for(lambda: port_value(client, "/id", "out") == 9.0, "a new message of the first node")
+    first.end()
+    other.end()
+
+
+def test_the_first_message_of_a_latching_node_is_new_long_after_the_subscription(
+    ros_daemon: tuple[Daemon, rtcf.Client], master: Master
+) -> None:
+    _, client = ros_daemon
+    client.load(rtcf.component("rtcf_examples", "Identity", name="id", remaps=["in:=/chart"]))
+    client.start()
+    silent = master.node("told", "/chart")
+    wait_for(lambda: "/chart" in master.topics()[0], "the publisher")
+    _map(client, "/chart")
+    silent.wait_until_connected()
+    time.sleep(2.5)  # longer than a latched message takes
+    silent.tell("7.0")
+    wait_for(lambda: port_value(client, "/id", "out") == 7.0, "the first message")
+    silent.end()
+
+
+def test_a_latched_message_of_a_node_that_answers_late_is_old(
+    ros_daemon: tuple[Daemon, rtcf.Client], master: Master
+) -> None:
+    _, client = ros_daemon
+    client.load(rtcf.component("rtcf_examples", "Identity", name="id", remaps=["in:=/chart"]))
+    client.start()
+    early = master.node("latch", "/chart", "7.0")
+    wait_for(lambda: "/chart" in master.topics()[0], "the publisher")
+    os.kill(early.pid, signal.SIGSTOP)
+    try:
+        _map(client, "/chart")
+        wait_for(lambda: "/chart" in master.topics()[1], "the subscription")
+        time.sleep(3.0)
+    finally:
+        os.kill(early.pid, signal.SIGCONT)
+    wait_for(lambda: port_value(client, "/id", "in") == 7.0, "the message")
+    _run_on(client)
+    assert math.isnan(port_value(client, "/id", "out"))
+    early.end()

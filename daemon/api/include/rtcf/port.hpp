@@ -431,7 +431,7 @@ class Output final : public OutputBase {
 
     /// The value in place: change it, then call publish(). No reader sees a change before that. In
     /// one cycle, use either this or write(), which is faster for a small value. Real-time safe.
-    T& value() noexcept RTCF_NONBLOCKING {
+    T& value() noexcept(kNoThrow) {
         if constexpr (kHasDraft) {
             // After write(), or a value that the executor has put back.
             if (draft().stamp != raw_->stamp) draft() = *static_cast<const Slot<T>*>(raw_);
@@ -441,7 +441,7 @@ class Output final : public OutputBase {
         }
     }
     /// Writes the value changed in place. Real-time safe.
-    void publish() noexcept RTCF_NONBLOCKING {
+    void publish() noexcept(kNoThrow) {
         if constexpr (kHasDraft) static_cast<Slot<T>*>(raw_)->value = value();
         stampWrite();
         if constexpr (kHasDraft) draft().stamp = raw_->stamp;
@@ -457,9 +457,9 @@ class Output final : public OutputBase {
     }
 
    private:
-    // As isShared(). A copy that may throw is no part of value() and publish().
-    static constexpr bool kHasDraft = PortType<T>::kFixedSize && sizeof(T) <= kLargestShared &&
-                                      std::is_nothrow_copy_assignable_v<T>;
+    // As isShared().
+    static constexpr bool kHasDraft = PortType<T>::kFixedSize && sizeof(T) <= kLargestShared;
+    static constexpr bool kNoThrow = !kHasDraft || std::is_nothrow_copy_assignable_v<T>;
 
     Slot<T>& draft() const noexcept RTCF_NONBLOCKING {
         return static_cast<Slot<T>&>(port().draft());

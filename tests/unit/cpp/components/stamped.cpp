@@ -1,5 +1,6 @@
 // A writer that writes in every hook that it is told to, and a reader that shows what it reads.
 #include <rtcf/component.hpp>
+#include <rtcf/eigen_type.hpp>
 
 namespace {
 
@@ -65,8 +66,36 @@ class Listener final : public rtcf::Component {
     }
 };
 
+// Counts in place, and publishes each `every`-th count.
+class Counting final : public rtcf::Component {
+    rtcf::Output<double> out{this, "out"};
+    rtcf::Output<Eigen::Vector3d> vector{this, "vector"};
+    rtcf::Parameter<std::int64_t> every{this, "every", 100};
+    rtcf::State<std::int64_t> cycles{this, "cycles", 0};
+
+    bool start() override {
+        vector.write(Eigen::Vector3d::Zero());
+        return true;
+    }
+    void update() override {
+        out.value() += 1.0;
+        vector.value().x() += 1.0;
+        if (++cycles % every != 0) return;
+        out.publish();
+        vector.publish();
+    }
+};
+
+class VectorListener final : public rtcf::Component {
+    rtcf::Input<Eigen::Vector3d> in{this, "in"};
+    rtcf::Output<double> value{this, "value"};
+    void update() override { value.write(in.read() == rtcf::DataStatus::None ? -1.0 : in.value().x()); }
+};
+
 }  // namespace
 
+RTCF_COMPONENT(Counting, "Counts in place")
+RTCF_COMPONENT(VectorListener, "Shows the x of a vector")
 RTCF_COMPONENT(PlainSayer, "Writes in its hooks")
 RTCF_COMPONENT(CheckedSayer, "Writes a finite output in its hooks")
 RTCF_COMPONENT(Listener, "Shows what it reads")

@@ -76,6 +76,25 @@ TEST_P(PeriodChange, KeepsAConstantOutputExactly) {
         [&](double) { EXPECT_EQ(*passing.read<double>("out"), 2.5); });
 }
 
+TEST(PeriodAndSections, AreFaded) {
+    Bench bench("Biquads", {{"sections", std::string("lowpass 2 0.7")}});
+    int cycle = 0;
+    double last = 1.0;
+    changePeriod(
+        bench, 4'000'000, false, 200,
+        [&](double time) {
+            if (cycle == 200) bench.set({{"sections", std::string("highpass 2 0.7")}});
+            bench.write("in", 1.0 + time);
+        },
+        [&](double) {
+            const double out = *bench.read<double>("out");
+            EXPECT_NEAR(out, last, 0.06) << cycle;  // the step without a transition is 1
+            last = out;
+            ++cycle;
+        });
+    EXPECT_NEAR(last, 0.0, 0.2);
+}
+
 INSTANTIATE_TEST_SUITE_P(Loop, PeriodChange,
                          testing::Values(std::pair{4'000'000, true}, std::pair{4'000'000, false},
                                          std::pair{250'000, true}, std::pair{250'000, false},

@@ -383,6 +383,43 @@ TEST_F(Stamps, QueueDropsMessagesOfTheTimeBeforeTheStartAndCountsThem) {
     EXPECT_EQ(lines, 2) << all;
 }
 
+TEST_F(Stamps, QueueForgetsTheMessagesOfComponentsFromBeforeTheStart) {
+    load(sayer("PlainSayer", {{"number", 1.0}, {"every", std::int64_t{1'000'000}}}));
+    ComponentDefinition collector = definition("Collector", "C");
+    collector.remaps = {{"in", "/m"}};
+    load(collector);
+    setParameters("/C", {{"takes", false}});
+    start();
+    ASSERT_TRUE(eventually([&] { return value("/C", "waiting") == 1.0; }));
+    stop();
+    setParameters("/C", {{"takes", true}});
+    setParameters("/M", {{"number", 2.0}});
+    start();
+    ASSERT_TRUE(eventually([&] { return value("/C", "order") == 2.0; }));
+    EXPECT_EQ(value("/C", "dropped"), 1.0);
+}
+
+TEST_F(Stamps, ChangesInPlaceThatWereNotPublishedAreNotPartOfASnapshot) {
+    ComponentDefinition counting = definition("Counting", "M");
+    counting.remaps = {{"out", "/m"}, {"vector", "/v"}};
+    load(counting);
+    load(listener("L"));
+    ComponentDefinition reader = definition("VectorListener", "V");
+    reader.remaps = {{"in", "/v"}};
+    load(reader);
+    step(50);
+    EXPECT_EQ(value("/L", "status"), static_cast<double>(DataStatus::None));
+    EXPECT_EQ(value("/V", "value"), 0.0) << "also a type whose copy is not noexcept";
+    step(100);
+    const auto snapshot = onGraphThread([&] { return runner().takeSnapshot().snapshot; });
+    step(30);
+    onGraphThread([&] { return runner().restore(snapshot, [](const std::string&) {}); });
+    EXPECT_EQ(value("/L", "in"), 100.0);
+    step(50);
+    EXPECT_EQ(value("/L", "value"), 150.0);
+    EXPECT_EQ(value("/V", "value"), 150.0);
+}
+
 TEST_F(Stamps, QueueGetsWhatASuccessorWritesInStart) {
     load(sayer("PlainSayer", {{"number", 1.75}, {"starts", true}}));
     ComponentDefinition collector = definition("Collector", "C");
