@@ -302,8 +302,7 @@ class Excitation final : public rtcf::Component {
     }
 
     void pass(double command) noexcept {
-        if (!std::isfinite(command))
-            reportFault("in is not finite: out is its last finite value");
+        if (!std::isfinite(command)) reportFault("in is not finite: out is its last finite value");
         out.write(last_in_);  // rejected if there was no finite one
         signal.write(0.0);
         publish();

@@ -184,8 +184,7 @@ class JointLimiter final : public rtcf::Component {
     bool note(rtcf::Input<double>& measured, std::size_t i, bool needed) {
         if (measured.read() == rtcf::DataStatus::None) return false;
         if (!needed) return true;
-        const char* const fault =
-            watch_.note(i, measured.value(), measured.age(this), elapsed());
+        const char* const fault = watch_.note(i, measured.value(), measured.age(this), elapsed());
         if (fault != nullptr) reportFault(fault);
         return watch_.valid(i);
     }

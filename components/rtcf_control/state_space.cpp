@@ -545,8 +545,7 @@ class StateSpace final : public rtcf::Component {
             const rtcf::DataStatus status = port.read();
             values[i] = port.value();
             if (status == rtcf::DataStatus::None) continue;
-            const char* const fault =
-                watch_.note(at, port.value(), port.age(this), elapsed());
+            const char* const fault = watch_.note(at, port.value(), port.age(this), elapsed());
             if (fault != nullptr) reportFault(fault);
             lost = lost || watch_.lost(at);
         }

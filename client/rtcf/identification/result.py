@@ -23,8 +23,8 @@ METHODS = ("simc", "lambda", "relay")
 MOST_SENSITIVITY = 2.0  # of a proposal, with each model that describes the values
 LEAST_FIT = 50.0  # percent, of a model that is used for gains
 MOST_SYSTEMATIC = 4.0  # percent of the output, see Fit.systematic
-# Likewise, of a plant that integrates or oscillates: dry friction looks like damping, and is none for
-# small motions.
+# Likewise, of a plant that integrates or oscillates: dry friction looks like damping, and is none
+# for small motions.
 MOST_SYSTEMATIC_UNDAMPED = 1.0
 _BETTER = 1.0  # percent by which a model must be better to be used
 _CREDIBLE = 1.2  # residuals by the smallest ones, of models that a loop must be stable with

@@ -290,8 +290,8 @@ class GravityCompensation final : public rtcf::Component {
         double sum = 0.0;  // changes with any position
         for (std::size_t i = 0; i < count(); ++i) sum += position_.value()[i];
         // A message that was rejected does not count.
-        const std::int64_t age = is_new || !watch_.valid(0) ? measured.age(this)
-                                                            : watch_.silence(0) + elapsed();
+        const std::int64_t age =
+            is_new || !watch_.valid(0) ? measured.age(this) : watch_.silence(0) + elapsed();
         if (const char* const fault = watch_.note(0, sum, age, elapsed())) reportFault(fault);
     }
 

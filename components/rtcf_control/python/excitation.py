@@ -136,9 +136,7 @@ class Excitation(Component):
     played: State[int] = State(0, unit="ns", doc="time since the signal began")
     phase: State[float] = State(0.0, doc="phase of the wave, from 0 to 1")
     bits: State[int] = State(PRBS_START, doc="shift register of PRBS")
-    measured_age: State[int] = State(
-        0, unit="ns", doc="age of the last finite measured value"
-    )
+    measured_age: State[int] = State(0, unit="ns", doc="age of the last finite measured value")
     unchanged: State[int] = State(0, unit="ns", doc="time since its last change")
     last_finite: State[float] = State(math.nan, doc="last finite measured value; NaN = none")
     peak: Derived[float]  # of the multisine

@@ -55,8 +55,8 @@ class Cycle {
     /// @name Graph thread
     /// @{
     /// Sets the clock before the start hooks, so that what they write belongs to the start, and
-    /// empties the queues of components. While no cycle runs. If CLOCK_MONOTONIC is not the loop time, or was not before, all values keep
-    /// the ages of the last cycle.
+    /// empties the queues of components. While no cycle runs. If CLOCK_MONOTONIC is not the loop
+    /// time, or was not before, all values keep the ages of the last cycle.
     void announce(Pace pace);
     /// Resets clock and counters, so that the next cycle is number 0. Unless it is a step, takes
     /// the values from outside that arrived before it, as old ones. After announce() and the start

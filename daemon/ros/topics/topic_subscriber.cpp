@@ -43,13 +43,13 @@ bool TopicSubscriber::open(ros::NodeHandle& handle, ros::CallbackQueueInterface&
                            std::optional<std::set<std::string>> publishers) {
     using Event = ros::MessageEvent<const RawBytes>;
     const auto latched = std::make_shared<LatchedBefore>(std::move(publishers));
-    const boost::function<void(const Event&)> deliver =
-        [injector = injector_, muted = muted_, latched](const Event& event) {
-            const bool is_old = latched->includes(event.getConnectionHeaderPtr());
-            const RawBytes& message = *event.getConstMessage();
-            if (*muted) return;
-            injector->deliver(message.bytes.get(), message.size, executor::monotonicNow(), is_old);
-        };
+    const boost::function<void(const Event&)> deliver = [injector = injector_, muted = muted_,
+                                                         latched](const Event& event) {
+        const bool is_old = latched->includes(event.getConnectionHeaderPtr());
+        const RawBytes& message = *event.getConstMessage();
+        if (*muted) return;
+        injector->deliver(message.bytes.get(), message.size, executor::monotonicNow(), is_old);
+    };
     ros::SubscribeOptions options;
     options.topic = injector_->topic();
     // Large, so that no message is lost before the injector, which decides whether only the newest

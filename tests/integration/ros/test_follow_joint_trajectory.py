@@ -37,9 +37,7 @@ MD5 = {
 class Peer:
     """The action's client."""
 
-    def __init__(
-        self, environment: dict[str, str], node: str = "/follow_joint_trajectory"
-    ) -> None:
+    def __init__(self, environment: dict[str, str], node: str = "/follow_joint_trajectory") -> None:
         self._process = subprocess.Popen(
             ["/usr/bin/python3", SUPPORT / "action_peer.py", f"{node}/follow_joint_trajectory"],
             env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,

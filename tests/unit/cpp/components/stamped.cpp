@@ -89,7 +89,9 @@ class Counting final : public rtcf::Component {
 class VectorListener final : public rtcf::Component {
     rtcf::Input<Eigen::Vector3d> in{this, "in"};
     rtcf::Output<double> value{this, "value"};
-    void update() override { value.write(in.read() == rtcf::DataStatus::None ? -1.0 : in.value().x()); }
+    void update() override {
+        value.write(in.read() == rtcf::DataStatus::None ? -1.0 : in.value().x());
+    }
 };
 
 }  // namespace
