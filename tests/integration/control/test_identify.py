@@ -177,7 +177,7 @@ def test_the_notch_for_a_resonance_permits_the_gains_for_it(
     load(client, "Pid", "pid", {"measured": "/y", "effort": "/effort"}, breaks=["measured"],
          **notch["gains"])  # fmt: skip
     client.write("pid.setpoint", 1.0)
-    client.step(5000)
+    client.step(15000)
     assert float(value(daemon, "plant.out1")) == pytest.approx(1.0, abs=1e-3)
 
 

@@ -74,7 +74,7 @@ def test_ros_receives_each_value_of_an_independent_simulation(
         assert is_among(g2.values(), [values["R3"] for values in wanted])
         assert is_among(g1.values(), [values["R1"] for values in wanted])
         # The sums grow and restart repeatedly, so the values differ.
-        assert len({values["R3"] for values in wanted}) > 50
+        assert len({values["R3"] for values in wanted}) > 20
         for node in (g1, g2, latched):
             node.end()
 

@@ -21,6 +21,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <memory>
 #include <string>
 #include <type_traits>
@@ -431,18 +432,21 @@ class Output final : public OutputBase {
 
     /// The value in place: change it, then call publish(). No reader sees a change before that. In
     /// one cycle, use either this or write(), which is faster for a small value. Real-time safe.
-    T& value() noexcept(kNoThrow) {
+    T& value() noexcept RTCF_NONBLOCKING {
         if constexpr (kHasDraft) {
             // After write(), or a value that the executor has put back.
-            if (draft().stamp != raw_->stamp) draft() = *static_cast<const Slot<T>*>(raw_);
+            if (draft().stamp != raw_->stamp) {
+                copy(static_cast<const Slot<T>*>(raw_)->value, draft().value);
+                draft().stamp = raw_->stamp;
+            }
             return draft().value;
         } else {
             return static_cast<Slot<T>*>(raw_)->value;
         }
     }
     /// Writes the value changed in place. Real-time safe.
-    void publish() noexcept(kNoThrow) {
-        if constexpr (kHasDraft) static_cast<Slot<T>*>(raw_)->value = value();
+    void publish() noexcept RTCF_NONBLOCKING {
+        if constexpr (kHasDraft) copy(value(), static_cast<Slot<T>*>(raw_)->value);
         stampWrite();
         if constexpr (kHasDraft) draft().stamp = raw_->stamp;
     }
@@ -457,9 +461,20 @@ class Output final : public OutputBase {
     }
 
    private:
+    static constexpr bool kMayThrow = !std::is_nothrow_copy_assignable_v<T>;
     // As isShared().
-    static constexpr bool kHasDraft = PortType<T>::kFixedSize && sizeof(T) <= kLargestShared;
-    static constexpr bool kNoThrow = !kHasDraft || std::is_nothrow_copy_assignable_v<T>;
+    static constexpr bool kHasDraft = PortType<T>::kFixedSize && sizeof(T) <= kLargestShared &&
+                                      (!kMayThrow || std::is_trivially_destructible_v<T>);
+
+    // A trivially destructible type owns no memory. Those of Eigen do not declare that their copies
+    // throw nothing.
+    static void copy(const T& from, T& to) noexcept RTCF_NONBLOCKING {
+        if constexpr (kMayThrow) {
+            std::memcpy(static_cast<void*>(&to), &from, sizeof(T));
+        } else {
+            to = from;
+        }
+    }
 
     Slot<T>& draft() const noexcept RTCF_NONBLOCKING {
         return static_cast<Slot<T>&>(port().draft());
