@@ -415,23 +415,6 @@ def test_velocities_have_a_limited_acceleration(blocks: Blocks) -> None:
         assert out[end] == wanted[end]
 
 
-def test_a_joint_that_follows_its_velocity_stops_at_the_limit(stepped: Bench) -> None:
-    block = Stepped(stepped, "JointLimiter", command="velocity", upper=1.0, deceleration=5.0)
-    position, speeds = 0.0, []
-    try:
-        for _ in range(1200):
-            speeds.append(block.step(**{"in": 2.0, "position": position})["last"])
-            position += speeds[-1] * DT
-    finally:
-        block.unload()
-    assert position == pytest.approx(1.0, abs=ROUNDING)
-    assert speeds[400:500] == [2.0] * 100
-    # It slows down by 5 * 1 ms in each cycle, from 2.0 to 0: 400 cycles.
-    slower = -np.diff(speeds)
-    assert np.abs(slower).max() <= 0.005 + ROUNDING
-    assert np.count_nonzero(slower > 0.005 - ROUNDING) >= 398
-
-
 def test_a_velocity_follows_the_braking_distance(blocks: Blocks) -> None:
     # Against the continuous law v^2 = 2 a d, from which discrete steps differ by at most a h. The
     # joint moves more slowly than commanded, so the limit of the acceleration does not matter.
@@ -445,37 +428,6 @@ def test_a_velocity_follows_the_braking_distance(blocks: Blocks) -> None:
     assert (out[begun] <= law[begun]).all()
     assert (np.diff(out[position >= 1.0]) <= 0.0).all()
     assert (out[position >= 1.05] == 0.0).all()
-
-
-def test_a_limit_that_comes_too_late_is_kept_by_harder_braking(stepped: Bench) -> None:
-    block = Stepped(stepped, "JointLimiter", command="velocity", upper=9.0, deceleration=5.0)
-    position, speeds = 0.0, []
-    try:
-        for cycle in range(900):
-            if cycle == 400:
-                block.set(command="velocity", upper=position + 0.2, deceleration=5.0)
-                upper = position + 0.2
-            speeds.append(block.step(**{"in": 2.0, "position": position})["last"])
-            position += speeds[-1] * DT
-            assert cycle < 400 or position <= upper + ROUNDING
-    finally:
-        block.unload()
-    # 2 rad/s within 0.2 rad: 10 rad/s^2.
-    assert np.diff(speeds[400:]).min() == pytest.approx(-0.01, rel=0.02)
-    assert position == pytest.approx(upper, abs=1e-3)
-
-
-def test_beyond_a_limit_it_brakes_by_the_deceleration(stepped: Bench) -> None:
-    block = Stepped(stepped, "JointLimiter", upper=9.0, deceleration=5.0)
-    try:
-        before = block.step(400, **{"in": 9.0, "position": 0.0})["last"]
-        block.set(upper=before - 0.1, deceleration=5.0)
-        positions = [block.step()["last"] for _ in range(1500)]
-    finally:
-        block.unload()
-    assert np.abs(np.diff(positions, 2)).max() <= 5.0 * DT**2 + ROUNDING
-    assert max(positions) == pytest.approx(before + 0.4, abs=3e-3)  # v^2 / (2 a)
-    assert positions[-1] == pytest.approx(before - 0.1, abs=ROUNDING)
 
 
 def test_soft_limits_bound_the_velocity_by_the_distance(blocks: Blocks) -> None:

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -61,6 +62,32 @@ TEST_P(PeriodChange, KeepsTheResponseOfAFilterToAWave) {
                 EXPECT_NEAR(*bench.read<double>("out"),
                             gain * (is_single ? std::cos(turns) : std::sin(turns)), kRounding)
                     << text << " at " << time;
+            });
+    }
+}
+
+// All kinds of sections: the output changes by no more than its wave does in a period.
+TEST_P(PeriodChange, AddsNoSpike) {
+    for (const char* const text :
+         {"lowpass 20 5", "highpass 20 0.7", "notch 50 5; bandpass 30 2", "lead_lag 5 40",
+          "butterworth_lowpass 5 30", "butterworth_highpass 3 2"}) {
+        Bench bench("Biquads", {{"sections", std::string(text)}});
+        double last = 0.0;
+        double largest = 0.0;
+        double before = 0.0;
+        changePeriod(
+            bench, GetParam().first, GetParam().second, 2000,
+            [&](double time) { bench.write("in", std::sin(kTurn * 5.0 * time)); },
+            [&](double time) {
+                const double out = *bench.read<double>("out");
+                const double turn = kTurn * 5.0 * std::max(time - before, 1e-9);
+                if (time > 1.0 && time < 1.9) largest = std::max(largest, std::abs(out));
+                if (time > 1.9) {
+                    EXPECT_LE(std::abs(out - last), 1.1 * turn * largest + 1e-6)
+                        << text << " at " << time;
+                }
+                last = out;
+                before = time;
             });
     }
 }
