@@ -104,8 +104,8 @@ class StampsModel : public Stamps, public ::testing::WithParamInterface<unsigned
     void say(double value) { said_ = {value, ++numbers_}; }
 
     // A loop break reads the value of the previous cycle.
-    const Said& heard(const Hearer& hearer, const Said& before) const {
-        return hearer.broken ? before : said_;
+    const Said* heard(const Hearer& hearer, const Said* before) const {
+        return hearer.broken ? before : &said_;
     }
 
     void modelCycle() {
@@ -118,7 +118,7 @@ class StampsModel : public Stamps, public ::testing::WithParamInterface<unsigned
             // Changes in place without publish() are seen by nobody.
         }
         for (auto& [name, hearer] : hearers_)
-            if (!hearer.early) hearer.hear(voice_ ? &heard(hearer, before) : nullptr);
+            if (!hearer.early) hearer.hear(voice_ ? heard(hearer, &before) : nullptr);
         ++iteration_;
     }
 
