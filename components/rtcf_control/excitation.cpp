@@ -168,14 +168,11 @@ class Excitation final : public rtcf::Component {
                             0.0,
                             proposed[lines]};
         if (const char* const error = next.frequencyError()) return fail(error);
-        const double component_hz = 1e9 / static_cast<double>(design_period_.proposed());
-        if (const std::string error = next.samplingError(component_hz); !error.empty()) {
-            const bool is_new = !is_configured_ || !next.hasFrequenciesOf(waveform());
-            if (is_new && next.shape != Shape::Prbs)
-                return RTCF_FAIL(this, "{}: {}", error, kSamplingAdvice);
-            if (is_new || design_period_.proposed() != period())
-                RTCF_WARN(this, "{}: {}", error, kSamplingAdvice);
-        }
+        const Waveform present = waveform();
+        if (const std::string refusal =
+                samplingRefusal(this, next, is_configured_ ? &present : nullptr, design_period_);
+            !refusal.empty())
+            return fail("{}", refusal);
         if (proposed[shape] == ExcitationShape::Multisine)
             peak_.stage(peakOfMultisine(proposed[lines]));
         return true;

@@ -89,14 +89,11 @@ class SignalGenerator final : public rtcf::Component {
         const Waveform next{proposed[shape],    proposed[frequency_], proposed[end_frequency],
                             proposed[duration], proposed[delay],      proposed[lines]};
         if (const char* const error = next.frequencyError()) return fail(error);
-        const double component_hz = 1e9 / static_cast<double>(design_period_.proposed());
-        if (const std::string error = next.samplingError(component_hz); !error.empty()) {
-            const bool is_new = !is_configured_ || !next.hasFrequenciesOf(waveform());
-            if (is_new && next.shape != Shape::Prbs)
-                return RTCF_FAIL(this, "{}: {}", error, kSamplingAdvice);
-            if (is_new || design_period_.proposed() != period())
-                RTCF_WARN(this, "{}: {}", error, kSamplingAdvice);
-        }
+        const Waveform present = waveform();
+        if (const std::string refusal =
+                samplingRefusal(this, next, is_configured_ ? &present : nullptr, design_period_);
+            !refusal.empty())
+            return fail("{}", refusal);
         if (proposed[shape] == Shape::Multisine) peak_.stage(peakOfMultisine(proposed[lines]));
         return true;
     }

@@ -9,6 +9,7 @@
 #include <string>
 
 #include <rtcf/component.hpp>
+#include <rtcf/design_period.hpp>
 
 namespace rtcf_control {
 
@@ -43,10 +44,6 @@ inline double peakOfMultisine(int lines) {
 
 /// Nanoseconds of a time in s.
 inline std::int64_t nanoseconds(double seconds) noexcept { return std::llround(seconds * 1e9); }
-
-/// What to do about Waveform::samplingError().
-constexpr const char* kSamplingAdvice =
-    "lower frequency, end_frequency or lines, or raise the loop's frequency";
 
 /// A signal, from the parameters of its component.
 struct Waveform {
@@ -103,6 +100,21 @@ struct Waveform {
                             : frequency * duration / ratio * std::expm1(ratio * time / duration);
     }
 };
+
+/// Why a component must not get a signal; empty if it may. Logs errors that are permitted: of a
+/// loop that becomes slower, and of a PRBS. In prepare(); not real-time safe.
+/// @param present signal of the component; null before configure()
+inline std::string samplingRefusal(const rtcf::Component* owner, const Waveform& next,
+                                   const Waveform* present, const rtcf::DesignPeriod& period) {
+    constexpr const char* kAdvice =
+        "lower frequency, end_frequency or lines, or raise the loop's frequency";
+    const std::string error = next.samplingError(1e9 / static_cast<double>(period.proposed()));
+    if (error.empty()) return {};
+    const bool is_new = present == nullptr || !next.hasFrequenciesOf(*present);
+    if (is_new && next.shape != Shape::Prbs) return error + ": " + kAdvice;
+    if (is_new || period.proposed() != owner->period()) RTCF_WARN(owner, "{}: {}", error, kAdvice);
+    return {};
+}
 
 /// A running signal: refers to the state of its component. All functions are real-time safe.
 struct WaveState {

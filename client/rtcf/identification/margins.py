@@ -179,8 +179,3 @@ class SampledPlant:
             low, high = np.where(same, middle, low), np.where(same, high, middle)
         found: Array = (low + high) / 2.0
         return found
-
-
-def margins(gains: Gains, model: Model, period: float) -> Margins:
-    """Return the margins of a loop; see SampledPlant."""
-    return SampledPlant(model, period).margins(gains)

@@ -54,7 +54,7 @@ class Cycle {
 
     /// @name Graph thread
     /// @{
-    /// Sets the clock before the start hooks, so that what they write belongs to the start, and
+    /// Sets the clock before the start hooks, so that their values belong to the start, and
     /// empties the queues of components. While no cycle runs. If CLOCK_MONOTONIC is not the loop
     /// time, or was not before, all values keep the ages of the last cycle.
     void announce(Pace pace);

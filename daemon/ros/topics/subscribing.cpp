@@ -6,6 +6,7 @@
 #include <xmlrpcpp/XmlRpcValue.h>
 
 #include <algorithm>
+#include <chrono>
 #include <optional>
 #include <set>
 #include <utility>
@@ -159,8 +160,13 @@ std::string Subscribing::problem() const {
 }
 
 void Subscribing::run() {
+    constexpr std::chrono::milliseconds kTurn{100};
+    auto next = std::chrono::steady_clock::now();
     while (!stop_) {
         queue_.callAvailable(ros::WallDuration(0.1));
+        const auto now = std::chrono::steady_clock::now();
+        if (now < next) continue;  // called for each message
+        next = now + kTurn;
         const std::lock_guard lock(mutex_);
         for (const auto& [injector, subscriber] : subscribers_) subscriber->watchConnections();
     }

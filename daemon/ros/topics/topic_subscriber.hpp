@@ -26,8 +26,7 @@ class NodeHandle;
 namespace rtcf::ros1 {
 
 /// Messages latched before a subscription or a connection: ROS 1 does not say when they were
-/// published, so they are old. A publisher that registers later latches what it publishes now. One
-/// thread.
+/// published, so they are old. A publisher that registers later latches new messages. One thread.
 class LatchedBefore {
    public:
     /// Header of a connection.

@@ -1,4 +1,4 @@
-// A writer that writes in every hook that it is told to, and a reader that shows what it reads.
+// A writer with values of all hooks, and a reader that shows its input.
 #include <rtcf/component.hpp>
 #include <rtcf/eigen_type.hpp>
 
@@ -100,4 +100,4 @@ RTCF_COMPONENT(Counting, "Counts in place")
 RTCF_COMPONENT(VectorListener, "Shows the x of a vector")
 RTCF_COMPONENT(PlainSayer, "Writes in its hooks")
 RTCF_COMPONENT(CheckedSayer, "Writes a finite output in its hooks")
-RTCF_COMPONENT(Listener, "Shows what it reads")
+RTCF_COMPONENT(Listener, "Shows its input")

@@ -24,7 +24,7 @@ from rtcf.identification.experiment import (
     Collector,
     Recorded,
 )
-from rtcf.identification.margins import margins
+from rtcf.identification.margins import Margins, SampledPlant
 from rtcf.identification.models import Array, Model, StateSpace, Transfer
 from rtcf.identification.result import estimated_response, fitted_response, identify
 from rtcf.identification.tuning import Gains, RelayPoint
@@ -47,6 +47,10 @@ SWINGING = Transfer(1.5, (0.04, 0.08, 1.0), 0.05)
 def response(part: Model | Gains, omega: Array, period: float = PERIOD) -> Any:
     above, below = part.fraction(omega, period)
     return above / below
+
+
+def margins(gains: Gains, model: Model, period: float) -> Margins:
+    return SampledPlant(model, period).margins(gains)
 
 
 def noisy(y: Any) -> Any:
