@@ -169,10 +169,10 @@ class Excitation final : public rtcf::Component {
                             proposed[lines]};
         if (const char* const error = next.frequencyError()) return fail(error);
         const Waveform present = waveform();
-        if (const std::string refusal =
-                samplingRefusal(this, next, is_configured_ ? &present : nullptr, design_period_);
-            !refusal.empty())
-            return fail("{}", refusal);
+        if (const std::string error =
+                proposalError(this, next, is_configured_ ? &present : nullptr, design_period_);
+            !error.empty())
+            return fail("{}", error);
         if (proposed[shape] == ExcitationShape::Multisine)
             peak_.stage(peakOfMultisine(proposed[lines]));
         return true;

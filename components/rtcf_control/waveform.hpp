@@ -104,8 +104,8 @@ struct Waveform {
 /// Why a component must not get a signal; empty if it may. Logs errors that are permitted: of a
 /// loop that becomes slower, and of a PRBS. In prepare(); not real-time safe.
 /// @param present signal of the component; null before configure()
-inline std::string samplingRefusal(const rtcf::Component* owner, const Waveform& next,
-                                   const Waveform* present, const rtcf::DesignPeriod& period) {
+inline std::string proposalError(const rtcf::Component* owner, const Waveform& next,
+                                 const Waveform* present, const rtcf::DesignPeriod& period) {
     constexpr const char* kAdvice =
         "lower frequency, end_frequency or lines, or raise the loop's frequency";
     const std::string error = next.samplingError(1e9 / static_cast<double>(period.proposed()));
