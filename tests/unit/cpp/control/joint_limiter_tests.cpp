@@ -8,11 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "control/numbers.hpp"
+
 namespace rtcf::test {
 namespace {
-
-constexpr double kStep = 1e-3;  // s
-constexpr double kRounding = 1e-9;
 
 struct Motion {
     std::vector<double> speeds;

@@ -6,21 +6,18 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <rtcf/test.hpp>
 #include <string>
 #include <vector>
 
 #include "control/allocations.hpp"
+#include "control/numbers.hpp"
 
 namespace rtcf::test {
 namespace {
 
 using Vector = std::vector<double>;
 using Names = std::vector<std::string>;
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 sensor_msgs::JointState message(const Names& names, const Vector& position,
                                 const Vector& velocity = {}, const Vector& effort = {}) {

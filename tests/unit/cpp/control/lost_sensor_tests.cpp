@@ -3,17 +3,13 @@
 
 #include <algorithm>
 #include <cstring>
-#include <limits>
 #include <rtcf/test.hpp>
 #include <string>
 
+#include "control/numbers.hpp"
+
 namespace rtcf::test {
 namespace {
-
-constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kStep = 1e-3;  // s
-constexpr double kRounding = 1e-9;
 
 Bench limiter(const std::string& command) {
     return Bench("JointLimiter", {{"command", command},

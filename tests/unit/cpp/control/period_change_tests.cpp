@@ -9,11 +9,12 @@
 #include <utility>
 #include <vector>
 
+#include "control/numbers.hpp"
+
 namespace rtcf::test {
 namespace {
 
 constexpr std::int64_t kFirst = 1'000'000;  // ns
-constexpr double kRounding = 1e-9;
 constexpr double kTurn = 6.28318530717958647692;
 
 // Runs a component with a period of 1 ms, then of another one. In a running loop, the first cycle

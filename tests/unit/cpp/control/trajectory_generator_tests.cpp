@@ -9,24 +9,23 @@
 #include <cstring>
 #include <iomanip>
 #include <iostream>
-#include <limits>
 #include <random>
 #include <rtcf/test.hpp>
 #include <sstream>
 #include <string>
 #include <vector>
 
+#include "control/numbers.hpp"
+
 namespace rtcf::test {
 namespace {
 
 using Vector = std::vector<double>;
 
-constexpr double kPeriod = 0.001;  // s
 // Limits of all joints, unless a test sets others.
 constexpr double kVelocity = 2.0;
 constexpr double kAcceleration = 4.0;
 constexpr double kJerk = 16.0;
-constexpr double kRounding = 1e-9;  // of positions and limits of size 1
 
 #ifdef RTCF_SANITIZED
 constexpr int kTargets = 200;
@@ -84,7 +83,7 @@ class Generator {
     }
     // `begin` is the time from the next cycle to the stamp, s; NaN for no stamp.
     void trajectory(const std::vector<trajectory_msgs::JointTrajectoryPoint>& points,
-                    double begin = std::numeric_limits<double>::quiet_NaN()) {
+                    double begin = kNaN) {
         trajectory_msgs::JointTrajectory message;
         message.points = points;
         if (!std::isnan(begin)) {
@@ -120,7 +119,7 @@ class Generator {
 // Fails if a joint moves from one sample to the next as limits do not allow.
 void expectSmooth(const Sample& last, const Sample& now, double velocity = kVelocity,
                   double acceleration = kAcceleration, double jerk = kJerk) {
-    const double h = kPeriod;
+    const double h = kStep;
     for (std::size_t i = 0; i < now.position.size(); ++i) {
         ASSERT_LE(std::abs(now.velocity[i]), velocity * (1.0 + kRounding));
         ASSERT_LE(std::abs(now.acceleration[i]), acceleration * (1.0 + kRounding));
@@ -146,9 +145,8 @@ TEST(TrajectoryGenerator, WritesNothingBeforeTheStartPositionIsKnown) {
     bench.write("target", jointState({1.0, 2.0}));
     bench.cycle();
     EXPECT_EQ(bench.read<sensor_msgs::JointState>("command"), nullptr);
-    const double nan = std::numeric_limits<double>::quiet_NaN();
     for (const auto& state :
-         {jointState({0.5}), jointState({0.5, nan}), jointState({0.5, 0.5}, {}, {"j0", "j9"})}) {
+         {jointState({0.5}), jointState({0.5, kNaN}), jointState({0.5, 0.5}, {}, {"j0", "j9"})}) {
         bench.write("measured", state);
         bench.cycle();
         EXPECT_EQ(bench.read<sensor_msgs::JointState>("command"), nullptr);
@@ -169,7 +167,7 @@ TEST(TrajectoryGenerator, TakesTheAnalyticTimeToATargetAndStandsThere) {
         EXPECT_TRUE(generator.done());
         generator.target({1.0 + distance});
         const double duration = analyticDuration(std::abs(distance));
-        EXPECT_EQ(generator.finish(), static_cast<int>(std::ceil(duration / kPeriod - 1e-6)));
+        EXPECT_EQ(generator.finish(), static_cast<int>(std::ceil(duration / kStep - 1e-6)));
         EXPECT_EQ(generator.progress(), 1.0);
         const Sample end = generator.next();
         EXPECT_EQ(end.position[0], 1.0 + distance);
@@ -181,7 +179,7 @@ TEST(TrajectoryGenerator, TakesTheAnalyticTimeToATargetAndStandsThere) {
 TEST(TrajectoryGenerator, MovesJointsTogether) {
     Generator generator({0.0, 0.0, 0.0});
     generator.target({3.0, 0.5, -1.0});
-    const int cycles = static_cast<int>(analyticDuration(3.0) / kPeriod);
+    const int cycles = static_cast<int>(analyticDuration(3.0) / kStep);
     generator.bench.cycle(static_cast<std::uint64_t>(cycles - 10));
     EXPECT_NEAR(generator.progress(), (cycles - 10) / (1000.0 * analyticDuration(3.0)), 1e-3);
     for (const double velocity : generator.now().velocity) EXPECT_NE(velocity, 0.0);
@@ -249,7 +247,7 @@ TEST(TrajectoryGenerator, StopsBehindATargetWithAVelocity) {
     do {
         const Sample now = generator.next();
         ASSERT_NO_FATAL_FAILURE(expectSmooth(last, now));
-        passed = passed || (std::abs(now.position[0] - 2.0) <= kVelocity * kPeriod &&
+        passed = passed || (std::abs(now.position[0] - 2.0) <= kVelocity * kStep &&
                             std::abs(now.velocity[0] - kVelocity) < 1e-3);
         last = now;
     } while (!generator.done());
@@ -262,7 +260,6 @@ TEST(TrajectoryGenerator, StopsBehindATargetWithAVelocity) {
 }
 
 TEST(TrajectoryGenerator, RejectsTargetsAndMovesOn) {
-    const double nan = std::numeric_limits<double>::quiet_NaN();
     Generator generator({0.0, 0.0});
     Generator undisturbed({0.0, 0.0});
     generator.target({3.0, 1.0});
@@ -271,7 +268,7 @@ TEST(TrajectoryGenerator, RejectsTargetsAndMovesOn) {
     undisturbed.bench.cycle(100);
     std::uint32_t count = 0;
     for (const auto& bad :
-         {jointState({nan, 0.0}), jointState({0.0, 0.0}, {0.0, nan}), jointState({0.0}),
+         {jointState({kNaN, 0.0}), jointState({0.0, 0.0}, {0.0, kNaN}), jointState({0.0}),
           jointState({0.0, 0.0}, {0.0}), jointState({0.0, 0.0}, {0.0, 2.1}), jointState({}),
           jointState({0.0, 0.0}, {}, {"j0", "x"}), jointState({0.0}, {}, {"j0", "j1"})}) {
         generator.bench.write("target", bad);
@@ -291,7 +288,7 @@ TEST(TrajectoryGenerator, HaltsOnTheFastestWay) {
     ASSERT_NEAR(generator.now().velocity[0], kVelocity, kRounding);
     const double from = generator.now().position[0];
     generator.bench.write("halt", true);
-    EXPECT_EQ(generator.finish(), static_cast<int>(std::ceil(kStopDuration / kPeriod - 1e-6)));
+    EXPECT_EQ(generator.finish(), static_cast<int>(std::ceil(kStopDuration / kStep - 1e-6)));
     EXPECT_NEAR(generator.now().position[0], from + kVelocity / 2.0 * kStopDuration, kRounding);
     generator.target({10.0});
     generator.trajectory({pointAt(1.0, {2.0})});
@@ -333,7 +330,6 @@ TEST(TrajectoryGenerator, StandsWhereOthersMoveTheJointsUntilANewTarget) {
 }
 
 TEST(TrajectoryGenerator, RejectsWhatComesWhileItDoesNotKnowWhereTheJointsAre) {
-    constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
     for (const std::string port : {"idle", "halt"}) {
         Bench bench("TrajectoryGenerator", Generator::withDefaults(1, {}));
         bench.write("measured", jointState({port == "idle" ? 0.0 : kNaN}));
@@ -387,7 +383,7 @@ TEST(TrajectoryGenerator, FollowsLinearCubicAndQuinticSegments) {
                               pointAt(1.0, {1.0}, each.velocities, each.accelerations),
                               pointAt(2.0, {0.0}, each.velocities, each.accelerations)});
         for (int i = 0; i <= 2000; ++i) {
-            const double x = i <= 1000 ? i * kPeriod : 2.0 - i * kPeriod;
+            const double x = i <= 1000 ? i * kStep : 2.0 - i * kStep;
             ASSERT_NEAR(generator.next().position[0], each.position(x), kRounding) << i;
             ASSERT_EQ(generator.done(), i == 2000);
             ASSERT_NEAR(generator.progress(), i / 2000.0, kRounding);
@@ -401,7 +397,7 @@ TEST(TrajectoryGenerator, BeginsATrajectoryAtItsStamp) {
     Generator generator({0.0, 1.0});
     generator.trajectory({pointAt(0.1, {0.1, 1.1})}, 0.05);
     for (int i = 0; i <= 200; ++i) {
-        const double moved = std::clamp((i - 50) * kPeriod, 0.0, 0.1);
+        const double moved = std::clamp((i - 50) * kStep, 0.0, 0.1);
         const Vector position = generator.next().position;
         ASSERT_NEAR(position[0], moved, kRounding);
         ASSERT_NEAR(position[1], 1.0 + moved, kRounding);
@@ -452,7 +448,7 @@ TEST(TrajectoryGenerator, FollowsActionChunksOfAPolicy) {
     };
     Generator generator({0.0, 1.0}, {{"velocity", std::string("10")}});
     for (int cycle = 0; cycle < 4000; ++cycle) {
-        const double now = cycle * kPeriod;
+        const double now = cycle * kStep;
         if (cycle % 20 == 0 && cycle < 3900) {
             std::vector<trajectory_msgs::JointTrajectoryPoint> chunk;
             for (int k = 0; k < 10; ++k) {
@@ -504,7 +500,6 @@ TEST(TrajectoryGenerator, JoinsATrajectoryToATargetMotionAndBack) {
 }
 
 TEST(TrajectoryGenerator, RejectsTrajectoriesAndMovesOn) {
-    const double nan = std::numeric_limits<double>::quiet_NaN();
     Generator generator({0.0}, {{"upper", std::string("5")}});
     std::uint32_t count = 0;
     std::vector<std::vector<trajectory_msgs::JointTrajectoryPoint>> bad{
@@ -513,9 +508,9 @@ TEST(TrajectoryGenerator, RejectsTrajectoriesAndMovesOn) {
         {pointAt(1.0, {2.1})},                       // velocity of the way there
         {pointAt(1.0, {1.0}), pointAt(1.1, {1.3})},  // velocity of a segment
         {pointAt(1.0, {1.0}, {-2.1})},               // velocity of the point
-        {pointAt(1.0, {nan})},
-        {pointAt(1.0, {0.0}, {nan})},
-        {pointAt(1.0, {0.0}, {0.0}, {nan})},
+        {pointAt(1.0, {kNaN})},
+        {pointAt(1.0, {0.0}, {kNaN})},
+        {pointAt(1.0, {0.0}, {0.0}, {kNaN})},
         {pointAt(1.0, {0.0, 0.0})},  // sizes
         {pointAt(1.0, {0.0}, {0.0, 0.0})},
         {pointAt(1.0, {})},
@@ -571,7 +566,7 @@ TEST(TrajectoryGenerator, StopsOnAnEmptyTrajectory) {
     generator.target({10.0});
     generator.bench.cycle(1500);
     generator.trajectory({});
-    EXPECT_EQ(generator.finish(), static_cast<int>(std::ceil(kStopDuration / kPeriod - 1e-6)));
+    EXPECT_EQ(generator.finish(), static_cast<int>(std::ceil(kStopDuration / kStep - 1e-6)));
     EXPECT_EQ(generator.rejected(), 0U);
 }
 
@@ -775,10 +770,10 @@ TEST(TrajectoryGenerator, EveryStopStaysWithinTheLimitsOfVelocityAndPosition) {
             } else {
                 generator.trajectory({});
             }
-            const int most = static_cast<int>((4.0 * v / a + 8.0 * a / j) / kPeriod) + 100;
+            const int most = static_cast<int>((4.0 * v / a + 8.0 * a / j) / kStep) + 100;
             const int cycles = run(most);
             ASSERT_TRUE(generator.done()) << "stop " << done << " runs away";
-            longest = std::max(longest, cycles * kPeriod / (v / a + a / j));
+            longest = std::max(longest, cycles * kStep / (v / a + a / j));
             if (halts) generator.bench.write("halt", false);
             ++done;
             ASSERT_LE(over_velocity, 1e-8) << "before stop " << done;
