@@ -55,7 +55,7 @@ struct Section {
 };
 
 // V = U / (1 + damping S + S^2), of the input U of a section, and its derivatives S V and S^2 V.
-struct Motion {
+struct SectionMotion {
     double value = 0.0;
     double rate = 0.0;
     double acceleration = 0.0;
@@ -208,7 +208,7 @@ class ChainReader {
 // transform, the trapezoidal rule, integrates. It does not depend on the period, so that it stays
 // valid when the period changes.
 class Biquads final : public rtcf::Component {
-    using Motions = std::array<Motion, kMostSections>;
+    using Motions = std::array<SectionMotion, kMostSections>;
 
     // Smaller values are set to 0: numbers below 1e-308 would slow down the cycle.
     static constexpr double kSmallest = 1e-200;
@@ -343,7 +343,7 @@ class Biquads final : public rtcf::Component {
     double filter(double x, Motions& motions) const {
         for (std::size_t i = 0; i < count_; ++i) {
             const Section& c = design_.value()[i];
-            Motion& m = motions[i];
+            SectionMotion& m = motions[i];
             const double value = m.value + c.k * m.rate;
             if (c.second_order) {
                 const double rate = m.rate + c.k * m.acceleration;

@@ -16,14 +16,14 @@ constexpr double kMostSteps = 1000.0;
 constexpr double kStepByRate = 0.25;
 
 // Motion of the motor and its load, and the current: rad, rad/s, A. Also their rates of change.
-struct Motion {
+struct MotorMotion {
     double angle = 0.0;
     double speed = 0.0;
     double load_angle = 0.0;
     double load_speed = 0.0;
     double current = 0.0;
 
-    Motion plus(double step, const Motion& rate) const noexcept {
+    MotorMotion plus(double step, const MotorMotion& rate) const noexcept {
         return {angle + step * rate.angle, speed + step * rate.speed,
                 load_angle + step * rate.load_angle, load_speed + step * rate.load_speed,
                 current + step * rate.current};
@@ -215,7 +215,7 @@ class Motor final : public rtcf::Component {
         const double wanted = command.read() != rtcf::DataStatus::None ? command.value() : 0.0;
         const double load =
             load_torque.read() != rtcf::DataStatus::None ? load_torque.value() : 0.0;
-        Motion motion{angle_, speed_, load_angle_, load_speed_, current_};
+        MotorMotion motion{angle_, speed_, load_angle_, load_speed_, current_};
         // As one inertia, also if the shaft was elastic before.
         if (stiffness == 0.0) motion.load_speed = motion.speed;
         const double span = std::min(dt(), kMostSteps * step);
@@ -246,7 +246,7 @@ class Motor final : public rtcf::Component {
     }
 
     // Torque of the motor within its limit, N m.
-    double torqueOf(const Motion& motion, double wanted) const noexcept {
+    double torqueOf(const MotorMotion& motion, double wanted) const noexcept {
         double free = wanted;
         if (drive == MotorCommand::Voltage)
             free = torque_constant * (inductance > 0.0
@@ -256,21 +256,21 @@ class Motor final : public rtcf::Component {
     }
 
     // Torque of an elastic shaft against the rotor, N m.
-    double shaftTorque(const Motion& motion) const noexcept {
+    double shaftTorque(const MotorMotion& motion) const noexcept {
         return stiffness * (motion.angle - motion.load_angle) +
                damping * (motion.speed - motion.load_speed);
     }
 
     // Torque on the rotor without its friction, N m.
-    double applied(const Motion& motion, double wanted, double load) const noexcept {
+    double applied(const MotorMotion& motion, double wanted, double load) const noexcept {
         return torqueOf(motion, wanted) - (stiffness > 0.0 ? shaftTorque(motion) : load);
     }
 
     // Rates of change. `direction` is that of the dry friction, 0 = the rotor sticks.
-    Motion rates(const Motion& motion, double direction, double wanted,
-                 double load) const noexcept {
+    MotorMotion rates(const MotorMotion& motion, double direction, double wanted,
+                      double load) const noexcept {
         const bool rigid = stiffness == 0.0;
-        Motion rate;
+        MotorMotion rate;
         if (direction != 0.0) {
             const double ratio = motion.speed / stribeck_velocity;
             const double dry =
@@ -295,13 +295,13 @@ class Motor final : public rtcf::Component {
     }
 
     // One step of the Runge-Kutta method of order 4.
-    Motion moved(const Motion& from, double direction, double time, double wanted,
-                 double load) const noexcept {
-        const Motion a = rates(from, direction, wanted, load);
-        const Motion b = rates(from.plus(time / 2.0, a), direction, wanted, load);
-        const Motion c = rates(from.plus(time / 2.0, b), direction, wanted, load);
-        const Motion d = rates(from.plus(time, c), direction, wanted, load);
-        Motion to =
+    MotorMotion moved(const MotorMotion& from, double direction, double time, double wanted,
+                      double load) const noexcept {
+        const MotorMotion a = rates(from, direction, wanted, load);
+        const MotorMotion b = rates(from.plus(time / 2.0, a), direction, wanted, load);
+        const MotorMotion c = rates(from.plus(time / 2.0, b), direction, wanted, load);
+        const MotorMotion d = rates(from.plus(time, c), direction, wanted, load);
+        MotorMotion to =
             from.plus(time / 6.0, a).plus(time / 3.0, b).plus(time / 3.0, c).plus(time / 6.0, d);
         const double most = torque_limit / torque_constant;
         to.current = std::clamp(to.current, -most, most);
@@ -310,7 +310,7 @@ class Motor final : public rtcf::Component {
 
     // Direction of the dry friction: that of the motion, or of the torque that starts it; 0 = the
     // torque does not start the rotor.
-    double directionOf(const Motion& motion, double wanted, double load) const noexcept {
+    double directionOf(const MotorMotion& motion, double wanted, double load) const noexcept {
         if (motion.speed != 0.0) return std::copysign(1.0, motion.speed);
         const double torque_now = applied(motion, wanted, load);
         const bool sticks =
@@ -318,18 +318,19 @@ class Motor final : public rtcf::Component {
         return sticks ? 0.0 : std::copysign(1.0, torque_now);
     }
 
-    Motion advanced(const Motion& from, double time, double wanted, double load) const noexcept {
+    MotorMotion advanced(const MotorMotion& from, double time, double wanted,
+                         double load) const noexcept {
         if (coulomb == 0.0 && static_friction == 0.0) return moved(from, 1.0, time, wanted, load);
         const double direction = directionOf(from, wanted, load);
-        const Motion to = moved(from, direction, time, wanted, load);
+        const MotorMotion to = moved(from, direction, time, wanted, load);
         if (direction * to.speed >= 0.0) return to;
         // The rotor has come to rest within the step, and stays, or begins to move from there.
         const double share = from.speed != 0.0 ? from.speed / (from.speed - to.speed) : 0.0;
-        Motion rest = moved(from, direction, share * time, wanted, load);
+        MotorMotion rest = moved(from, direction, share * time, wanted, load);
         rest.speed = 0.0;
         if (stiffness == 0.0) rest.load_speed = 0.0;
         const double next = directionOf(rest, wanted, load);
-        Motion end = moved(rest, next, (1.0 - share) * time, wanted, load);
+        MotorMotion end = moved(rest, next, (1.0 - share) * time, wanted, load);
         if (next * end.speed < 0.0) {
             end.speed = 0.0;
             if (stiffness == 0.0) end.load_speed = 0.0;

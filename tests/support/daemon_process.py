@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import rtcf
+from warm_start import WARM, WarmProcess
 
 BUILD_TREE = Path(str(rtcf.__file__)).parents[2]
 # Starts a program that ends by Ctrl-C, also where tests run in the background or under nohup, which
@@ -101,7 +102,7 @@ class Daemon:
         self._arguments = arguments
         self._wrapper = wrapper
         self._environment = {"ROS_HOSTNAME": "localhost"} | dict(environment or {})
-        self._process: subprocess.Popen[bytes] | None = None
+        self._process: subprocess.Popen[bytes] | WarmProcess | None = None
 
     def start(self) -> None:
         """Start it and wait until it is ready."""
@@ -109,19 +110,25 @@ class Daemon:
         settings.write_text(self._settings)
         with self.log_file.open("ab") as log:
             begin = log.tell()
+            words = [
+                "--foreground",
+                *("--socket", str(self.socket), "--config", str(settings)),
+                *("--state-dir", str(self.folder / "state")),
+                *self._arguments,
+            ]
+            environment = clean_environment() | self._environment
             # In its own session, like a terminal's foreground job in its process group.
-            self._process = subprocess.Popen(
-                [
-                    *self._wrapper,
-                    *(str(BUILD_TREE / "bin" / "rtcfd"), "--foreground"),
-                    *("--socket", str(self.socket), "--config", str(settings)),
-                    *("--state-dir", str(self.folder / "state")),
-                    *self._arguments,
-                ],
-                env=clean_environment() | self._environment,
-                stderr=log,
-                start_new_session=True,
-            )
+            if self._wrapper:
+                self._process = subprocess.Popen(
+                    [*self._wrapper, str(BUILD_TREE / "bin" / "rtcfd"), *words],
+                    env=environment,
+                    stderr=log,
+                    start_new_session=True,
+                )
+            else:
+                self._process = WARM.start(
+                    "rtcfd", words, environment, 1, log.fileno(), session=True
+                )
         self.pid = self._process.pid
 
         def ready() -> bool:
@@ -132,7 +139,7 @@ class Daemon:
 
     def ctl(self, *arguments: str) -> subprocess.CompletedProcess[str]:
         """Run rtcfctl."""
-        return self.run("rtcfctl", *arguments)
+        return WARM.run("rtcfctl", arguments, self.environment(), DEADLINE_S)
 
     def run(self, *command: str) -> subprocess.CompletedProcess[str]:
         """Run a command with rtcfctl on its PATH, connected to this daemon."""

@@ -11,6 +11,7 @@ from typing import Any
 
 import rtcf
 from daemon_process import BUILD_TREE, DEADLINE_S, MINDS_CTRL_C, wait_for
+from warm_start import WARM, WarmProcess
 
 
 class DaemonUnderTest:
@@ -23,7 +24,7 @@ class DaemonUnderTest:
         self.packages = folder / "lib"
         self.log_file = folder / "log"
         self.executor = folder / "executor"
-        self.process: subprocess.Popen[bytes] | None = None
+        self.process: WarmProcess | None = None
         self.environment: dict[str, str] = {}
         self.settings = folder / "rtcfd.toml"
         self.graphs = folder / "graphs.d"
@@ -58,17 +59,14 @@ class DaemonUnderTest:
         """Start rtcfd and wait until it is ready."""
         with self.log_file.open("ab") as log:
             begin = len(self.log())
-            self.process = subprocess.Popen(
-                [
-                    str(BUILD_TREE / "bin" / "rtcfd"),
-                    *(["--foreground"] if foreground else []),
-                    *("--socket", str(self.socket), "--state-dir", str(self.state)),
-                    *("--path", str(self.packages), "--executor", str(self.executor)),
-                    *options,
-                ],
-                stderr=log,
-                env=os.environ | self.environment,
-            )
+            words = [
+                *(["--foreground"] if foreground else []),
+                *("--socket", str(self.socket), "--state-dir", str(self.state)),
+                *("--path", str(self.packages), "--executor", str(self.executor)),
+                *options,
+            ]
+            environment = os.environ | self.environment
+            self.process = WARM.start("rtcfd", words, environment, 1, log.fileno())
         wait_for(lambda: "ready;" in self.log()[begin:] or self.process_ended(), "rtcfd")
         return self
 
@@ -83,9 +81,12 @@ class DaemonUnderTest:
 
     def ctl(self, *arguments: str, wrapper: Sequence[str] = ()) -> subprocess.CompletedProcess[str]:
         """Run rtcfctl; `wrapper` is a command that runs it."""
+        environment = {**os.environ, "RTCF_SOCKET": str(self.socket)}
+        if not wrapper:
+            return WARM.run("rtcfctl", arguments, environment, DEADLINE_S)
         return subprocess.run(
             [*wrapper, str(BUILD_TREE / "bin" / "rtcfctl"), *arguments],
-            env={**os.environ, "RTCF_SOCKET": str(self.socket)},
+            env=environment,
             capture_output=True,
             text=True,
             timeout=DEADLINE_S,

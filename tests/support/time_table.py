@@ -8,6 +8,14 @@ import os
 import time
 from pathlib import Path
 
+_of_others_s = 0.0
+
+
+def count(processor_s: float) -> None:
+    """Count the processor time of a process that is no child of this one for the running test."""
+    global _of_others_s
+    _of_others_s += processor_s
+
 
 class TimeTable:
     """Writes a line per test; several processes may write the same file."""
@@ -30,4 +38,4 @@ class TimeTable:
 
 def _processor_s() -> float:
     now = os.times()
-    return now.user + now.system + now.children_user + now.children_system
+    return now.user + now.system + now.children_user + now.children_system + _of_others_s

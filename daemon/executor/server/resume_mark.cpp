@@ -17,7 +17,7 @@ namespace rtcf::executor {
 
 namespace {
 
-constexpr std::chrono::milliseconds kPatience{300};  // longest wait for the disk in the destructor
+constexpr std::chrono::milliseconds kLongestWait{300};  // for the disk in the destructor
 
 // Removes the file; works on a full disk, too.
 // @return the error; empty = none
@@ -87,7 +87,8 @@ ResumeMark::ResumeMark(std::string path) {
 ResumeMark::~ResumeMark() {
     if (!shared_) return;
     std::unique_lock<std::mutex> lock(shared_->mutex);
-    shared_->removed.wait_for(lock, kPatience, [this] { return shared_->asked == shared_->done; });
+    shared_->removed.wait_for(lock, kLongestWait,
+                              [this] { return shared_->asked == shared_->done; });
     shared_->ending = true;
     shared_->wake.notify_one();
 }

@@ -77,7 +77,7 @@ v1::Response lostRecords(std::uint64_t count) {
 // knows, see link.py of rtcfd. Hello, stop and exit never change.
 constexpr std::uint32_t kProtocol = 4;
 constexpr std::int64_t kHookTimeout = 10 * kSecond;
-constexpr std::int64_t kProbeTimeout = kSecond / 2;
+constexpr std::int64_t kProbeDeadline = kSecond / 2;
 
 }  // namespace
 
@@ -593,7 +593,7 @@ void Server::submitProbe(std::uint64_t connection, const v1::Request& request) {
     response.set_id(id);
     *response.mutable_component() =
         componentTo(*graph, static_cast<std::size_t>(found - graph->components.begin()), state);
-    waiting_[{connection, id}] = {monotonicNow() + kProbeTimeout, [response] { return response; },
+    waiting_[{connection, id}] = {monotonicNow() + kProbeDeadline, [response] { return response; },
                                   nullptr};
     runner_->post([this, connection, name, response]() mutable {
         try {
