@@ -118,18 +118,17 @@ class Daemon:
             ]
             environment = clean_environment() | self._environment
             # In its own session, like a terminal's foreground job in its process group.
+            process: subprocess.Popen[bytes] | WarmProcess
             if self._wrapper:
-                self._process = subprocess.Popen(
+                process = subprocess.Popen(
                     [*self._wrapper, str(BUILD_TREE / "bin" / "rtcfd"), *words],
                     env=environment,
                     stderr=log,
                     start_new_session=True,
                 )
             else:
-                self._process = WARM.start(
-                    "rtcfd", words, environment, 1, log.fileno(), session=True
-                )
-        self.pid = self._process.pid
+                process = WARM.start("rtcfd", words, environment, 1, log.fileno(), session=True)
+        self._process, self.pid = process, process.pid
 
         def ready() -> bool:
             assert not self.ended, self.log()
