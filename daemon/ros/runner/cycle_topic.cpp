@@ -16,7 +16,7 @@ namespace rtcf::ros1 {
 
 namespace {
 
-constexpr std::uint32_t kQueue = 20000;  // messages kept for a slow subscriber: at least 0.4 s
+constexpr std::uint32_t kCyclesKept = 20000;  // messages kept for a slow subscriber: at least 0.4 s
 
 ros::Time timeOf(std::int64_t ns) {
     return ros::Time().fromNSec(static_cast<std::uint64_t>(std::max<std::int64_t>(ns, 0)));
@@ -50,9 +50,9 @@ CycleTopic::~CycleTopic() {
 
 void CycleTopic::open(ros::NodeHandle& handle, const std::string& name_space) {
     ros::Publisher cycles =
-        handle.advertise<rtcf_msgs::Cycle>(executor::joinName(name_space, "cycles"), kQueue);
+        handle.advertise<rtcf_msgs::Cycle>(executor::joinName(name_space, "cycles"), kCyclesKept);
     ros::Publisher iteration_info = handle.advertise<rtcf_msgs::IterationInfo>(
-        executor::joinName(name_space, "iteration_info"), kQueue);
+        executor::joinName(name_space, "iteration_info"), kCyclesKept);
     const std::lock_guard lock(mutex_);
     cycles_ = cycles;
     iteration_info_ = iteration_info;

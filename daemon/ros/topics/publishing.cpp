@@ -14,7 +14,7 @@ namespace rtcf::ros1 {
 namespace {
 
 // Most messages per tap and turn, so that a fast tap does not starve others.
-constexpr int kMost = 1000;
+constexpr int kMostAtOnce = 1000;
 
 }  // namespace
 
@@ -191,7 +191,7 @@ void Publishing::leave(const std::vector<Stream>& streams, const std::vector<Str
     for (const Stream& stream : next) staying.insert(stream.tap.get());
     for (const Stream& stream : streams) {
         const bool stays = staying.count(stream.tap.get()) != 0;
-        drain(stream, stays ? kMost : std::numeric_limits<int>::max());
+        drain(stream, stays ? kMostAtOnce : std::numeric_limits<int>::max());
     }
 }
 
@@ -231,7 +231,7 @@ void Publishing::run() {
                 changed_.notify_all();
             }
         }
-        for (const Stream& stream : serving) drain(stream, kMost);
+        for (const Stream& stream : serving) drain(stream, kMostAtOnce);
         makeRoom();
         std::this_thread::sleep_for(kPeriod);
     }
