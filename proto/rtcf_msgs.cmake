@@ -5,13 +5,15 @@ set(package ${CMAKE_CURRENT_SOURCE_DIR}/rtcf_msgs)
 set(build ${CMAKE_CURRENT_BINARY_DIR}/rtcf_msgs)
 set(stage ${CMAKE_CURRENT_BINARY_DIR}/rtcf_msgs-stage)
 set(staged ${stage}${CMAKE_INSTALL_PREFIX})
+# A path without the prefix: the compiler cache serves builds for any.
+set(include ${CMAKE_CURRENT_BINARY_DIR}/rtcf_msgs-include)
 set(python_modules lib/python3/dist-packages)
 
 file(GLOB definitions CONFIGURE_DEPENDS ${package}/msg/*.msg ${package}/srv/*.srv)
 set(headers)
 foreach(definition IN LISTS definitions)
   cmake_path(GET definition STEM name)
-  list(APPEND headers ${staged}/include/rtcf_msgs/${name}.h)
+  list(APPEND headers ${include}/rtcf_msgs/${name}.h)
 endforeach()
 
 set(stamp ${CMAKE_CURRENT_BINARY_DIR}/rtcf_msgs.stamp)
@@ -35,8 +37,9 @@ add_custom_command(
 add_custom_target(rtcf_msgs_build ALL DEPENDS ${stamp})
 
 file(MAKE_DIRECTORY ${staged}/include)
+file(CREATE_LINK ${staged}/include ${include} SYMBOLIC)
 add_library(rtcf_msgs INTERFACE)
-target_include_directories(rtcf_msgs SYSTEM INTERFACE ${staged}/include)
+target_include_directories(rtcf_msgs SYSTEM INTERFACE ${include})
 add_dependencies(rtcf_msgs rtcf_msgs_build)
 
 install(DIRECTORY ${staged}/include/rtcf_msgs DESTINATION include COMPONENT ros-rtcf)
