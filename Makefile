@@ -4,6 +4,7 @@
 BUILD := build
 # SYMBOLS=ON: gdb shows variables, too.
 SYMBOLS := OFF
+configure = tools/configure $(BUILD) -DRTCF_SYMBOLS=$(SYMBOLS)
 # Compilers are called by way of ccache where it is installed.
 export CMAKE_CXX_COMPILER_LAUNCHER = $(shell command -v ccache)
 # One cache for this tree and the packages, which are built in another folder and locale.
@@ -34,17 +35,17 @@ dependencies-%:
 	@tools/install-dependencies build run $*
 
 build:
-	@tools/configure $(BUILD) -DRTCF_SYMBOLS=$(SYMBOLS)
+	@$(configure)
 	@cmake --build $(BUILD)
 
 demo: dependencies ## run Fig. 1 of the paper at 2 kHz for 10 s, with ROS nodes talking to it
-	@tools/configure $(BUILD) -DRTCF_SYMBOLS=$(SYMBOLS)
+	@$(configure)
 	@echo "building what the demo needs: some minutes the first time"
 	@cmake --build $(BUILD) --target rtcf_demo
 	@components/rtcf_examples/demo/demo
 
 robot: dependencies ## run a simulated arm until Ctrl-C, and show it in the browser
-	@tools/configure $(BUILD) -DRTCF_SYMBOLS=$(SYMBOLS)
+	@$(configure)
 	@echo "building the arm and its controllers: some minutes the first time"
 	@cmake --build $(BUILD) --target rtcf_robot
 	@components/rtcf_arm/show

@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import rtcf
-from warm_start import WARM, WarmProcess
+from warm_start import WarmProcess, WarmStart
 
 BUILD_TREE = Path(str(rtcf.__file__)).parents[2]
+WARM = WarmStart(BUILD_TREE)
 # Starts a program that ends by Ctrl-C, also where tests run in the background or under nohup, which
 # ignore it. Not preexec_fn: a fork beside an open client hangs on Debian 13.
 MINDS_CTRL_C = ("env", "--default-signal=INT,HUP")

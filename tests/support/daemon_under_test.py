@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import rtcf
-from daemon_process import BUILD_TREE, DEADLINE_S, MINDS_CTRL_C, wait_for
-from warm_start import WARM, WarmProcess
+from daemon_process import BUILD_TREE, DEADLINE_S, MINDS_CTRL_C, WARM, wait_for
+from warm_start import WarmProcess
 
 
 class DaemonUnderTest:

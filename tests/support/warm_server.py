@@ -3,7 +3,6 @@
 warm_server.py PROGRAM BUILD_TREE SOCKET
 """
 
-import array
 import gc
 import importlib
 import json
@@ -48,44 +47,56 @@ def _become(program: str, build: Path, request: dict[str, Any], descriptors: Seq
     sys.exit(status)
 
 
-def _serve(program: str, build: Path, requests: socket.socket) -> None:
-    """Fork the program for each request, until the other side ends."""
-    selector = selectors.DefaultSelector()
-    selector.register(requests, selectors.EVENT_READ)
-    running: dict[int, tuple[int, socket.socket]] = {}  # by pidfd
-    while True:
-        for key, _ in selector.select():
-            if key.fileobj is not requests:
-                descriptor = key.fd
-                pid, answers = running.pop(descriptor)
-                selector.unregister(descriptor)
+class _Server:
+    """Forks the program for each request, and answers with its process id and later its status."""
+
+    def __init__(self, program: str, build: Path, requests: socket.socket) -> None:
+        self._program = program
+        self._build = build
+        self._requests = requests
+        self._selector = selectors.DefaultSelector()
+        self._running: dict[int, tuple[int, socket.socket]] = {}  # by pidfd
+
+    def serve(self) -> None:
+        """Serve until the other side ends."""
+        self._selector.register(self._requests, selectors.EVENT_READ)
+        while True:
+            for key, _ in self._selector.select():
+                if key.fileobj is not self._requests:
+                    self._report(key.fd)
+                    continue
+                text, descriptors, _, _ = socket.recv_fds(self._requests, _LARGEST, _DESCRIPTORS)
+                if not text:
+                    return
+                self._fork(json.loads(text), descriptors)
+
+    def _fork(self, request: dict[str, Any], descriptors: Sequence[int]) -> None:
+        pid = os.fork()
+        if pid == 0:
+            self._requests.close()
+            self._selector.close()
+            for descriptor, (_, answers) in self._running.items():
                 os.close(descriptor)
-                _, status, used = os.wait4(pid, 0)
-                answer = f"{os.waitstatus_to_exitcode(status)} {used.ru_utime + used.ru_stime:.3f}"
-                with answers, suppress(OSError):  # nobody may wait for it
-                    answers.send(answer.encode())
-                continue
-            space = socket.CMSG_SPACE(_DESCRIPTORS * 4)
-            text, control, _, _ = requests.recvmsg(_LARGEST, space)
-            if not text:
-                return
-            descriptors = array.array("i", control[0][2])
-            pid = os.fork()
-            if pid == 0:
-                requests.close()
-                selector.close()
-                for descriptor, (_, answers) in running.items():
-                    os.close(descriptor)
-                    answers.close()
-                running.clear()
-                _become(program, build, json.loads(text), descriptors)
-            os.close(descriptors[0])
-            os.close(descriptors[1])
-            answers = socket.socket(fileno=descriptors[2])
-            answers.send(str(pid).encode())
-            descriptor = os.pidfd_open(pid)
-            running[descriptor] = (pid, answers)
-            selector.register(descriptor, selectors.EVENT_READ)
+                answers.close()
+            _become(self._program, self._build, request, descriptors)
+        out, err, answering = descriptors
+        os.close(out)
+        os.close(err)
+        answers = socket.socket(fileno=answering)
+        answers.send(str(pid).encode())
+        descriptor = os.pidfd_open(pid)
+        self._running[descriptor] = (pid, answers)
+        self._selector.register(descriptor, selectors.EVENT_READ)
+
+    def _report(self, descriptor: int) -> None:
+        """Answer with the status of a program that has ended, and its processor time."""
+        pid, answers = self._running.pop(descriptor)
+        self._selector.unregister(descriptor)
+        os.close(descriptor)
+        _, status, used = os.wait4(pid, 0)
+        answer = f"{os.waitstatus_to_exitcode(status)} {used.ru_utime + used.ru_stime:.3f}"
+        with answers, suppress(OSError):  # nobody may wait for it
+            answers.send(answer.encode())
 
 
 def _main() -> None:
@@ -99,7 +110,7 @@ def _main() -> None:
     for module in _IMPORTS[program]:
         importlib.import_module(module)
     gc.freeze()  # the programs then share these modules' memory, also when they end
-    _serve(program, build, requests)
+    _Server(program, build, requests).serve()
 
 
 if __name__ == "__main__":

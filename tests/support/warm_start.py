@@ -1,19 +1,17 @@
 """rtcfctl and rtcfd from a process that has imported them: half of their processor time is imports.
 
-    WARM.start("rtcfctl", ["status"], environment, out, err).wait()
+    WarmStart(build_tree).start("rtcfctl", ["status"], environment, out, err).wait()
 
 Each program is forked from a process of its own, which this process starts at the first call, and
 which ends with it. It behaves as the one in build/bin except for its command line in /proc. Tests
 of the start itself call that one.
 """
 
-import array
 import json
 import os
 import signal
 import socket
 import subprocess
-import sys
 import threading
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -70,11 +68,12 @@ class WarmProcess:
 
 
 class WarmStart:
-    """The processes of this one that fork programs, one per program."""
+    """The processes of this one that fork programs, one per program and locale."""
 
-    def __init__(self) -> None:
+    def __init__(self, build_tree: Path) -> None:
+        self._build_tree = build_tree
         self._lock = threading.Lock()
-        self._servers: dict[tuple[str, str, tuple[tuple[str, str], ...]], socket.socket] = {}
+        self._servers: dict[tuple[str, tuple[tuple[str, str], ...]], socket.socket] = {}
 
     def start(
         self,
@@ -94,12 +93,9 @@ class WarmStart:
             "folder": os.getcwd(),
             "session": session,
         }
-        descriptors = array.array("i", [out, err, its.fileno()])
         with self._lock, its:
-            self._server(program, environment).sendmsg(
-                [json.dumps(request).encode()],
-                [(socket.SOL_SOCKET, socket.SCM_RIGHTS, descriptors)],
-            )
+            server = self._server(program, environment)
+            socket.send_fds(server, [json.dumps(request).encode()], [out, err, its.fileno()])
         return WarmProcess(mine)
 
     def run(
@@ -111,7 +107,7 @@ class WarmStart:
             try:
                 status = process.wait(timeout)
             except subprocess.TimeoutExpired:
-                process.send_signal(signal.SIGKILL)
+                process.kill()
                 process.wait()
                 raise
             for each in (out, err):
@@ -119,14 +115,14 @@ class WarmStart:
             return subprocess.CompletedProcess([program, *words], status, out.read(), err.read())
 
     def _server(self, program: str, environment: Mapping[str, str]) -> socket.socket:
-        build = Path(sys.modules["rtcf"].__file__ or "").parents[2]
-        special = {name: value for name, value in environment.items() if name.startswith(_LOCALE)}
-        key = (program, str(build), tuple(sorted(special.items())))
+        locale = sorted(each for each in environment.items() if each[0].startswith(_LOCALE))
+        key = (program, tuple(locale))
         if key not in self._servers:
             mine, its = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
             with its:
+                arguments = [program, str(self._build_tree), str(its.fileno())]
                 subprocess.Popen(
-                    ["/usr/bin/python3", "-I", _SERVER, program, build, str(its.fileno())],
+                    ["/usr/bin/python3", "-I", str(_SERVER), *arguments],
                     env=dict(environment),
                     pass_fds=[its.fileno()],
                     stdin=subprocess.DEVNULL,
@@ -134,6 +130,3 @@ class WarmStart:
                 )
             self._servers[key] = mine
         return self._servers[key]
-
-
-WARM = WarmStart()
