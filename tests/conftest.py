@@ -6,6 +6,7 @@ in build/test/counterexamples: tests/run does not repeat it, since other draws m
 The times of all tests are in build/test/times.tsv.
 """
 
+import gc
 import os
 from pathlib import Path
 
@@ -32,6 +33,8 @@ _RANDOM_S = float(os.environ.get("RTCF_RANDOM_S", "60"))
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    # As in rtcf-compile, which many tests run in this process.
+    gc.set_threshold(100_000, 20, 20)
     config.pluginmanager.register(RandomShares(_RANDOM_S))
     # Not in the process that starts those of pytest-xdist.
     if hasattr(config, "workerinput") or not config.getoption("numprocesses", None):

@@ -37,7 +37,12 @@ std::size_t shortestForm(std::uint32_t number) {
 
 TEST(Utf8, EachCharacterIsValidInItsShortestFormOnly) {
     constexpr std::uint32_t kEnd = 0x200000;  // beyond the last number of 4 bytes
-    for (std::uint32_t number = 0; number < kEnd; ++number) {
+#ifdef RTCF_SANITIZED
+    constexpr std::uint32_t kStep = 17;
+#else
+    constexpr std::uint32_t kStep = 1;
+#endif
+    for (std::uint32_t number = 0; number < kEnd; number += kStep) {
         const bool surrogate = number >= 0xD800 && number <= 0xDFFF;
         const bool character = !surrogate && number <= 0x10FFFF;
         const std::size_t shortest = shortestForm(number);

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <random>
 
+#include "control/random_tasks.hpp"
+
 namespace rtcf::test {
 namespace {
 
@@ -94,7 +96,7 @@ TEST(PolynomialSegment, KnowsWhetherItStaysWithinLimits) {
         return std::uniform_real_distribution<double>(low, high)(random);
     };
     int within = 0;
-    for (int n = 0; n < 3000; ++n) {
+    for (int n = 0; n < kTasks; ++n) {
         const double duration = std::pow(10.0, between(-2.0, 1.0));
         const auto motion = [&] {
             return Motion{between(-1.0, 1.0), between(-2.0, 2.0) / duration,
@@ -120,7 +122,7 @@ TEST(PolynomialSegment, KnowsWhetherItStaysWithinLimits) {
         const PositionRange any{between(-1.5, 0.0), between(0.0, 1.5)};
         within += segment.staysWithin(any, between(0.0, 5.0) / duration) ? 1 : 0;
     }
-    EXPECT_GT(within, 100);
+    EXPECT_GT(within, kTasks / 30);
     EXPECT_TRUE(PolynomialSegment(kBegin, kEnd, PointKind::PositionVelocity, 0.0)
                     .staysWithin({kEnd.position, kEnd.position}, 0.0));
 }

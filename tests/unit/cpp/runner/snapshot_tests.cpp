@@ -18,7 +18,11 @@ using executor::Snapshot;
 using executor::snapshotFromFile;
 using executor::snapshotToFile;
 
-constexpr std::uint64_t kMany = 10'000;  // cycles
+#ifdef RTCF_SANITIZED
+constexpr std::uint64_t kMany = 1'000;  // cycles
+#else
+constexpr std::uint64_t kMany = 10'000;
+#endif
 
 class Snapshots : public RunnerFixture {
    protected:
