@@ -108,7 +108,8 @@ def drawn(
             before = values[0] if last is None else last
             field.column(x, min(*values, before), max(*values, before), owner)
             last = values[-1]
-    labels = {0: f"{high:.2f}", height - 1: f"{low:.2f}"}
+    # 0.0 is added because -0.001 is rounded to -0.0.
+    labels = {0: f"{round(high, 2) + 0.0:.2f}", height - 1: f"{round(low, 2) + 0.0:.2f}"}
     lines = [
         f"{labels.get(row, ''):>{label}} {''.join(text for text, _ in runs)}".rstrip()
         for row, runs in enumerate(field.lines())

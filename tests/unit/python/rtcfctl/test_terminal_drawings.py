@@ -4,7 +4,7 @@ import math
 
 from hypothesis import given
 from hypothesis import strategies as st
-from rtcfctl.terminal.drawings import Curves, spark
+from rtcfctl.terminal.drawings import Curves, drawn, spark
 
 
 def test_a_row_of_blocks_begins_at_zero() -> None:
@@ -20,6 +20,12 @@ def test_the_corners_of_a_plot_are_its_ends() -> None:
     curves.column(0, -1.0, -1.0, 0)
     curves.column(3, 1.0, 1.0, 1)
     assert curves.lines() == [[(" ", -1), ("\u2808", 1)], [("\u2840", 0), (" ", -1)]]
+
+
+def test_a_number_that_rounds_to_zero_has_no_sign() -> None:
+    _, *lines, _ = drawn("", [[-0.004, 1.0]], {})
+    assert lines[0].split()[0] == "1.00"
+    assert lines[-1].split()[0] == "0.00"
 
 
 def test_a_column_is_a_line_of_dots() -> None:
