@@ -40,7 +40,10 @@ def machine(bare: Machine) -> Machine:
     for deb in DEBS.glob("*.deb"):
         if "-dbgsym_" not in deb.name:
             bare.path(f"/debs/{deb.name}").write_bytes(deb.read_bytes())
-    bare.shell("apt-get install --yes --quiet /debs/*.deb >/var/log/rtcf-install.log 2>&1")
+    log = "/var/log/rtcf-install.log"
+    bare.shell(
+        f"apt-get install --yes --quiet /debs/*.deb >{log} 2>&1 || {{ tail --lines=20 {log}; exit 1; }}"
+    )
     for user in ("alice", "bob", "carol", "mallory"):
         bare.run("useradd", "--create-home", user)
     for user in ("alice", "bob", "carol"):
