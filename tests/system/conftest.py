@@ -41,9 +41,8 @@ def machine(bare: Machine) -> Machine:
         if "-dbgsym_" not in deb.name:
             bare.path(f"/debs/{deb.name}").write_bytes(deb.read_bytes())
     log = "/var/log/rtcf-install.log"
-    bare.shell(
-        f"apt-get install --yes --quiet /debs/*.deb >{log} 2>&1 || {{ tail --lines=20 {log}; exit 1; }}"
-    )
+    install = f"apt-get install --yes --quiet /debs/*.deb >{log} 2>&1"
+    bare.shell(f"{install} || {{ tail --lines=20 {log}; exit 1; }}")
     for user in ("alice", "bob", "carol", "mallory"):
         bare.run("useradd", "--create-home", user)
     for user in ("alice", "bob", "carol"):
