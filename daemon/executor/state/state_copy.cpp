@@ -36,9 +36,12 @@ void planHandOver(const Component& previous, const Component& successor,
             notes.push_back(fmt::format("state {} of {} is new: it begins at {}", state.name, name,
                                         state.print(state.initial.data())));
         } else if (before->identity != state.identity || before->size != state.size) {
-            notes.push_back(fmt::format("state {} of {} begins at {}: it was {} and is {}",
-                                        state.name, name, state.print(state.initial.data()),
-                                        before->type, state.type));
+            const std::string why =
+                before->type == state.type
+                    ? fmt::format("its type {} has changed", state.type)
+                    : fmt::format("it was {} and is {}", before->type, state.type);
+            notes.push_back(fmt::format("state {} of {} begins at {}: {}", state.name, name,
+                                        state.print(state.initial.data()), why));
         } else {
             copies.push_back({state.value, before->value, state.size});
         }

@@ -13,7 +13,8 @@
 ///
 /// Two states of equal identity and size have the same layout, byte for byte, even in libraries
 /// that were built at different times. The identity of a struct contains the names, types and
-/// offsets of its fields.
+/// offsets of its fields, that of an enum its enumerators from 0 to 31, if it names its underlying
+/// type or is an `enum class`.
 #pragma once
 
 #include <fmt/format.h>
@@ -60,6 +61,41 @@ constexpr std::string_view ownName() noexcept {
     text = text.substr(0, text.find_first_of(";]"));
     const std::size_t scope = text.rfind("::");
     return scope == std::string_view::npos ? text : text.substr(scope + 2);
+}
+
+/// True if an enum has an underlying type that its enumerators do not change: any number of that
+/// type is a value of the enum.
+template <typename E, typename = void>
+struct HasFixedType : std::false_type {};
+template <typename E>
+struct HasFixedType<E, std::void_t<decltype(E{0})>> : std::true_type {};
+
+/// The name of an enumerator; empty if no enumerator has this value.
+template <typename E, E Value>
+constexpr std::string_view enumerator() noexcept {
+    std::string_view text = __PRETTY_FUNCTION__;
+    text.remove_prefix(text.find("Value = ") + 8);
+    text = text.substr(0, text.find_first_of(";]"));
+    // `(scope::Mode)5`, but `scope::Mode::Run`.
+    const std::size_t cast = text.rfind(')');
+    if (cast != std::string_view::npos &&
+        text.find_first_not_of("-0123456789", cast + 1) == std::string_view::npos)
+        return {};
+    const std::size_t scope = text.rfind("::");
+    return scope == std::string_view::npos ? text : text.substr(scope + 2);
+}
+
+/// Enumerators of these values are part of an enum's identity.
+constexpr int kEnumerators = 32;
+
+template <typename E, int... Values>
+constexpr std::uint64_t enumeratorsHash(std::uint64_t hash,
+                                        std::integer_sequence<int, Values...> /*values*/) noexcept {
+    const auto add = [&hash](std::string_view name, std::uint64_t value) {
+        if (!name.empty()) hash = stateHash(value, stateHash(name, hash));
+    };
+    (add(enumerator<E, static_cast<E>(Values)>(), std::uint64_t{Values}), ...);
+    return hash;
 }
 
 template <typename T, typename = void>
@@ -133,7 +169,14 @@ template <typename T>
 struct StateType<T, std::enable_if_t<std::is_enum_v<T>>> {
     using Number = std::underlying_type_t<T>;
     static constexpr std::uint64_t identity() noexcept {
-        return detail::stateHash(detail::ownName<T>(), StateType<Number>::identity());
+        const std::uint64_t hash =
+            detail::stateHash(detail::ownName<T>(), StateType<Number>::identity());
+        if constexpr (detail::HasFixedType<T>::value) {
+            return detail::enumeratorsHash<T>(
+                hash, std::make_integer_sequence<int, detail::kEnumerators>());
+        } else {
+            return hash;
+        }
     }
     static std::string name() { return std::string(detail::ownName<T>()); }
     static void print(const T& value, std::string& text) {

@@ -132,6 +132,35 @@ TEST(State, TypesAndValuesHaveNames) {
     EXPECT_EQ(StateType<Eigen::Isometry3d>::name(), "transform");
 }
 
+namespace same {
+enum class Mode { Idle, Run };
+}
+namespace rebuilt {
+enum class Mode { Off, Idle, Run };
+}
+namespace renamed {
+enum class Mode { Idle, Go };
+}
+namespace longer {
+enum class Mode { Idle, Run, Fail };
+}
+namespace loose {
+enum Mode { Idle, Run };  // its values depend on its enumerators
+}
+namespace plain {
+enum Mode : int { Idle = 0, Run = 1, Other = 40 };
+}
+
+TEST(State, AnEnumIsIdentifiedByItsEnumerators) {
+    const std::uint64_t mode = StateType<Mode>::identity();
+    EXPECT_EQ(StateType<same::Mode>::identity(), mode);
+    EXPECT_EQ(StateType<plain::Mode>::identity(), mode) << "up to 31";
+    EXPECT_NE(StateType<rebuilt::Mode>::identity(), mode);
+    EXPECT_NE(StateType<renamed::Mode>::identity(), mode);
+    EXPECT_NE(StateType<longer::Mode>::identity(), mode);
+    EXPECT_NE(StateType<loose::Mode>::identity(), mode);
+}
+
 TEST(State, DuplicateOrTooLargeDeclarationIsRejected) {
     EXPECT_THROW(TwiceDeclared(), std::logic_error);
     EXPECT_THROW(TooLarge(), std::logic_error);
