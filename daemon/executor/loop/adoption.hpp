@@ -40,7 +40,13 @@ struct Rewire {
             input->disconnect();
             return;
         }
-        if (queue != nullptr && !continued && !arrived) queue->skip();
+        if (queue == nullptr) return;
+        if (continued) {
+            // A loop break that has ended was a value behind.
+            if (input->slot().stamp > input->seen()) queue->receive();
+        } else if (!arrived) {
+            queue->skip();
+        }
     }
 };
 

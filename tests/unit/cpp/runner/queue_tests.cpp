@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
 #include <cstring>
 #include <string>
 #include <vector>
@@ -98,6 +99,24 @@ TEST_F(Queues, ALoopBreakIsACycleLateAndLosesNothing) {
     load(early);
     step(5);
     EXPECT_EQ(value("/C", "order"), 123.0) << "the value of cycle 4 arrives in cycle 5";
+}
+
+TEST_F(Queues, TheEndOfALoopBreakLosesNothing) {
+    load(definition("Digits", "D"));
+    ComponentDefinition early = collector("out");
+    early.breaks = {"in"};
+    load(early);
+    step(5);
+    ASSERT_EQ(value("/C", "order"), 123.0);
+    for (const double order : {12345.0, 12345678.0}) {
+        setBreak("/C", "in", false);
+        step(1);
+        EXPECT_EQ(value("/C", "order"), order);
+        setBreak("/C", "in", true);
+        step(2);
+        EXPECT_EQ(value("/C", "order"), order * 10.0 + std::fmod(order, 10.0) + 1.0);
+    }
+    EXPECT_EQ(value("/C", "dropped"), 0.0);
 }
 
 TEST_F(Queues, ASuccessorGetsNoMessageTwice) {
