@@ -14,6 +14,7 @@
 #include "bridge/bridge.hpp"
 #include "check/undeclared_members.hpp"
 #include "common/error.hpp"
+#include "common/thrown.hpp"
 #include "faults/crash_handler.hpp"
 #include "faults/flight_recorder.hpp"
 #include "graph/definition.hpp"
@@ -145,7 +146,7 @@ int checkComponent(const CheckRequest& request) {
             run(request, runner, values);
             outcome.set_value({});
         } catch (const std::exception& error) {
-            outcome.set_value(error.what());
+            outcome.set_value(textOf(error));
         }
     });
     const std::string why = outcome.get_future().get();

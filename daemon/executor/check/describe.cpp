@@ -14,6 +14,7 @@
 #include <system_error>
 
 #include "common/serialized.hpp"
+#include "common/thrown.hpp"
 #include "messages/to_wire.hpp"
 #include "plugins/library.hpp"
 
@@ -57,11 +58,15 @@ int describeLibrary(const std::string& library, const std::string& package,
                 *description.add_types() = typeTo(package, library, *record, *component);
             } catch (const std::exception& error) {
                 description.set_problem(fmt::format("library {}: constructor of {} threw: {}",
-                                                    library, record->type, error.what()));
+                                                    library, record->type, textOf(error)));
+            } catch (...) {
+                description.set_problem(
+                    fmt::format("library {}: constructor of {} threw an exception of unknown type",
+                                library, record->type));
             }
         }
     } catch (const std::exception& error) {
-        description.set_problem(error.what());
+        description.set_problem(textOf(error));
     }
     return writeToOutput(serialized(description)) ? 0 : 1;
 }

@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "common/error.hpp"
+#include "common/thrown.hpp"
+#include "graph/inherited_parameters.hpp"
 #include "realtime/component_arena.hpp"
 
 namespace rtcf::executor {
@@ -29,10 +31,6 @@ std::string parameterNames(const Component& component) {
         names += (names.empty() ? "" : ", ") + parameter->declaration().name;
     }
     return names.empty() ? "none" : names;
-}
-
-std::string parameterText(const ParameterValue& value) {
-    return std::visit([](const auto& held) { return fmt::format("{}", held); }, value);
 }
 
 // Notes a hook in the flight recorder and in the gate to ROS while it runs.
@@ -103,6 +101,7 @@ Instance::Instance(ComponentDefinition definition, std::shared_ptr<const Library
     for (const ParameterBase* parameter : accessTo(*component_).parameters()) {
         parameter_values_.push_back(parameter->declaration().default_value);
     }
+    accessTo(*component_).freezeParameters();
     setFirstParameters();
 }
 
@@ -113,27 +112,11 @@ Instance::~Instance() {
 
 void Instance::setFirstParameters() {
     auto batch = definition_->parameters;
-    const auto& declared = accessTo(*component_).parameters();
-    for (const auto& [name, given, chosen] : definition_->inherited) {
-        const auto names_it = [&name = name](const auto& setting) { return setting.first == name; };
-        if (std::any_of(batch.begin(), batch.end(), names_it)) continue;
-        const auto found = std::find_if(declared.begin(), declared.end(),
-                                        [&name = name](const ParameterBase* parameter) {
-                                            return parameter->declaration().name == name;
-                                        });
-        ParameterValue value = given;
-        const std::string why = found == declared.end()
-                                    ? fmt::format("{}/{} has no such parameter",
-                                                  definition_->package, definition_->type)
-                                    : (*found)->check(value);
-        if (why.empty()) {
-            if (!sameValue(value, (*found)->declaration().default_value))
-                kept_parameters_.emplace_back(name, std::move(value));
-        } else if (chosen) {
-            lost_parameters_.push_back(
-                fmt::format("parameter {} = {} is not kept: {}", name, parameterText(given), why));
-        }
-    }
+    KeptParameters kept =
+        inheritedParameters(definition_->inherited, accessTo(*component_).parameters(), batch,
+                            fmt::format("{}/{}", definition_->package, definition_->type));
+    kept_parameters_ = std::move(kept.kept);
+    lost_parameters_ = std::move(kept.notes);
     batch.insert(batch.end(), kept_parameters_.begin(), kept_parameters_.end());
     for (StagedValue* value : stageParameters(batch)) value->commit();
     releaseStaged();
@@ -147,6 +130,7 @@ void Instance::callHook(Hook hook, const std::function<bool()>& call) {
     HookNote note(recorder_, slot(), hook, gate_, context_.full_name);
     ErrorKind kind = ErrorKind::HookFailed;
     std::string why;
+    if (component_ != nullptr) accessTo(*component_).clearFailure();
     try {
         const bool passed = call();
         why = note.unanswered();
@@ -165,7 +149,7 @@ void Instance::callHook(Hook hook, const std::function<bool()>& call) {
         kind = ErrorKind::NoMaster;
         why = error.what();
     } catch (const std::exception& error) {
-        why = fmt::format("it threw: {}", error.what());
+        why = fmt::format("it threw: {}", textOf(error));
     } catch (...) {
         why = "it threw an exception of unknown type";
     }
@@ -180,7 +164,7 @@ void Instance::callLastHook(Hook hook, const std::function<void()>& call) noexce
         call();
         why = note.unanswered();
     } catch (const std::exception& error) {
-        why = fmt::format("it threw: {}", error.what());
+        why = fmt::format("it threw: {}", textOf(error));
     } catch (...) {
         why = "it threw an exception of unknown type";
     }
@@ -203,11 +187,21 @@ void Instance::configure() {
     setHookTime();
     try {
         callHook(Hook::Configure, [this] { return component_->configure(); });
+        requireMembers();
     } catch (...) {
         cleanup();
         throw;
     }
     freezePorts();
+}
+
+void Instance::requireMembers() const {
+    const std::vector<std::string>& ended = accessTo(*component_).ended();
+    if (ended.empty()) return;
+    throw Error(ErrorKind::HookFailed,
+                fmt::format("{} ({}/{}): {} ended before the component: make it a member of the "
+                            "class, and keep it to the end",
+                            context_.full_name, definition_->package, definition_->type, ended[0]));
 }
 
 void Instance::freezePorts() {

@@ -118,6 +118,8 @@ class Instance {
    private:
     void setFirstParameters();
     void setHookTime() noexcept;
+    // @throws Error if a member has ended
+    void requireMembers() const;
     void callHook(Hook hook, const std::function<bool()>& call);
     /// Calls a hook whose failure rejects nothing: errors are logged.
     void callLastHook(Hook hook, const std::function<void()>& call) noexcept;

@@ -4,6 +4,8 @@
 
 #include <exception>
 
+#include "common/thrown.hpp"
+
 namespace rtcf::executor {
 
 void logErrors(Log& log, const char* what, const std::function<void()>& work) noexcept {
@@ -11,7 +13,7 @@ void logErrors(Log& log, const char* what, const std::function<void()>& work) no
         try {
             work();
         } catch (const std::exception& error) {
-            log.write(LogLevel::Error, {}, fmt::format("{} failed: {}", what, error.what()));
+            log.write(LogLevel::Error, {}, fmt::format("{} failed: {}", what, textOf(error)));
         }
     } catch (...) {
         // Logging failed, too.

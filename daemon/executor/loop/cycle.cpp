@@ -6,6 +6,8 @@
 #include <set>
 #include <utility>
 
+#include "common/thrown.hpp"
+
 namespace rtcf::executor {
 
 namespace {
@@ -168,7 +170,7 @@ template <bool Plain>
             }
             return true;
         } catch (const std::exception& error) {
-            goes_on = threw(*next, error.what());
+            goes_on = threw(*next, textOf(error));
         } catch (...) {
             goes_on = threw(*next, "an exception of unknown type");
         }
@@ -372,7 +374,7 @@ void Cycle::makeSafe(Component& component, ComponentStatistics& statistics,
     try {
         commit(component, statistics, may);
     } catch (const std::exception& error) {
-        keepBefore(error.what());
+        keepBefore(textOf(error));
     } catch (...) {
         keepBefore("an exception of unknown type");
     }

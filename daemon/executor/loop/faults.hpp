@@ -89,7 +89,7 @@ struct ComponentFaults final : FaultSink {
     Counter count;          ///< number of all faults, also those not recorded
 
     void report(std::uint64_t iteration, const char* text) noexcept RTCF_NONBLOCKING override {
-        reported.note(iteration, text);
+        reported.note(iteration, text != nullptr ? text : "a fault without a text");
         count.add(1);
     }
     /// Records the next fault of the kinds that recur, if the last one was taken. Graph thread.

@@ -153,9 +153,16 @@ Library::Library(const std::string& path, int file) : path_(path) {
          record = record->next) {
         types_.push_back(record);
     }
-    handle_ = copy.keep();
     std::sort(types_.begin(), types_.end(),
               [](const auto* a, const auto* b) { return std::strcmp(a->type, b->type) < 0; });
+    const auto twice = std::adjacent_find(
+        types_.begin(), types_.end(),
+        [](const auto* a, const auto* b) { return std::strcmp(a->type, b->type) == 0; });
+    if (twice != types_.end()) {
+        refuse(path, fmt::format(R"(registers the type {} twice ("{}" and "{}"): rename one)",
+                                 (*twice)->type, (*twice)->doc, twice[1]->doc));
+    }
+    handle_ = copy.keep();
 }
 
 const ComponentRecord* Library::find(const std::string& type) const noexcept {

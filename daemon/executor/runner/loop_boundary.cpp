@@ -44,10 +44,10 @@ void LoopBoundary::requireSmall(std::size_t bytes, const char* what) const {
     const std::size_t most = mostBytes();
     if (bytes <= most) return;
     throw Error(
-        ErrorKind::ResourceExhausted,
+        ErrorKind::StateTooLarge,
         fmt::format(
             "{} touches {} bytes in one cycle of {}; the limit is {} at {:g} Hz: stop the loop, "
-            "or lower its frequency",
+            "lower its frequency, or change fewer components at a time",
             what, bytes, runner_, most, settings_.frequency_hz));
 }
 

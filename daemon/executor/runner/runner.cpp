@@ -7,6 +7,7 @@
 
 #include "common/c_locale.hpp"
 #include "common/error.hpp"
+#include "common/thrown.hpp"
 #include "faults/crash_handler.hpp"
 #include "logging/log_errors.hpp"
 
@@ -199,7 +200,7 @@ void Runner::changeByBridge(const std::string& component, const ParameterBatch& 
             done(message);
             return;
         }
-        message = error.what();
+        message = textOf(error);
         log_.write(LogLevel::Warn, component, "a change requested by ROS was rejected: " + message);
     }
     done(message);

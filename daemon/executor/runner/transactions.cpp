@@ -2,8 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <rtcf/design_period.hpp>
-
 #include "common/error.hpp"
 #include "logging/log_errors.hpp"
 #include "names/name_pattern.hpp"
@@ -16,14 +14,13 @@ namespace {
 // Computes a component's derived values for another period of the loop. Adds them to `values`.
 void stagePeriod(Instance& instance, std::int64_t loop_period_ns,
                  std::vector<StagedValue*>& values) {
+    bool designed = false;
     for (DerivedBase* derived : accessTo(instance.component()).derived()) {
-        auto* const period = dynamic_cast<DesignPeriod*>(derived);
-        if (period == nullptr) continue;
-        period->propose(loop_period_ns * instance.definition().every);
-        const std::vector<StagedValue*> staged = instance.stageParameters({});
-        values.insert(values.end(), staged.begin(), staged.end());
-        return;
+        designed = derived->propose(loop_period_ns * instance.definition().every) || designed;
     }
+    if (!designed) return;
+    const std::vector<StagedValue*> staged = instance.stageParameters({});
+    values.insert(values.end(), staged.begin(), staged.end());
 }
 
 }  // namespace
@@ -123,12 +120,6 @@ void Transactions::handOver(Change& change, const Instance& previous,
     std::size_t bytes = bytesOf(hand_over.states);
     for (const HandOver& other : change.hand_overs) bytes += bytesOf(other.states);
     boundary_.requireSmall(bytes, "the state to hand over");
-    if (bytes > kLargestState) {
-        throw Error(ErrorKind::StateTooLarge,
-                    fmt::format("a hand-over of {} bytes of state exceeds the limit of {} bytes: "
-                                "replace fewer components at a time",
-                                bytes, kLargestState));
-    }
     change.hand_overs.push_back(std::move(hand_over));
 }
 

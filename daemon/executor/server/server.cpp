@@ -16,6 +16,7 @@
 #include <utility>
 
 #include "common/serialized.hpp"
+#include "common/thrown.hpp"
 #include "common/time_units.hpp"
 #include "messages/errors.hpp"
 #include "messages/from_wire.hpp"
@@ -552,7 +553,7 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
         } catch (const Error& error) {
             response = errorResponse(id, error.kind(), error.what());
         } catch (const std::exception& error) {
-            response = errorResponse(id, ErrorKind::FailedPrecondition, error.what());
+            response = errorResponse(id, ErrorKind::FailedPrecondition, textOf(error));
         } catch (...) {
             response = errorResponse(id, ErrorKind::FailedPrecondition, "an unknown exception");
         }
@@ -631,7 +632,7 @@ void Server::beginWatch(std::uint64_t connection, const v1::Request& request) {
         } catch (const Error& error) {
             post(connection, errorResponse(id, error.kind(), error.what()), true);
         } catch (const std::exception& error) {
-            post(connection, errorResponse(id, ErrorKind::FailedPrecondition, error.what()), true);
+            post(connection, errorResponse(id, ErrorKind::FailedPrecondition, textOf(error)), true);
         }
     });
 }

@@ -138,7 +138,8 @@ struct AbiProbe {
              placeOf(&Component::start), placeOf(&Component::update), placeOf(&Component::safe),
              placeOf(&Component::stop), placeOf(&Component::cleanup), placeOf(&Component::takeOver),
              placeOf(&Source::wait), placeOf(&StagedValue::commit), placeOf(&StagedValue::release),
-             placeOf(&ParameterBase::stage), placeOf(&LogSink::claim), placeOf(&LogSink::commit),
+             placeOf(&DerivedBase::propose), placeOf(&ParameterBase::stage),
+             placeOf(&LogSink::claim), placeOf(&LogSink::commit),
              placeOf(&ComponentMemory::allocate), placeOf(&ComponentMemory::release)});
         return static_cast<std::uint32_t>(hash ^ (hash >> 32));
     }

@@ -92,7 +92,7 @@ inline ComponentMemory* detail::memoryFor(ComponentContext* context, std::size_t
 class Component {
    public:
     Component() = default;
-    virtual ~Component() = default;
+    virtual ~Component();
     Component(const Component&) = delete;
     Component& operator=(const Component&) = delete;
 
@@ -228,15 +228,14 @@ class Component {
     /// arguments, the text is used verbatim. RTCF_FAIL(this, …) checks the format at compile time.
     /// Not real-time.
     /// @return false, as the result of the hook
-    template <typename... Arguments>
-    [[nodiscard]] bool fail(std::string_view text, const Arguments&... arguments) {
-        if constexpr (sizeof...(arguments) == 0) {
-            rest_->failure = text;
-        } else {
+    template <typename Text, typename... Arguments>
+    [[nodiscard]] bool fail(const Text& text, const Arguments&... arguments) {
+        const std::string_view shown = detail::textOrNull(text);
+        rest_->failure = shown;
+        if constexpr (sizeof...(arguments) != 0) {
             try {
-                rest_->failure = fmt::vformat(text, fmt::make_format_args(arguments...));
-            } catch (const fmt::format_error&) {
-                rest_->failure = text;  // the format is wrong: use it verbatim
+                rest_->failure = fmt::format(fmt::runtime(shown), detail::textOrNull(arguments)...);
+            } catch (const fmt::format_error&) {  // the format is wrong: it is the text
             }
         }
         return false;
@@ -258,7 +257,8 @@ class Component {
     // Kept outside the object, so that the derived class's ports, which each cycle touches, lie
     // close together.
     struct Rest {
-        bool frozen = false;
+        bool frozen = false;             // no more members
+        bool parameters_frozen = false;  // no more parameters
         std::vector<std::unique_ptr<InputPort>> input_ports;
         std::vector<InputPort*> inputs;
         std::vector<OutputPort*> outputs;
@@ -268,6 +268,7 @@ class Component {
         std::vector<StateDeclaration> states;
         std::vector<OutputPort*> staged_outputs;
         std::string failure;
+        std::vector<std::string> ended;  // members that ended before the component
     };
     std::unique_ptr<Rest> rest_ = std::make_unique<Rest>();
     Shared<std::int64_t> now_ = 1;  // loop time; stamps of outputs must not be 0
@@ -296,6 +297,16 @@ class Source : public Component {
 #include "rtcf/component_access.hpp"
 
 namespace rtcf {
+
+inline Component::~Component() {
+    // Members outside of the component's class may end later.
+    accessTo(*this).forgetMembers();
+}
+
+inline void detail::endMember(const void* member) noexcept {
+    Component* const owner = memberOwners().take(member);
+    if (owner != nullptr) accessTo(*owner).end(member);
+}
 
 template <typename T>
 void State<T>::declareIn(Component* owner, StateDeclaration declaration) {
@@ -359,7 +370,9 @@ inline OutputBase::OutputBase(Component* owner, std::string name, std::string un
 
 inline DerivedBase::DerivedBase(Component* owner) { accessTo(*owner).declare(this); }
 
-inline MailboxBase::MailboxBase(Component* owner) { accessTo(*owner).declare(this); }
+inline MailboxBase::MailboxBase(Component* owner) : now_(&accessTo(*owner).now()) {
+    accessTo(*owner).declare(this);
+}
 
 inline ParameterBase::ParameterBase(Component* owner, ParameterDeclaration declaration,
                                     const void* place)
@@ -368,10 +381,6 @@ inline ParameterBase::ParameterBase(Component* owner, ParameterDeclaration decla
     if (const std::string why = check(initial); !why.empty())
         throw std::logic_error("default value: " + why);
     accessTo(*owner).declare(this);
-}
-
-inline void detail::undeclareParameters(Component& owner, std::size_t count) noexcept {
-    accessTo(owner).undeclareParameters(count);
 }
 
 inline std::string ParameterBase::check(ParameterValue& value) const {

@@ -14,6 +14,8 @@
 #include <utility>
 #include <vector>
 
+#include "rtcf/member_owners.hpp"
+
 namespace rtcf {
 
 /// @tparam C Component or const Component
@@ -33,6 +35,8 @@ class ComponentAccess {
     const Shared<std::int64_t>& now() const noexcept { return component_.now_; }
     /// The error text of the hook that failed.
     const std::string& failure() const noexcept { return rest().failure; }
+    /// Before a hook, so that failure() is not that of an earlier one.
+    void clearFailure() const noexcept { rest().failure.clear(); }
 
     /// @name Members, in the order of their declarations
     /// @{
@@ -62,26 +66,64 @@ class ComponentAccess {
     /// @{
     void declare(std::unique_ptr<InputPort> input) const {
         declarePort(rest().inputs, input.get());
+        own(addressOf(input));
         rest().input_ports.push_back(std::move(input));
     }
     void declare(OutputPort* output) const {
         declarePort(rest().outputs, output);
+        own(addressOf(output));
         if (output->staged()) rest().staged_outputs.push_back(output);
     }
-    void declare(DerivedBase* derived) const { rest().derived.push_back(derived); }
-    void declare(MailboxBase* mailbox) const { rest().mailboxes.push_back(mailbox); }
+    void declare(DerivedBase* derived) const {
+        rest().derived.push_back(derived);
+        own(derived);
+    }
+    void declare(MailboxBase* mailbox) const {
+        rest().mailboxes.push_back(mailbox);
+        own(mailbox);
+    }
     void declare(StateDeclaration state) const;
     void declare(ParameterBase* parameter) const;
-    /// Undoes the last declarations of parameters.
-    void undeclareParameters(std::size_t count) const noexcept {
-        rest().parameters.resize(rest().parameters.size() - count);
-    }
+    /// Rejects further parameters, which are set before configure(). After the constructor.
+    void freezeParameters() const noexcept { rest().parameters_frozen = true; }
     /// Rejects further declarations. After configure().
     void freeze() const noexcept { rest().frozen = true; }
     /// @}
 
+    /// @name Members that end before the component
+    /// Not real-time.
+    /// @{
+    /// Those that ended before freeze(), as "parameter 'gain'": an error of the component.
+    const std::vector<std::string>& ended() const noexcept { return rest().ended; }
+    /// Removes a member from the lists above. @param member its address
+    void end(const void* member) const;
+    /// Before the end of the component.
+    void forgetMembers() const noexcept {
+        visitMembers([](const void* member) { detail::memberOwners().take(member); });
+    }
+    /// @}
+
    private:
     Component::Rest& rest() const noexcept { return *component_.rest_; }
+    // Members are known by these addresses.
+    static const void* addressOf(const InputPort* port) noexcept { return &port->input(); }
+    static const void* addressOf(const std::unique_ptr<InputPort>& port) noexcept {
+        return &port->input();
+    }
+    static const void* addressOf(const OutputPort* port) noexcept { return &port->output(); }
+    static const void* addressOf(const StateDeclaration& state) noexcept { return state.value; }
+    static const void* addressOf(const void* member) noexcept { return member; }
+    void own(const void* member) const { detail::memberOwners().add(member, &component_); }
+    template <typename Visit>
+    void visitMembers(const Visit& visit) const {
+        const Component::Rest& of = rest();
+        for (const InputPort* each : of.inputs) visit(addressOf(each));
+        for (const OutputPort* each : of.outputs) visit(addressOf(each));
+        for (const ParameterBase* each : of.parameters) visit(each);
+        for (const DerivedBase* each : of.derived) visit(each);
+        for (const MailboxBase* each : of.mailboxes) visit(each);
+        for (const StateDeclaration& each : of.states) visit(each.value);
+    }
     template <typename T>
     void declarePort(std::vector<T*>& members, T* port) const;
     void requireDeclarable(const std::string& name, const char* what, bool in_group = false) const;
@@ -130,6 +172,10 @@ template <typename C>
 void ComponentAccess<C>::declare(ParameterBase* parameter) const {
     const std::string& name = parameter->declaration().name;
     requireDeclarable(name, "parameter", true);
+    if (rest().parameters_frozen) {
+        throw std::logic_error(fmt::format(
+            "parameter '{}' declared after the constructor: make it a member of the class", name));
+    }
     const auto contains = [](const std::string& group, const std::string& member) {
         return member.size() > group.size() && member[group.size()] == '/' &&
                member.compare(0, group.size(), group) == 0;
@@ -146,6 +192,39 @@ void ComponentAccess<C>::declare(ParameterBase* parameter) const {
         }
     }
     rest().parameters.push_back(parameter);
+    own(parameter);
+}
+
+template <typename C>
+void ComponentAccess<C>::end(const void* member) const {
+    Component::Rest& of = rest();
+    const auto is_it = [member](const auto& each) { return addressOf(each) == member; };
+    // @return true if the list had it
+    const auto take = [&](auto& list, const std::string& kind, const auto& name) {
+        const auto found = std::find_if(list.begin(), list.end(), is_it);
+        if (found == list.end()) return false;
+        if (!of.frozen) of.ended.push_back(kind + name(*found));
+        list.erase(found);
+        return true;
+    };
+    const auto drop = [&](auto& list) {
+        list.erase(std::remove_if(list.begin(), list.end(), is_it), list.end());
+    };
+    const auto of_port = [](const auto* port) { return " '" + port->name() + "'"; };
+    const auto of_parameter = [](const auto* each) {
+        return " '" + each->declaration().name + "'";
+    };
+    const auto of_state = [](const auto& state) { return " '" + state.name + "'"; };
+    const auto none = [](const auto* /*each*/) { return std::string(); };
+    if (take(of.inputs, "input", of_port)) {
+        drop(of.input_ports);
+    } else if (take(of.outputs, "output", of_port)) {
+        drop(of.staged_outputs);
+    } else {
+        (void)(take(of.parameters, "parameter", of_parameter) ||
+               take(of.states, "state", of_state) || take(of.derived, "a Derived", none) ||
+               take(of.mailboxes, "a Mailbox", none));
+    }
 }
 
 template <typename C>
@@ -163,6 +242,7 @@ void ComponentAccess<C>::declare(StateDeclaration state) const {
                         "that a component may have",
                         state.name, size, kLargestState));
     }
+    own(state.value);
     rest().states.push_back(std::move(state));
 }
 

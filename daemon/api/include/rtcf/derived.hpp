@@ -4,9 +4,11 @@
 /// the parameters, at one cycle boundary.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <utility>
 
+#include "rtcf/member_owners.hpp"
 #include "rtcf/parameter.hpp"
 #include "rtcf/realtime.hpp"
 
@@ -16,9 +18,17 @@ class Component;
 
 /// Base class of derived values of all types.
 class DerivedBase : public StagedValue {
+   public:
+    /// Proposes the component's next period, ns, before prepare(). Not real-time safe.
+    /// @return true if the component computes values for its period
+    virtual bool propose(std::int64_t period_ns) noexcept {
+        (void)period_ns;
+        return false;
+    }
+
    protected:
     explicit DerivedBase(Component* owner);
-    ~DerivedBase() = default;
+    ~DerivedBase() { detail::endMember(this); }
 };
 
 /// A derived value of any type. If it owns memory, that memory is freed outside the real-time

@@ -22,8 +22,7 @@
 
 namespace rtcf {
 
-/// A component has at most one. The executor calls its virtual functions and propose(): raise
-/// RTCF_ABI_VERSION with any change of its layout.
+/// A component may have several: its base classes may have theirs.
 class DesignPeriod final : public DerivedBase {
    public:
     /// @param owner the component, `this`
@@ -37,10 +36,10 @@ class DesignPeriod final : public DerivedBase {
 
     /// @name For the executor
     /// @{
-    /// Proposes the component's next period, ns, before prepare(). Not real-time safe.
-    void propose(std::int64_t period_ns) noexcept {
+    bool propose(std::int64_t period_ns) noexcept override {
         staged_ = period_ns;
         is_staged_ = true;
+        return true;
     }
     void commit() noexcept RTCF_NONBLOCKING override { is_staged_ = false; }
     void release() noexcept override { is_staged_ = false; }

@@ -109,10 +109,21 @@ struct LogText {
     std::string_view view() const noexcept { return {bytes.data(), size}; }
 };
 
+/// "(null)" for a null pointer to a text, as of getenv(); other values as they are.
+template <typename T>
+decltype(auto) textOrNull(const T& value) noexcept {
+    if constexpr (std::is_convertible_v<const T&, const char*>) {
+        const char* const text = value;
+        return std::string_view(text != nullptr ? text : "(null)");
+    } else {
+        return value;
+    }
+}
+
 template <typename T>
 auto logStore(const T& value) noexcept {
     if constexpr (std::is_convertible_v<const T&, std::string_view>) {
-        return LogText(value);
+        return LogText(textOrNull(value));
     } else if constexpr (std::is_enum_v<T>) {
         return static_cast<std::underlying_type_t<T>>(value);
     } else if constexpr (std::is_pointer_v<T>) {

@@ -15,12 +15,17 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <cstddef>
+#include <cstdint>
 #include <mutex>
 
+#include "rtcf/member_owners.hpp"
 #include "rtcf/realtime.hpp"
+#include "rtcf/slot.hpp"
 
 namespace rtcf {
 
@@ -45,6 +50,7 @@ class MailboxBase {
     void open() {
         const std::lock_guard lock(mutex_);
         state_.store(State::Free, std::memory_order_relaxed);
+        pending_ = false;
         open_ = true;
         ++run_;
     }
@@ -59,7 +65,7 @@ class MailboxBase {
 
    protected:
     explicit MailboxBase(Component* owner);
-    ~MailboxBase() = default;
+    ~MailboxBase() { detail::endMember(this); }
 
     /// Waits for the end of all calls. The destructor of the derived class calls it, while request
     /// and reply still exist.
@@ -115,6 +121,8 @@ class MailboxBase {
     }
 
     std::atomic<State> state_{State::Free};
+    const Shared<std::int64_t>* now_;  ///< the component's time
+    bool pending_ = false;             ///< update() has a request to which it has not replied
 
    private:
     friend struct AbiProbe;
@@ -163,19 +171,27 @@ class Mailbox final : public MailboxBase {
     /// @name In update()
     /// @{
     /// The request that waits for a reply, or null. It is the same one in each cycle until reply(),
-    /// or until its caller gives up. Valid until the end of this update(). Real-time safe,
+    /// or until its caller gives up. Within an update(), it stays and does not change, whatever its
+    /// caller does; after reply(), the next request comes in the next update(). Real-time safe,
     /// wait-free.
     const Request* request() noexcept RTCF_NONBLOCKING {
+        if (shown_ns_ == *now_) return shown_;
         const State state = state_.load(std::memory_order_acquire);
-        if (state == State::Asked) return &request_;
         if (state == State::Abandoned) state_.store(State::Free, std::memory_order_release);
-        return nullptr;
+        pending_ = state == State::Asked;
+        if (!pending_) return nullptr;
+        shown_ = &requests_[asked_];
+        shown_ns_ = *now_;
+        return shown_;
     }
-    /// Replies to the request; does nothing if there is none. Wait-free; real-time safe if the
-    /// assignment of Reply is.
+    /// Replies to the request of request(); does nothing if there is none. Wait-free; real-time
+    /// safe if the assignment of Reply is.
     void reply(const Reply& reply) noexcept {
-        if (state_.load(std::memory_order_acquire) != State::Asked) return;
+        if (!pending_ || state_.load(std::memory_order_acquire) != State::Asked) return;
+        pending_ = false;
         reply_ = reply;
+        shown_ = nullptr;
+        shown_ns_ = *now_;
         State asked = State::Asked;
         // If this fails, the caller has just given up; the next request() resets the state.
         state_.compare_exchange_strong(asked, State::Answered, std::memory_order_acq_rel);
@@ -189,7 +205,11 @@ class Mailbox final : public MailboxBase {
     /// @param reply   set if the result is Answered
     /// @param timeout for other callers and for the reply; at most a year
     MailStatus call(const Request& request, Reply& reply, std::chrono::nanoseconds timeout) {
-        return exchange(timeout, [&] { request_ = request; }, [&] { reply = reply_; });
+        const auto ask = [&] {
+            asked_ = 1 - asked_;
+            requests_[asked_] = request;
+        };
+        return exchange(timeout, ask, [&] { reply = reply_; });
     }
 
    private:
@@ -197,8 +217,12 @@ class Mailbox final : public MailboxBase {
     using MailboxBase::close;
     using MailboxBase::open;
 
-    Request request_{};
+    // A caller writes the one that update() has not seen last: update() may still use that one.
+    std::array<Request, 2> requests_{};
+    std::size_t asked_ = 0;
     Reply reply_{};
+    const Request* shown_ = nullptr;  // what request() returns at the time shown_ns_
+    std::int64_t shown_ns_ = 0;
 };
 
 }  // namespace rtcf

@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "rtcf/bounded_vector.hpp"
+#include "rtcf/member_owners.hpp"
 #include "rtcf/realtime.hpp"
 
 namespace rtcf {
@@ -124,7 +125,7 @@ class ParameterBase : public StagedValue {
 
    protected:
     ParameterBase(Component* owner, ParameterDeclaration declaration, const void* place = nullptr);
-    virtual ~ParameterBase() = default;
+    virtual ~ParameterBase() { detail::endMember(this); }
 
     ParameterDeclaration declaration_;
 
@@ -134,9 +135,6 @@ class ParameterBase : public StagedValue {
 };
 
 namespace detail {
-
-/// Undoes the last declarations of parameters.
-void undeclareParameters(Component& owner, std::size_t count) noexcept;
 
 /// Declaration and staged value of a parameter, or of an element of an array. Kept outside the
 /// component, so that the values that each cycle touches lie close together.
@@ -314,18 +312,11 @@ class Parameter<std::array<T, N>> final {
     Parameter(Component* owner, const std::string& name, const Array& initial,
               const Options&... options)
         : value_(initial), settings_(std::make_unique<Settings>()) {
-        auto& elements = settings_->elements;
-        try {
-            for (std::size_t i = 0; i < N; ++i) {
-                std::string element = name + '_' + std::to_string(i);
-                elements.emplace_back(
-                    owner,
-                    detail::DeclarationOf<T>::make(std::move(element), initial[i], options...),
-                    value_[i]);
-            }
-        } catch (...) {
-            detail::undeclareParameters(*owner, elements.size());
-            throw;
+        for (std::size_t i = 0; i < N; ++i) {
+            std::string element = name + '_' + std::to_string(i);
+            settings_->elements.emplace_back(
+                owner, detail::DeclarationOf<T>::make(std::move(element), initial[i], options...),
+                value_[i]);
         }
     }
     Parameter(const Parameter&) = delete;
@@ -381,24 +372,18 @@ class Parameter<BoundedVector<T, N>> final {
         std::fill(value_.elements_.begin() + value_.size_, value_.elements_.end(),
                   initial.empty() ? detail::DeclarationOf<T>::anyValid(options...)
                                   : value_.elements_[initial.size() - 1]);
-        auto& elements = settings_->elements;
-        try {
-            for (std::size_t i = 0; i < N; ++i) {
-                T& place = value_.elements_[i];
-                std::string element = name + '_' + std::to_string(i);
-                elements.emplace_back(
-                    owner, detail::DeclarationOf<T>::make(std::move(element), place, options...),
-                    place);
-            }
-            auto size = detail::DeclarationOf<std::int64_t>::make(
-                name + std::string(ParameterDeclaration::kSizeSuffix), value_.size_, Min(0.0),
-                Max(static_cast<double>(N)), Doc("number of elements of " + name));
-            size.is_size = true;
-            settings_->size.emplace(owner, std::move(size), value_.size_);
-        } catch (...) {
-            detail::undeclareParameters(*owner, elements.size());
-            throw;
+        for (std::size_t i = 0; i < N; ++i) {
+            T& place = value_.elements_[i];
+            std::string element = name + '_' + std::to_string(i);
+            settings_->elements.emplace_back(
+                owner, detail::DeclarationOf<T>::make(std::move(element), place, options...),
+                place);
         }
+        auto size = detail::DeclarationOf<std::int64_t>::make(
+            name + std::string(ParameterDeclaration::kSizeSuffix), value_.size_, Min(0.0),
+            Max(static_cast<double>(N)), Doc("number of elements of " + name));
+        size.is_size = true;
+        settings_->size.emplace(owner, std::move(size), value_.size_);
     }
     Parameter(const Parameter&) = delete;
     Parameter& operator=(const Parameter&) = delete;

@@ -30,6 +30,7 @@
 #include "rtcf/any_type.hpp"
 #include "rtcf/arithmetic_type.hpp"
 #include "rtcf/component_memory.hpp"
+#include "rtcf/member_owners.hpp"
 #include "rtcf/message_type.hpp"
 #include "rtcf/port_type.hpp"
 #include "rtcf/realtime.hpp"
@@ -69,7 +70,7 @@ class InputBase {
     bool connected(const Component* owner) const noexcept RTCF_NONBLOCKING;
 
    protected:
-    ~InputBase() = default;
+    ~InputBase() { detail::endMember(this); }
 
     DataStatus readStatus() noexcept RTCF_NONBLOCKING {
         const std::int64_t stamp = source_->stamp;
@@ -403,7 +404,7 @@ class OutputPort {
     OnNonFinite policy_ = OnNonFinite::Hold;
 };
 
-inline OutputBase::~OutputBase() = default;
+inline OutputBase::~OutputBase() { detail::endMember(this); }
 inline const std::string& OutputBase::name() const noexcept { return port_->name(); }
 inline const std::string& OutputBase::unit() const noexcept { return port_->unit(); }
 inline bool OutputBase::connected() const noexcept RTCF_NONBLOCKING { return port_->connected(); }

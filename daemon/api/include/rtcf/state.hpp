@@ -18,6 +18,7 @@
 #include <utility>
 #include <vector>
 
+#include "rtcf/member_owners.hpp"
 #include "rtcf/parameter.hpp"
 #include "rtcf/realtime.hpp"
 #include "rtcf/state_type.hpp"
@@ -77,7 +78,7 @@ class State final {
         declareIn(owner, std::move(declaration));
     }
     State(const State&) = delete;
-    ~State() = default;
+    ~State() { detail::endMember(&value_); }
 
     /// @name Access as to a plain member; real-time safe
     /// @{

@@ -53,8 +53,11 @@ class Bench {
         context_.log_level = LogLevel::Debug;
         component_.reset(find(type).create(type.c_str(), &context_));
         accessTo(*component_).attach(context_);
+        accessTo(*component_).freezeParameters();
         set(parameters);
-        require(component_->configure(), "configure");
+        call("configure", [this] { return component_->configure(); });
+        if (const auto& ended = accessTo(*component_).ended(); !ended.empty())
+            throw std::runtime_error(ended[0] + " ended before the component");
         accessTo(*component_).freeze();
         countWrites();
     }
@@ -68,18 +71,20 @@ class Bench {
 
     /// Sets a batch of parameters, as `rtcfctl set` does.
     void set(const Parameters& batch) {
-        for (const auto& [name, given] : batch) {
-            ParameterBase& parameter = named(accessTo(*component_).parameters(), name, "parameter");
-            ParameterValue value = given;
-            if (const std::string why = parameter.check(value); !why.empty()) {
-                release();
-                throw std::invalid_argument(why);
+        try {
+            for (const auto& [name, given] : batch) {
+                ParameterBase& parameter =
+                    named(accessTo(*component_).parameters(), name, "parameter");
+                ParameterValue value = given;
+                if (const std::string why = parameter.check(value); !why.empty())
+                    throw std::invalid_argument(why);
+                parameter.stage(value);
             }
-            parameter.stage(value);
+            call("prepare", [this] { return component_->prepare(Values{}); });
+        } catch (...) {
+            release();
+            throw;
         }
-        const bool prepared = component_->prepare(Values{});
-        if (!prepared) release();
-        require(prepared, "prepare");
         for (ParameterBase* parameter : accessTo(*component_).parameters()) {
             if (parameter->staged()) parameter->commit();
         }
@@ -105,7 +110,7 @@ class Bench {
     void cycle(std::uint64_t cycles = 1) {
         if (!started_) {
             accessTo(*component_).setTime(now() - 1);  // before the first cycle
-            require(component_->start(), "start");
+            call("start", [this] { return component_->start(); });
             countWrites();
             for (MailboxBase* mailbox : accessTo(*component_).mailboxes()) mailbox->open();
         }
@@ -201,7 +206,7 @@ class Bench {
         const char* text = "";
         void report(std::uint64_t /*iteration*/, const char* of) noexcept override {
             ++count;
-            text = of;
+            text = of != nullptr ? of : "";
         }
     };
 
@@ -244,9 +249,13 @@ class Bench {
             throw std::invalid_argument("port " + name + " carries " + is.name + ", not " +
                                         asked.name);
     }
-    void require(bool passed, const char* hook) const {
-        if (passed) return;
-        throw std::runtime_error(std::string(hook) + " failed: " + accessTo(*component_).failure());
+    template <typename Hook>
+    void call(const char* name, const Hook& hook) {
+        accessTo(*component_).clearFailure();
+        if (hook()) return;
+        const std::string& why = accessTo(*component_).failure();
+        throw std::runtime_error(std::string(name) + " failed: " +
+                                 (why.empty() ? "it returned false without an error text" : why));
     }
     /// The loop's time; 0 is no stamp.
     std::int64_t now() const { return std::max<std::int64_t>(2, clock_.time_ns); }

@@ -42,7 +42,44 @@ TEST(Fail, HasTheGivenText) {
     EXPECT_EQ(errorOf(3), "configure failed: no reply from drive in 0.2 s");
 }
 
+class Choosy final : public Component {
+    Parameter<double> x{this, "x", 0.0};
+    Derived<double> twice{this};
+    Output<double> out{this, "out"};
+
+    bool prepare(const Values& proposed) override {
+        twice.stage(2.0 * proposed[x]);
+        if (proposed[x] < 0.0) throw std::runtime_error("x is negative");
+        return proposed[x] <= 1.0 || fail("x is at most 1");
+    }
+    bool start() override { return x.value() < 0.5; }
+    void update() override { out.write(*twice); }
+};
+
+TEST(Fail, HasNoTextOfAnEarlierHook) {
+    Bench bench("Choosy");
+    EXPECT_THROW(bench.set({{"x", 5.0}}), std::runtime_error);
+    bench.set({{"x", 0.5}});
+    try {
+        bench.cycle();
+        FAIL();
+    } catch (const std::runtime_error& error) {
+        EXPECT_STREQ(error.what(), "start failed: it returned false without an error text");
+    }
+}
+
+TEST(Bench, ARejectedBatchChangesNothingLater) {
+    Bench bench("Choosy", {{"x", 0.25}});
+    EXPECT_THROW(bench.set({{"x", -1.0}}), std::runtime_error);
+    EXPECT_THROW(bench.set({{"y", 1.0}}), std::invalid_argument);
+    bench.set({});
+    bench.cycle();
+    EXPECT_EQ(*bench.read<double>("out"), 0.5);
+}
+
 }  // namespace
 }  // namespace rtcf::test
+
+RTCF_COMPONENT_NAMED(rtcf::test::Choosy, "Choosy", "Rejects values", Choosy)
 
 RTCF_COMPONENT_NAMED(rtcf::test::Failing, "Failing", "Fails in configure()", Failing)

@@ -22,6 +22,11 @@ using std::chrono::milliseconds;
 using std::chrono::nanoseconds;
 
 class Idle : public Component {
+   public:
+    /// Begins an update(), which the test simulates.
+    void begin() { accessTo(*this).setTime(time() + 1); }
+
+   private:
     void update() override {}
 };
 
@@ -45,8 +50,12 @@ std::future<Asked> ask(Box& box, int request, nanoseconds timeout = hours(1)) {
 }
 
 // Simulates update() in some cycle.
-bool finds(Box& box) {
-    return eventually([&] { return box.request() != nullptr; });
+template <typename Box>
+bool finds(Idle& idle, Box& box) {
+    return eventually([&] {
+        idle.begin();
+        return box.request() != nullptr;
+    });
 }
 
 TEST(Mailbox, PassesRequestAndReply) {
@@ -55,8 +64,9 @@ TEST(Mailbox, PassesRequestAndReply) {
     open(box);
     EXPECT_EQ(box.request(), nullptr);
     auto asked = ask(box, 7);
-    ASSERT_TRUE(finds(box));
+    ASSERT_TRUE(finds(idle, box));
     for (int cycle = 0; cycle < 100; ++cycle) {
+        idle.begin();
         ASSERT_NE(box.request(), nullptr) << "the request stays until it is answered";
         EXPECT_EQ(*box.request(), 7);
     }
@@ -82,13 +92,48 @@ TEST(Mailbox, ACallWithoutAnswerTimesOut) {
     open(box);
     EXPECT_EQ(ask(box, 1, milliseconds(1)).get().status, MailStatus::TimedOut);
     EXPECT_EQ(ask(box, 1, nanoseconds(-1)).get().status, MailStatus::TimedOut);
+    idle.begin();
     EXPECT_EQ(box.request(), nullptr) << "the call has timed out";
     box.reply(5);
     auto next = ask(box, 2);
-    ASSERT_TRUE(finds(box));
+    ASSERT_TRUE(finds(idle, box));
     EXPECT_EQ(*box.request(), 2);
     box.reply(6);
     EXPECT_EQ(next.get().reply, 6) << "not the late answer to another request";
+}
+
+TEST(Mailbox, ARequestStaysUntilTheEndOfItsUpdate) {
+    Idle idle;
+    Box box(&idle);
+    open(box);
+    auto late = ask(box, 1, milliseconds(20));
+    ASSERT_TRUE(finds(idle, box));
+    const int* const request = box.request();
+    EXPECT_EQ(late.get().status, MailStatus::TimedOut);
+    EXPECT_EQ(box.request(), request) << "its caller has given up";
+    EXPECT_EQ(*request, 1);
+    idle.begin();
+    EXPECT_EQ(box.request(), nullptr);
+}
+
+TEST(Mailbox, ARequestDoesNotChangeAfterItsReply) {
+    Idle idle;
+    Box box(&idle);
+    open(box);
+    auto first = ask(box, 1);
+    ASSERT_TRUE(finds(idle, box));
+    const int* const request = box.request();
+    box.reply(10);
+    EXPECT_EQ(first.get().reply, 10);
+    EXPECT_EQ(ask(box, 2, milliseconds(5)).get().status, MailStatus::TimedOut);
+    EXPECT_EQ(*request, 1) << "the same update() still uses it";
+    EXPECT_EQ(box.request(), nullptr) << "the next one comes in the next update()";
+    box.reply(20);
+    auto third = ask(box, 3);
+    ASSERT_TRUE(finds(idle, box));
+    EXPECT_EQ(*box.request(), 3);
+    box.reply(30);
+    EXPECT_EQ(third.get().reply, 30);
 }
 
 TEST(Mailbox, AReplyWithoutCallerIsIgnored) {
@@ -97,7 +142,7 @@ TEST(Mailbox, AReplyWithoutCallerIsIgnored) {
     open(box);
     box.reply(5);
     auto asked = ask(box, 1);
-    ASSERT_TRUE(finds(box));
+    ASSERT_TRUE(finds(idle, box));
     box.reply(6);
     EXPECT_EQ(asked.get().reply, 6);
 }
@@ -109,7 +154,7 @@ TEST(Mailbox, TheEndOfTheLoopAnswersAllCallers) {
         open(box);
         std::vector<std::future<Asked>> waiting;
         for (int i = 0; i < 4; ++i) waiting.push_back(ask(box, i));
-        ASSERT_TRUE(finds(box));
+        ASSERT_TRUE(finds(idle, box));
         close(box);
         for (auto& each : waiting) EXPECT_EQ(each.get().status, MailStatus::Ended);
     }
@@ -120,12 +165,12 @@ TEST(Mailbox, ANewLoopStartsWithoutRequests) {
     Box box(&idle);
     open(box);
     auto before = ask(box, 1);
-    ASSERT_TRUE(finds(box));
+    ASSERT_TRUE(finds(idle, box));
     close(box);
     open(box);
     auto after = ask(box, 2);
     EXPECT_EQ(before.get().status, MailStatus::Ended);
-    ASSERT_TRUE(finds(box));
+    ASSERT_TRUE(finds(idle, box));
     EXPECT_EQ(*box.request(), 2);
     box.reply(3);
     EXPECT_EQ(after.get().reply, 3);
@@ -136,7 +181,7 @@ TEST(Mailbox, ItsDestructionReleasesCallers) {
     auto box = std::make_unique<Box>(&idle);
     open(*box);
     auto asked = ask(*box, 1);
-    ASSERT_TRUE(finds(*box));
+    ASSERT_TRUE(finds(idle, *box));
     box.reset();
     EXPECT_EQ(asked.get().status, MailStatus::Ended);
 }
@@ -153,7 +198,7 @@ TEST(Mailbox, AReplyOutlivesTheMailbox) {
             const MailStatus status = to.call(1, reply, hours(1));
             return std::pair(status, reply);
         });
-        ASSERT_TRUE(eventually([&] { return box->request() != nullptr; }));
+        ASSERT_TRUE(finds(idle, *box));
         box->reply(text);
         close(*box);
         box.reset();
@@ -190,6 +235,7 @@ TEST(Mailbox, AnswersBelongToTheirRequests) {
     }
     std::mt19937 random(99);  // NOLINT(cert-msc32-c,cert-msc51-cpp)
     while (left > 0) {
+        idle.begin();
         if (const auto* request = box.request(); request != nullptr && random() % 3 != 0)
             box.reply(std::vector<int>(*request));
         if (random() % 500 == 0) {

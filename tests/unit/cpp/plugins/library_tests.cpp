@@ -75,6 +75,13 @@ TEST(Library, OfAnotherAbiIsRejectedWithBothNumbers) {
 }
 
 // The same headers and ABI number; only the compiler options differ.
+TEST(Library, WithTwoTypesOfOneNameIsRejected) {
+    const std::string error = errorOf(kFolder + "registered_twice.so");
+    EXPECT_NE(error.find("registers the type Gain twice"), std::string::npos) << error;
+    EXPECT_NE(error.find("of file 1"), std::string::npos) << error;
+    EXPECT_NE(error.find("of file 2"), std::string::npos) << error;
+}
+
 TEST(Library, OfAnotherLayoutIsRejected) {
     const std::string text = errorOf(kFolder + "other_layout.so");
     EXPECT_NE(text.find("was built for component ABI"), std::string::npos) << text;

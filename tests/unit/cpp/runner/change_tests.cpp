@@ -296,6 +296,17 @@ TEST_F(Change, FrequencyChangesWhileTheLoopRuns) {
     EXPECT_EQ(journal().count("/A start"), 1U);
 }
 
+TEST_F(Change, EachDesignPeriodOfAComponentFollowsTheFrequency) {
+    load(definition("DesignedTwice", "D"));
+    start();
+    for (const double frequency : {1000.0, 500.0, 2000.0}) {
+        configure([&](RunnerSettings& settings) { settings.frequency_hz = frequency; });
+        ASSERT_TRUE(runs(3));
+        EXPECT_EQ(value("/D", "own"), 1.0 / frequency);
+        EXPECT_EQ(value("/D", "base"), 1.0 / frequency) << "that of the base class";
+    }
+}
+
 TEST_F(Change, ElapsedStaysConsistentWhenTheFrequencyChanges) {
     load(definition("Stopwatch", "W"));
     start();

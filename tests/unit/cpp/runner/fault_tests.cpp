@@ -26,6 +26,12 @@ class Fault : public RunnerFixture {
         return result;
     }
 
+    static ComponentDefinition wordless(const std::string& where) {
+        ComponentDefinition result = definition("Wordless", "W");
+        result.parameters = {{"where", where}};
+        return result;
+    }
+
     bool waitForFault() {
         return eventually([this] { return state() == RunnerState::Faulted; });
     }
@@ -49,6 +55,65 @@ TEST_F(Fault, ExceptionStopsTheLoopAndIsReported) {
     EXPECT_EQ(runner().graph()->get("/A").fault, "");
     EXPECT_EQ(value("/A", "out"), 11.0);
     EXPECT_EQ(value("/C", "out"), 10.0) << "the cycle was abandoned before it";
+}
+
+TEST_F(Fault, AnExceptionWithoutATextIsReported) {
+    EXPECT_NE(errorOf([&] {
+                  load(wordless("configure"));
+              }).find("configure failed: it threw: an exception without a text"),
+              std::string::npos);
+    load(wordless("update"));
+    start();
+    ASSERT_TRUE(waitForFault());
+    EXPECT_NE(ends().at(0).message.find("an exception without a text"), std::string::npos);
+    setParameters("/W", {{"where", std::string("cleanup")}});
+    unload("/W");
+    EXPECT_NE(logged().back().message.find("an exception without a text"), std::string::npos);
+    EXPECT_NE(errorOf([&] {
+                  load(definition("ThrowsANumber", "N"));
+              }).find("it threw an exception of unknown type"),
+              std::string::npos);
+}
+
+TEST_F(Fault, ANullTextIsReported) {
+    EXPECT_NE(errorOf([&] { load(wordless("fail")); }).find("no device (null)"), std::string::npos);
+    load(wordless("log"));
+    start();
+    ASSERT_TRUE(runs());
+    EXPECT_EQ(logged().back().message, "host (null)");
+    setParameters("/W", {{"where", std::string("fault")}});
+    EXPECT_TRUE(eventually([&] {
+        return runner().graph()->get("/W").fault.find("a fault without a text") !=
+               std::string::npos;
+    }));
+}
+
+TEST_F(Fault, AHookWithoutATextIsNotReportedWithThatOfAnEarlierOne) {
+    load(wordless(""));
+    EXPECT_NE(errorOf([&] {
+                  setParameters("/W", {{"where", std::string("prepare")}});
+              }).find("an earlier text"),
+              std::string::npos);
+    setParameters("/W", {{"where", std::string("start")}});
+    EXPECT_NE(errorOf([&] { start(); }).find("it returned false without an error text"),
+              std::string::npos);
+}
+
+TEST_F(Fault, AComponentThatLosesAMemberIsNotLoaded) {
+    const std::string dropped = errorOf([&] { load(definition("LosesAMember", "L")); });
+    EXPECT_NE(
+        dropped.find("/L (rtcf_unit_test/LosesAMember): input 'in' ended before the component"),
+        std::string::npos)
+        << dropped;
+    ComponentDefinition local = definition("LosesAMember", "L");
+    local.parameters = {{"local", true}};
+    const std::string declared = errorOf([&] { load(local); });
+    EXPECT_NE(declared.find("parameter 'gain' declared after the constructor"), std::string::npos)
+        << declared;
+    load(recorder("A", -1));
+    start();
+    EXPECT_TRUE(runs());
+    EXPECT_EQ(order(), std::vector<std::string>{"/A"});
 }
 
 TEST_F(Fault, SafeIsCalledForAllInOrder) {
