@@ -72,13 +72,13 @@ def test_random_tests_share_a_budget(folder: Path, workers: int) -> None:
     assert "1 failed, 3 passed" in done.stdout
     said = dict(re.findall(r"^tests/test_it\.py::test_(\w+): (.*)$", done.stdout, re.MULTILINE))
     assert set(said) == {"light", "heavy", "wrong"}
-    # A budget of 1 s in five parts; an example takes 0.02 s.
+    # A budget of 1 s in five parts; an example takes 0.02 s, and one more may begin at the end.
     light, heavy = (re.match(r"(\d+) examples, (\d+) left out in", said[name]) for name in
                     ("light", "heavy"))  # fmt: skip
     assert light
     assert heavy
-    assert 1 <= int(light[1]) <= 10 < int(light[2])
-    assert 1 <= int(heavy[1]) <= 30 < int(heavy[2])
+    assert 1 <= int(light[1]) <= 11 < int(light[2])
+    assert 1 <= int(heavy[1]) <= 31 < int(heavy[2])
     assert said["light"].endswith(" of 0.2 s")
     assert said["heavy"].endswith(" of 0.6 s")
     rows = {line.split("\t")[3]: line.split("\t")[:3] for line in table.read_text().splitlines()}
