@@ -3,10 +3,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <limits>
 #include <map>
 #include <optional>
+#include <string_view>
 
 namespace rtcf::executor {
 
@@ -16,11 +16,14 @@ using Settings = std::vector<std::pair<std::string, ParameterValue>>;
 constexpr std::string_view kSize = ParameterDeclaration::kSizeSuffix;
 constexpr std::uint64_t kFixed = std::numeric_limits<std::uint64_t>::max();
 
+bool isSize(std::string_view name) {
+    return name.size() > kSize.size() && name.substr(name.size() - kSize.size()) == kSize;
+}
+
 // `taps_3` → `taps`, `gain_0_1` → `gain`, `taps_size` → `taps`; other names as they are.
 std::string arrayOf(const std::string& name) {
     std::string_view rest = name;
-    if (rest.size() > kSize.size() && rest.substr(rest.size() - kSize.size()) == kSize)
-        return std::string(rest.substr(0, rest.size() - kSize.size()));
+    if (isSize(rest)) return std::string(rest.substr(0, rest.size() - kSize.size()));
     for (;;) {
         const std::size_t end = rest.find_last_not_of("0123456789");
         if (end == 0 || end == std::string_view::npos || end + 1 == rest.size() || rest[end] != '_')
@@ -158,9 +161,7 @@ class Keeper {
         std::string list;
         std::uint64_t count = 0;
         for (const InheritedParameter* member : members) {
-            const std::string& name = member->name;
-            if (name.size() > kSize.size() && name.substr(name.size() - kSize.size()) == kSize)
-                continue;
+            if (isSize(member->name)) continue;
             if (count == size) break;
             list += (count++ == 0 ? "" : ", ") + parameterText(member->value);
         }

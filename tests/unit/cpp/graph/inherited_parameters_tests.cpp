@@ -34,7 +34,7 @@ template <std::size_t N>
 using Gains = With<Parameter<std::array<double, N>>>;
 using Settings = std::vector<std::pair<std::string, ParameterValue>>;
 
-// What a component with these parameters hands over.
+// Inherited parameters of these names and values, all of them chosen.
 std::vector<InheritedParameter> of(const Settings& settings) {
     std::vector<InheritedParameter> inherited;
     for (const auto& [name, value] : settings) inherited.push_back({name, value, true});

@@ -74,7 +74,6 @@ TEST(Library, OfAnotherAbiIsRejectedWithBothNumbers) {
         EXPECT_NE(text.find(part), std::string::npos) << text;
 }
 
-// The same headers and ABI number; only the compiler options differ.
 TEST(Library, WithTwoTypesOfOneNameIsRejected) {
     const std::string error = errorOf(kFolder + "registered_twice.so");
     EXPECT_NE(error.find("registers the type Gain twice"), std::string::npos) << error;
@@ -82,6 +81,7 @@ TEST(Library, WithTwoTypesOfOneNameIsRejected) {
     EXPECT_NE(error.find("of file 2"), std::string::npos) << error;
 }
 
+// The same headers and ABI number; only the compiler options differ.
 TEST(Library, OfAnotherLayoutIsRejected) {
     const std::string text = errorOf(kFolder + "other_layout.so");
     EXPECT_NE(text.find("was built for component ABI"), std::string::npos) << text;
