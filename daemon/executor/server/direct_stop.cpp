@@ -108,12 +108,19 @@ void DirectStop::threadMain() {
             polled.push_back({client.asked ? -1 : client.fd, POLLIN, 0});  // no further requests
         const int at_most_ms = clients_.empty() && !full ? 1000 : 100;
         ::poll(polled.data(), polled.size(), waits ? kLookMs : at_most_ms);
+        if ((polled[1].revents & POLLIN) != 0) accept();
+        const std::uint64_t before = last().count;
         for (std::size_t i = clients_.size(); i-- > 0;) {
-            if (attend(clients_[i], polled[i + 2].revents != 0)) continue;
+            if (attend(clients_[i])) continue;
             ::close(clients_[i].fd);
             clients_.erase(clients_.begin() + static_cast<std::ptrdiff_t>(i));
         }
-        if ((polled[1].revents & POLLIN) != 0) accept();
+        // Not before all waiting requests are counted: who sees the loop stopped and starts it must
+        // not be rejected because of one of them.
+        if (last().count != before) {
+            what_.stop();
+            mark_.remove();
+        }
         listener_->renew(monotonicNow());
     }
     for (const Client& client : clients_) {
@@ -124,8 +131,14 @@ void DirectStop::threadMain() {
 }
 
 void DirectStop::accept() {
-    const int fd = listener_->accept();
-    if (fd < 0) return;
+    for (std::size_t i = clients_.size(); i < kMostClients; ++i) {
+        const int fd = listener_->accept();
+        if (fd < 0) return;
+        admit(fd);
+    }
+}
+
+void DirectStop::admit(int fd) {
     ucred peer{};
     socklen_t size = sizeof peer;
     if (::getsockopt(fd, SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0) {
@@ -142,7 +155,7 @@ void DirectStop::accept() {
     clients_.push_back({fd, peer.uid, peer.pid, false, monotonicNow() + kLineTimeout, 0, {}});
 }
 
-bool DirectStop::attend(Client& client, bool readable) {
+bool DirectStop::attend(Client& client) {
     if (client.asked) {
         if (!what_.running()) return !answerStopped(client);
         if (monotonicNow() < client.until_ns) return true;
@@ -151,10 +164,9 @@ bool DirectStop::attend(Client& client, bool readable) {
                "or the executor after stall_timeout");
         return false;
     }
-    if (!readable) return monotonicNow() < client.until_ns;
     std::array<char, kLongestLine> buffer{};
     const ssize_t count = ::recv(client.fd, buffer.data(), buffer.size(), 0);
-    if (count < 0) return errno == EAGAIN || errno == EINTR;
+    if (count < 0) return (errno == EAGAIN || errno == EINTR) && monotonicNow() < client.until_ns;
     client.text.append(buffer.data(), static_cast<std::size_t>(count));
     if (client.text.find('\n') == std::string::npos)
         return count > 0 && client.text.size() <= kLongestLine;
@@ -162,7 +174,7 @@ bool DirectStop::attend(Client& client, bool readable) {
         answer(client.fd, "refused: the only request here is `stop`");
         return false;
     }
-    stop(client);
+    countStop(client);
     client.asked = true;
     client.until_ns = monotonicNow() + kAnswerTimeout;
     client.saved_until_ns = monotonicNow() + kDiskTimeout;
@@ -182,13 +194,9 @@ bool DirectStop::answerStopped(const Client& client) const {
     return true;
 }
 
-void DirectStop::stop(const Client& client) {
-    {
-        const std::lock_guard<std::mutex> lock(mutex_);
-        last_ = {last_.count + 1, client.user, client.pid, monotonicNow()};
-    }
-    what_.stop();
-    mark_.remove();
+void DirectStop::countStop(const Client& client) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    last_ = {last_.count + 1, client.user, client.pid, monotonicNow()};
 }
 
 }  // namespace rtcf::executor

@@ -71,14 +71,16 @@ class DirectStop {
     };
 
     void threadMain();
+    /// Accepts all clients that wait, unless there are too many.
     void accept();
-    /// Handles one client.
+    void admit(int fd);
+    /// Handles one client, without waiting for it; counts its request to stop.
     /// @return false if the client is to be disconnected
-    bool attend(Client& client, bool readable);
+    bool attend(Client& client);
     /// Answers a client after the end of the loop.
     /// @return false if the answer still waits for the disk
     bool answerStopped(const Client& client) const;
-    void stop(const Client& client);
+    void countStop(const Client& client);
 
     ResumeMark mark_;
     const Access& access_;

@@ -5,15 +5,15 @@
 #include <poll.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
-#include <sys/un.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cstdint>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "support/connect_to.hpp"
 
 namespace rtcf {
 namespace {
@@ -42,14 +42,7 @@ class FewDescriptors {
     std::vector<int> held_;
 };
 
-int connectTo(const std::string& path) {
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    std::copy(path.begin(), path.end(), address.sun_path);
-    const int fd = ::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-    EXPECT_EQ(::connect(fd, reinterpret_cast<sockaddr*>(&address), sizeof address), 0);
-    return fd;
-}
+using test::connectTo;
 
 TEST(Listener, AcceptsOneWithoutFreeDescriptorsAndTheOthersWait) {
     const std::string path = ::testing::TempDir() + "listener-" + std::to_string(::getpid());

@@ -3,13 +3,11 @@
 #include <gtest/gtest.h>
 #include <poll.h>
 #include <sys/socket.h>
-#include <sys/un.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <array>
-#include <cerrno>
-#include <system_error>
+
+#include "support/connect_to.hpp"
 
 namespace rtcf::test {
 
@@ -19,15 +17,7 @@ constexpr int kPatience = 60'000;  // ms
 
 }  // namespace
 
-ExecutorClient::ExecutorClient(const std::string& socket_path)
-    : fd_(::socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
-    sockaddr_un address{};
-    address.sun_family = AF_UNIX;
-    std::copy(socket_path.begin(), socket_path.end(), address.sun_path);
-    if (::connect(fd_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) {
-        throw std::system_error(errno, std::generic_category(), socket_path);
-    }
-}
+ExecutorClient::ExecutorClient(const std::string& socket_path) : fd_(connectTo(socket_path)) {}
 
 ExecutorClient::~ExecutorClient() { ::close(fd_); }
 
