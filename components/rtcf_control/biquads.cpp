@@ -3,14 +3,15 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <cstring>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include <rtcf/component.hpp>
+#include <rtcf/read_number.hpp>
 
 namespace rtcf_control {
 namespace {
@@ -95,10 +96,10 @@ class ChainReader {
             if (!(words >> kind)) continue;
             std::vector<double> numbers;
             for (std::string word; words >> word;) {
-                char* end = nullptr;
-                numbers.push_back(std::strtod(word.c_str(), &end));
-                if (*end != '\0' || !std::isfinite(numbers.back()))
+                const std::optional<double> number = rtcf::readNumber(word);
+                if (!number || !std::isfinite(*number))
                     return fmt::format("{}: {} is not a number", kind, word);
+                numbers.push_back(*number);
             }
             if (std::string error = section(kind, numbers); !error.empty()) return error;
         }

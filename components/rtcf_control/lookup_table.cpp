@@ -1,12 +1,14 @@
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <cstddef>
-#include <cstdlib>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include <rtcf/component.hpp>
+#include <rtcf/read_number.hpp>
+
+#include "words.hpp"
 
 namespace rtcf_control {
 namespace {
@@ -14,23 +16,12 @@ namespace {
 // Reads numbers separated by spaces or commas.
 /// @return empty, or the text that is not a finite number
 std::string parse(const std::string& text, std::vector<double>& numbers) {
-    const auto separates = [](char c) {
-        return c == ',' || std::isspace(static_cast<unsigned char>(c)) != 0;
-    };
-    const char* at = text.c_str();
-    while (true) {
-        while (separates(*at)) ++at;
-        if (*at == '\0') return {};
-        char* end = nullptr;
-        const double number = std::strtod(at, &end);
-        if (end == at || (*end != '\0' && !separates(*end)) || !std::isfinite(number)) {
-            const char* last = at;
-            while (*last != '\0' && !separates(*last)) ++last;
-            return {at, last};
-        }
-        numbers.push_back(number);
-        at = end;
+    for (const std::string& word : words(text)) {
+        const std::optional<double> number = rtcf::readNumber(word);
+        if (!number || !std::isfinite(*number)) return word;
+        numbers.push_back(*number);
     }
+    return {};
 }
 
 bool rises(const std::vector<double>& points) {

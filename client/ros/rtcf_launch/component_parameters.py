@@ -9,7 +9,7 @@ from rtcf.v1 import control_pb2, graph_pb2
 from rtcf_shared.enums import choices
 
 from rtcf_launch.codes import Code, Ending
-from rtcf_launch.parameters import Parameters, as_boolean, as_integer, close_to
+from rtcf_launch.parameters import Parameters, as_boolean, as_integer, as_number, close_to
 
 _ON_LOST = choices(control_pb2.OnLeaseLost.DESCRIPTOR)
 PREFIX = "rtcf_"
@@ -172,6 +172,8 @@ def _value(info: graph_pb2.ParameterInfo, value: Any) -> graph_pb2.ParameterValu
         value = as_integer(value)
     elif info.type == "bool":
         value = as_boolean(value)
+    elif info.type == "double":
+        value = as_number(value)
     if isinstance(value, bool):
         found = made(bool_value=value)
     elif isinstance(value, int):

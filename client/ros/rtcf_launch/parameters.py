@@ -1,12 +1,14 @@
 """Private parameters of a node, read with type checks; an error is one line."""
 
 import difflib
+import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
 from rtcf_launch.codes import Code, Ending
 
 _MISSING = object()
+_NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?", re.ASCII)
 
 
 def _wrong(message: str) -> Ending:
@@ -46,6 +48,7 @@ class Parameters:
         value = self._take(name)
         if value is _MISSING:
             return None
+        value = as_number(value)
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise _wrong(f"~{name} must be a number, not {_shown(value)}")
         if not low <= value <= high:  # NaN is in no range
@@ -95,6 +98,14 @@ class Parameters:
 def as_integer(value: Any) -> Any:
     """Convert a float with an integer value, such as 2.0, to int; return other values unchanged."""
     return int(value) if isinstance(value, float) and value.is_integer() else value
+
+
+def as_number(value: Any) -> Any:
+    """Convert a text such as 1e-3 to float, which YAML 1.1 does not read as a number; return other
+    values unchanged."""
+    if not isinstance(value, str) or not _NUMBER.fullmatch(value):
+        return value
+    return float(value)
 
 
 def as_boolean(value: Any) -> Any:

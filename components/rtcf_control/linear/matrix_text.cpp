@@ -6,13 +6,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
+#include <optional>
 #include <sstream>
+#include <string_view>
+
+#include <rtcf/read_number.hpp>
 
 #include "words.hpp"
 
 namespace rtcf_control {
 namespace {
+
+using rtcf::readNumber;
+using rtcf::takeNumber;
 
 // Relative to the largest element: symmetry of a matrix, and eigenvalues that count as 0.
 constexpr double kRounding = 1e-9;
@@ -24,11 +30,23 @@ std::string named(const char* name, const std::string& error) {
 // Returns empty, or the text that is not a finite number.
 std::string readNumbers(const std::string& text, std::vector<double>& numbers) {
     for (const std::string& word : words(text)) {
-        char* end = nullptr;
-        numbers.push_back(std::strtod(word.c_str(), &end));
-        if (*end != '\0' || !std::isfinite(numbers.back())) return word;
+        const std::optional<double> number = readNumber(word);
+        if (!number || !std::isfinite(*number)) return word;
+        numbers.push_back(*number);
     }
     return {};
+}
+
+// Reads a pole such as -2+1j, -2 or 1j.
+std::optional<std::complex<double>> readPole(std::string_view word) {
+    const std::optional<double> first = takeNumber(word);
+    if (!first) return std::nullopt;
+    if (word.empty()) return *first;
+    if (word == "j") return std::complex<double>(0.0, *first);
+    if (word[0] != '+' && word[0] != '-') return std::nullopt;
+    const std::optional<double> second = takeNumber(word);
+    if (!second || word != "j") return std::nullopt;
+    return std::complex<double>(*first, *second);
 }
 
 }  // namespace
@@ -137,23 +155,10 @@ std::string readVector(const char* name, const std::string& text, int size,
 
 std::string readPoles(const std::string& text, std::vector<std::complex<double>>& poles) {
     for (const std::string& word : words(text)) {
-        char* end = nullptr;
-        const double first = std::strtod(word.c_str(), &end);
-        std::complex<double> pole(first, 0.0);
-        if (*end == 'j') {
-            pole = {0.0, first};
-            ++end;
-        } else if (*end == '+' || *end == '-') {
-            const char* const begin = end;
-            pole.imag(std::strtod(begin, &end));
-            if (end == begin || *end != 'j')
-                end = const_cast<char*>("?");
-            else
-                ++end;
-        }
-        if (*end != '\0' || !std::isfinite(std::abs(pole)))
+        const std::optional<std::complex<double>> pole = readPole(word);
+        if (!pole || !std::isfinite(std::abs(*pole)))
             return fmt::format("{} is not a number; write poles as in \"-3 -2+1j -2-1j\"", word);
-        poles.push_back(pole);
+        poles.push_back(*pole);
     }
     for (const std::complex<double>& pole : poles) {
         if (std::count(poles.begin(), poles.end(), pole) !=

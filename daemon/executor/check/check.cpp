@@ -19,6 +19,7 @@
 #include "faults/flight_recorder.hpp"
 #include "graph/definition.hpp"
 #include "logging/log.hpp"
+#include "rtcf/read_number.hpp"
 #include "runner/runner.hpp"
 
 namespace rtcf::executor {
@@ -69,10 +70,10 @@ ParameterValue parseValue(const std::string& text) {
         std::size_t used = 0;
         if (const long long number = std::stoll(text, &used); used == text.size())
             return std::int64_t{number};
-        if (const double number = std::stod(text, &used); used == text.size()) return number;
     } catch (const std::logic_error&) {
-        // Not a number, so a string.
+        // Not an integer.
     }
+    if (const std::optional<double> number = readNumber(text)) return *number;
     return text;
 }
 

@@ -7,9 +7,8 @@
 namespace rtcf::executor {
 
 /// Gives the calling thread the locale "C" until it ends, so that its components read and write
-/// numbers with a point, for example with strtod(). A component, or a library that it uses, may
-/// call setlocale(), which changes the locale of all threads without one of their own. Not
-/// real-time safe.
+/// numbers with a point. A component, or a library that it uses, may call setlocale(), which
+/// changes the locale of all threads without one of their own. Not real-time safe.
 inline void useCLocale() noexcept {
     static const locale_t locale = ::newlocale(LC_ALL_MASK, "C", nullptr);
     if (locale != nullptr) ::uselocale(locale);

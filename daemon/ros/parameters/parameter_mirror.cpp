@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "common/utf8.hpp"
+#include "rtcf/read_number.hpp"
 
 namespace rtcf::ros1 {
 
@@ -66,8 +67,13 @@ std::optional<ParameterValue> fromXmlRpc(XmlRpc::XmlRpcValue& value, const std::
             if (type == "int" && whole) return static_cast<std::int64_t>(real);
             return real;
         }
-        case XmlRpc::XmlRpcValue::TypeString:
-            return static_cast<std::string&>(value);
+        case XmlRpc::XmlRpcValue::TypeString: {
+            const std::string& text = static_cast<std::string&>(value);
+            // rosparam and roslaunch read 1e-3 as text, as YAML 1.1 does.
+            const std::optional<double> real = readNumber(text);
+            if (type == "double" && real && std::isfinite(*real)) return *real;
+            return text;
+        }
         default:
             return std::nullopt;
     }

@@ -11,7 +11,9 @@ class SetsLocale final : public rtcf::Component {
         return std::setlocale(LC_ALL, "") != nullptr ||
                fail("the locale of the environment is unknown");
     }
-    void update() override { half_.write(std::strtod("0.5", nullptr)); }
+    void update() override {
+        half_.write(std::strtod("0.5", nullptr));
+    }  // in the locale of rtcf's threads
 
     rtcf::Output<double> half_{this, "half"};
 };

@@ -150,6 +150,26 @@ TEST_F(ParameterMirrorTest, TakesNoSizeFromBesideItsListUntilItIsWrittenAgain) {
     EXPECT_EQ(taken, std::vector<std::int64_t>{4});
 }
 
+// rosparam reads 1e-3 as text, as YAML 1.1 does.
+TEST_F(ParameterMirrorTest, TakesATextThatIsANumberWhereANumberIsWanted) {
+    std::vector<rtcf::executor::ParameterBatch> taken;
+    ParameterMirror mirror;
+    mirror.serve([&](const std::string&, const rtcf::executor::ParameterBatch& batch, BatchPolicy,
+                     const std::function<void(const std::string&)>& done) {
+        taken.push_back(batch);
+        done({});
+    });
+    mirror.reconcile(calls(), caller_, {component(2.0)});
+    for (const char* text : {"1e-3", "fast"}) {
+        ASSERT_TRUE(ask("setParam", texts({"/test", "/C/kp", text}))[0]);
+        mirror.noteWritten("/C/kp/");
+        mirror.reconcile(calls(), caller_, {component(2.0)});
+    }
+    ASSERT_EQ(taken.size(), 2U);
+    EXPECT_EQ(taken[0].at(0).second, rtcf::ParameterValue(0.001));
+    EXPECT_EQ(taken[1].at(0).second, rtcf::ParameterValue(std::string("fast"))) << "for the error";
+}
+
 // The loop may answer during a turn, which still has the old values.
 TEST_F(ParameterMirrorTest, OverwritesNoNewValueOfTheLoopWithAnOldOne) {
     std::vector<double> taken;

@@ -7,6 +7,8 @@
 #include <csignal>
 #include <thread>
 
+#include <rtcf/read_number.hpp>
+
 #include "ros/roscpp/node_name.hpp"
 #include "ros_fixture.hpp"
 
@@ -60,8 +62,8 @@ TEST_F(RosNodeTest, NoValueIsLostOrReordered) {
     startNode();
     serve({&source}, {});
     const auto listener = listen("/out");
-    double last = std::stod(flow(source, *listener));
-    while (const auto line = listener->line(300ms)) last = std::stod(*line);
+    double last = rtcf::readNumber(flow(source, *listener)).value();
+    while (const auto line = listener->line(300ms)) last = rtcf::readNumber(*line).value();
     for (int i = 1; i <= 2000; ++i) {
         source.write(last + i);
         if (i % 20 == 0) std::this_thread::sleep_for(10ms);
@@ -69,7 +71,7 @@ TEST_F(RosNodeTest, NoValueIsLostOrReordered) {
     for (int i = 1; i <= 2000; ++i) {
         const auto line = listener->line(5s);
         ASSERT_TRUE(line) << "after " << i - 1;
-        ASSERT_EQ(std::stod(*line), last + i);
+        ASSERT_EQ(rtcf::readNumber(*line), last + i);
     }
 }
 

@@ -1,9 +1,11 @@
 #include "support/runner_fixture.hpp"
 
 #include <cmath>
-#include <cstdlib>
 #include <limits>
 #include <new>
+#include <string_view>
+
+#include <rtcf/read_number.hpp>
 
 namespace rtcf::test {
 
@@ -134,7 +136,7 @@ double RunnerFixture::value(const std::string& component, const std::string& por
     for (std::size_t i = 0; i < values.size(); ++i) {
         if (ports[i].name != port || !values[i].text) continue;
         const std::string& text = *values[i].text;  // "data: 1.5"
-        return std::strtod(text.c_str() + text.find(' '), nullptr);
+        return readNumber(std::string_view(text).substr(text.find(' ') + 1)).value();
     }
     return std::numeric_limits<double>::quiet_NaN();
 }

@@ -6,7 +6,13 @@ from typing import Any
 
 import pytest
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
-from rtcf_launch import arguments, component_parameters, daemon_choice, runner_parameters
+from rtcf_launch import (
+    arguments,
+    component_parameters,
+    daemon_choice,
+    parameters,
+    runner_parameters,
+)
 from rtcf_launch.codes import Code, Ending
 from rtcf_launch.component_choice import ComponentChoice
 from rtcf_launch.runner_node import runner_name
@@ -137,6 +143,20 @@ def test_missing_parameters_are_left_to_the_daemon() -> None:
 def test_parameters_of_rtcf_2021_are_accepted() -> None:
     found, lines = runner_parameters.read({"mode": "No_Wait", "safe_stack_size_kB": 0})
     assert (found.mode, found.settings.stack_kb, lines) == ("no_wait", 16, [])
+
+
+@pytest.mark.parametrize("text", ["1e-3", "1E-3", "+1e-3", ".1e-2", "1.e-3"])
+def test_a_text_that_yaml_does_not_read_as_a_number_is_one(text: str) -> None:
+    declared = {"gain": graph_pb2.ParameterInfo(name="gain", type="double"),
+                "name": graph_pb2.ParameterInfo(name="name", type="string")}  # fmt: skip
+    settings, _, _ = component_parameters.settings({"gain": text, "name": text}, declared)
+    found = {each.name: each.value for each in settings}
+    assert found["gain"].double_value == 0.001
+    assert found["name"].string_value == text
+    read, _ = runner_parameters.read({"frequency": "1e3"})
+    assert read.settings.frequency_hz == 1000.0
+    for other in ("fast", "1e", "nan", "0x1", "1_0", "\u0661", ""):
+        assert parameters.as_number(other) == other
 
 
 def test_numbers_are_converted_as_in_roscpp() -> None:
