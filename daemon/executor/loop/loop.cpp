@@ -57,6 +57,13 @@ class ProbeWork final : public BoundaryWork {
     Probe& probe_;
 };
 
+// To an absolute time, so that preemptions before the call do not add up (clock_nanosleep(2)).
+void sleepUntil(std::int64_t time_ns) noexcept {
+    const timespec until{time_ns / kSecond, time_ns % kSecond};
+    while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) == EINTR) {
+    }
+}
+
 // Cycles on time that remove one overrun from the bucket.
 constexpr std::uint64_t kBucketLeak = 1000;
 // Largest number of cycles in a row that CatchUp catches up: a freeze of the machine may have
@@ -92,6 +99,7 @@ void Loop::reset(const LoopSettings& settings, std::uint64_t stops_known, Pace p
     cycles_on_time_ = 0;
     caught_up_ = 0;
     beat_ns_ = 0;
+    overload_ = {};
     stack_bytes_ = settings.realtime.stack_bytes;
 }
 
@@ -341,9 +349,13 @@ void Loop::followRealTime() noexcept {
         // A device begins the next cycle itself; waitForSource() counts missed beats.
         const std::int64_t limit = time + cycle_.clock().period_ns;
         end = endOfCycle(wake_up, begin, limit);
-        if (end >= limit) noteOverrun(wake_up, begin, end, behind);
-        deadline = device != nullptr ? limit : nextDeadline(wake_up.deadline_ns, end);
+        const bool late = end >= limit;
+        if (late) noteOverrun(wake_up, begin, end, behind);
+        const std::int64_t rest = overload_.rest(wake_up.wake_ns, end, late);
+        if (rest != 0) rests_.add(1);
+        deadline = device != nullptr ? limit : nextDeadline(wake_up.deadline_ns, end, rest);
         cycle_.settle();
+        if (rest != 0 && device != nullptr) sleepUntil(end + rest);
     }
 }
 
@@ -404,10 +416,7 @@ Loop::WakeUp Loop::waitForSource(Source& device) noexcept {
 
 Loop::WakeUp Loop::waitForClock(std::int64_t deadline_ns) noexcept {
     const std::int64_t spin = spin_ns_.load(std::memory_order_relaxed);
-    const timespec until{(deadline_ns - spin) / kSecond, (deadline_ns - spin) % kSecond};
-    // An absolute time, so that preemptions before the call do not add up (clock_nanosleep(2)).
-    while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) == EINTR) {
-    }
+    sleepUntil(deadline_ns - spin);
     for (const void* line : cycle_.schedule().footprint) __builtin_prefetch(line);
     std::int64_t now = monotonicNow();
     cycle_.statistics().wake_up.add(now - deadline_ns + spin);
@@ -444,8 +453,8 @@ void Loop::countOverrun(const WakeUp& wake_up, std::int64_t begin_ticks, std::in
     }
 }
 
-std::int64_t Loop::nextDeadline(std::int64_t deadline_ns, std::int64_t end_ns) noexcept
-    RTCF_NONBLOCKING {
+std::int64_t Loop::nextDeadline(std::int64_t deadline_ns, std::int64_t end_ns,
+                                std::int64_t rest_ns) noexcept RTCF_NONBLOCKING {
     const std::int64_t period = cycle_.clock().period_ns;
     const std::int64_t next = deadline_ns + period;
     if (end_ns < next) {
@@ -456,17 +465,18 @@ std::int64_t Loop::nextDeadline(std::int64_t deadline_ns, std::int64_t end_ns) n
     }
     switch (overrun_policy_.load(std::memory_order_relaxed)) {
         case OverrunPolicy::CatchUp:
-            if (++caught_up_ > kMostCaughtUp) break;
+            if (++caught_up_ > kMostCaughtUp || rest_ns != 0) break;
             cycle_.setElapsed(period);
             return next;
         case OverrunPolicy::Relative:
-            cycle_.setElapsed((end_ns + period - deadline_ns) / period * period);
-            return end_ns + period;
+            end_ns += std::max(period, rest_ns);
+            cycle_.setElapsed((end_ns - deadline_ns) / period * period);
+            return end_ns;
         case OverrunPolicy::Skip:
             break;
     }
     caught_up_ = 0;
-    const std::int64_t missed = (end_ns - next) / period + 1;
+    const std::int64_t missed = (end_ns + rest_ns - next) / period + 1;
     noteMissed(missed);
     cycle_.setElapsed((missed + 1) * period);
     return next + missed * period;

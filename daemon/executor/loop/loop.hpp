@@ -16,6 +16,7 @@
 #include "faults/flight_recorder.hpp"
 #include "loop/adoption.hpp"
 #include "loop/cycle.hpp"
+#include "loop/overload.hpp"
 #include "loop/probe.hpp"
 #include "loop/schedule.hpp"
 #include "realtime/cpu_claim.hpp"
@@ -140,6 +141,8 @@ class Loop {
     std::uint64_t progress() const noexcept {
         return statistics().iteration.load(std::memory_order_relaxed) + waits_.value();
     }
+    /// Number of rests because of an overload.
+    std::uint64_t rests() const noexcept { return rests_.value(); }
     /// CPU that the thread is pinned to; -1 = none.
     int cpu() const noexcept { return cpu_.load(std::memory_order_relaxed); }
     int threadId() const noexcept { return thread_id_.load(std::memory_order_relaxed); }
@@ -182,8 +185,8 @@ class Loop {
                       bool behind) noexcept RTCF_NONBLOCKING;
     void noteOverrun(const WakeUp& wake_up, std::int64_t begin_ticks, std::int64_t end_ns,
                      bool behind) noexcept RTCF_NONBLOCKING;
-    std::int64_t nextDeadline(std::int64_t deadline_ns, std::int64_t end_ns) noexcept
-        RTCF_NONBLOCKING;
+    std::int64_t nextDeadline(std::int64_t deadline_ns, std::int64_t end_ns,
+                              std::int64_t rest_ns) noexcept RTCF_NONBLOCKING;
 
     Cycle cycle_;
     Log& log_;
@@ -205,10 +208,12 @@ class Loop {
     std::uint64_t cycles_on_time_ = 0;
     std::uint32_t caught_up_ = 0;  // cycles since the last one on time
     std::int64_t beat_ns_ = 0;     // time of the last beat of a Source; 0 = none yet
+    Overload overload_;
 
     // Shared.
     std::atomic<std::uint64_t> stops_{0};
     Counter waits_;
+    Counter rests_;
     std::atomic<bool> running_{false};
     std::atomic<bool> joinable_{false};
     std::atomic<int> thread_id_{0};

@@ -22,16 +22,25 @@ std::string OverrunReport::take(const Loop& loop, const Graph& graph, bool last)
     const std::uint64_t missed = statistics.missed.value();
     const std::int64_t now = monotonicNow();
     if (overruns == reported_overruns_) return {};
-    if (!last && reported_at_ns_ != 0 && now - reported_at_ns_ < kInterval) return {};
+    const std::uint64_t rests = loop.rests();
+    const bool overloaded = rests != reported_rests_;
+    const bool news = last || reported_at_ns_ == 0 || (overloaded && !reported_overload_);
+    if (!news && now - reported_at_ns_ < kInterval) return {};
     std::string line = fmt::format("{} ended late", cycles(overruns - reported_overruns_));
     if (missed != reported_missed_)
         line += fmt::format(", {} missed", cycles(missed - reported_missed_));
     if (reported_at_ns_ != 0)
         line += fmt::format(" in {:.0f} s", static_cast<double>(now - reported_at_ns_) / 1e9);
     line += mostFrequentCause(statistics, graph);
+    if (overloaded)
+        line +=
+            "; the loop is overloaded, and leaves a quarter of the CPU to others: take components "
+            "out, or lower its frequency";
     reported_at_ns_ = now;
     reported_overruns_ = overruns;
     reported_missed_ = missed;
+    reported_rests_ = rests;
+    reported_overload_ = overloaded;
     return line;
 }
 

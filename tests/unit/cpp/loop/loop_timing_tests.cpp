@@ -116,6 +116,25 @@ TEST_F(LoopTiming, LateWakeUpIsASeparateCause) {
     EXPECT_LE(late() + runner().graph()->get("/A").statistics->overruns.value(), overruns());
 }
 
+TEST_F(LoopTiming, AnOverloadedLoopRestsUntilAChangeMakesItFaster) {
+    load(definition("Ticker", "A"));
+    ComponentDefinition spinner = definition("Spinner", "S");
+    spinner.parameters = {{"busy_us", std::int64_t{3900}},
+                          {"busy_cycles", std::int64_t{1'000'000}}};
+    load(spinner);
+    start();
+    ASSERT_TRUE(eventually([this] { return runner().loop().rests() > 10; }));
+    ASSERT_TRUE(eventually([this] {
+        const std::vector<std::string> lines = linesOnOverruns();
+        return !lines.empty() && lines.back().find("the loop is overloaded") != std::string::npos;
+    }));
+    unload("/S");
+    EXPECT_TRUE(eventually([this] {
+        const std::uint64_t before = runner().loop().rests();
+        return runs(20) && runner().loop().rests() == before;
+    }));
+}
+
 // Without full real-time rights a loop is not blamed for being late.
 TEST_F(LoopTiming, FullBucketStopsTheLoopUnlessItRunsDegraded) {
     configure([](RunnerSettings& settings) { settings.loop.max_overruns = 3; });
