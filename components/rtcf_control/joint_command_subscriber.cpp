@@ -51,7 +51,7 @@ class JointCommandSubscriber final : public rtcf::Component {
     JointStatus<Kind> status_{this};
 
     rtcf::Parameter<std::string> joints{this, "joints", "joint1",
-                                        rtcf::Doc("names of 1 to 16 joints; fixed after the load")};
+                                        rtcf::Doc("names of 1 to 16 joints"), rtcf::Fixed()};
     rtcf::Parameter<Incomplete> incomplete{
         this,
         "incomplete",
@@ -64,8 +64,6 @@ class JointCommandSubscriber final : public rtcf::Component {
     rtcf::State<std::uint32_t> rejected_{this, "rejections", 0,
                                          rtcf::Doc("number of rejected messages")};
 
-    bool configured_ = false;
-
     Outputs makeOutputs(std::size_t quantity) {
         return makePorts<rtcf::Output<double>, kMostJoints>(this, kQuantities[quantity],
                                                             std::string(), rtcf::Finite());
@@ -73,21 +71,15 @@ class JointCommandSubscriber final : public rtcf::Component {
 
     bool prepare(const rtcf::Values& proposed) override {
         Setup setup{words(proposed[joints])};
-        if (const std::string why =
-                jointsError(setup.joints, configured_ ? &setup_->joints : nullptr);
-            !why.empty())
-            return fail(why);
+        if (const std::string why = jointsError(setup.joints); !why.empty()) return fail(why);
         setup_.stage(std::move(setup));
         return true;
     }
 
     bool configure() override {
         status_.reserve(kStatusSize, setup_->joints);
-        configured_ = true;
         return true;
     }
-
-    void cleanup() override { configured_ = false; }
 
     bool start() override {
         status_.begin();

@@ -19,17 +19,13 @@ constexpr std::size_t kMostJoints = 16;
 constexpr std::size_t kMostNames = 1024;
 
 /// Reason why a list cannot be the parameter `joints`; empty if it can. Not real-time safe.
-/// @param loaded joints of the loaded component, which cannot change; null before the load
-inline std::string jointsError(const std::vector<std::string>& joints,
-                               const std::vector<std::string>* loaded = nullptr) {
+inline std::string jointsError(const std::vector<std::string>& joints) {
     if (joints.empty() || joints.size() > kMostJoints)
         return fmt::format("joints has {} names; write 1 to {}", joints.size(), kMostJoints);
     std::vector<std::string> sorted = joints;
     std::sort(sorted.begin(), sorted.end());
     const auto twice = std::adjacent_find(sorted.begin(), sorted.end());
     if (twice != sorted.end()) return fmt::format("joints has {} twice", *twice);
-    if (loaded != nullptr && joints != *loaded)
-        return "joints cannot change after the load; unload the component and load it";
     return {};
 }
 

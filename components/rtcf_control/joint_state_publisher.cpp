@@ -42,20 +42,15 @@ class JointStatePublisher final : public rtcf::Component {
     JointStatus<Kind> status_{this};
 
     rtcf::Parameter<std::string> joints{this, "joints", "joint1",
-                                        rtcf::Doc("names of 1 to 16 joints; fixed after the load")};
+                                        rtcf::Doc("names of 1 to 16 joints"), rtcf::Fixed()};
     rtcf::Parameter<double> timeout{
         this,           "timeout",       std::numeric_limits<double>::infinity(),
         rtcf::Min(0.0), rtcf::Unit("s"), rtcf::Doc("age from which a value counts as missing")};
     rtcf::Derived<Setup> setup_{this};
 
-    bool configured_ = false;
-
     bool prepare(const rtcf::Values& proposed) override {
         Setup setup{words(proposed[joints])};
-        if (const std::string why =
-                jointsError(setup.joints, configured_ ? &setup_->joints : nullptr);
-            !why.empty())
-            return fail(why);
+        if (const std::string why = jointsError(setup.joints); !why.empty()) return fail(why);
         setup_.stage(std::move(setup));
         return true;
     }
@@ -69,11 +64,8 @@ class JointStatePublisher final : public rtcf::Component {
         sample.effort.resize(count);
         state.reserve(sample);
         status_.reserve(kStatusSize, setup_->joints);
-        configured_ = true;
         return true;
     }
-
-    void cleanup() override { configured_ = false; }
 
     bool start() override {
         status_.begin();

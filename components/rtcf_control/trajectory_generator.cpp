@@ -3,9 +3,9 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -14,6 +14,7 @@
 #include <trajectory_msgs/JointTrajectoryPoint.h>
 
 #include <rtcf/component.hpp>
+#include <rtcf/read_number.hpp>
 
 #include "joint_names.hpp"
 #include "trajectory/stop_motion.hpp"
@@ -208,7 +209,7 @@ class TrajectoryGenerator final : public rtcf::Component {
     rtcf::Output<std::uint32_t> rejected{this, "rejected"};
 
     rtcf::Parameter<std::string> joints{this, "joints", "joint1",
-                                        rtcf::Doc("names of 1 to 16 joints; fixed after the load")};
+                                        rtcf::Doc("names of 1 to 16 joints"), rtcf::Fixed()};
     rtcf::Parameter<std::string> velocity{
         this, "velocity", "1", rtcf::Unit("1/s"),
         rtcf::Doc("largest velocity: one number for all joints, or one for each")};
@@ -264,9 +265,7 @@ class TrajectoryGenerator final : public rtcf::Component {
         Setup setup;
         setup.joints = words(proposed[joints]);
         const std::size_t count = setup.joints.size();
-        if (const std::string why = jointsError(setup.joints, memory_ ? &setup_->joints : nullptr);
-            !why.empty())
-            return fail(why);
+        if (const std::string why = jointsError(setup.joints); !why.empty()) return fail(why);
         Numbers numbers{};
         constexpr Condition kLimit{[](double x) { return std::isfinite(x) && x > 0.0; },
                                    "finite and above 0"};
@@ -307,9 +306,9 @@ class TrajectoryGenerator final : public rtcf::Component {
                              found.size(), count);
         for (std::size_t i = 0; i < count; ++i) {
             const std::string& word = found[found.size() == 1 ? 0 : i];
-            char* end = nullptr;
-            numbers[i] = std::strtod(word.c_str(), &end);
-            if (*end != '\0') return RTCF_FAIL(this, "{}: {} is not a number", name, word);
+            const std::optional<double> number = rtcf::readNumber(word);
+            if (!number) return RTCF_FAIL(this, "{}: {} is not a number", name, word);
+            numbers[i] = *number;
             if (!condition.holds(numbers[i]))
                 return RTCF_FAIL(this, "{}: {} is not {}", name, word, condition.text);
         }

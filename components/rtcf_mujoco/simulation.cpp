@@ -422,11 +422,11 @@ class Plant {
 class Simulation final : public rtcf::Component {
     static constexpr std::size_t kMostOfRecord = 94;  // bytes of a text in a log record
 
-    rtcf::Parameter<std::string> model{this, "model", "",
-                                       rtcf::Doc("absolute path of an MJCF or URDF file")};
+    rtcf::Parameter<std::string> model{
+        this, "model", "", rtcf::Doc("absolute path of an MJCF or URDF file"), rtcf::Fixed()};
     rtcf::Parameter<std::string> keyframe{
-        this, "keyframe", "",
-        rtcf::Doc("initial state, a keyframe of the model; empty: its qpos0")};
+        this, "keyframe", "", rtcf::Doc("initial state, a keyframe of the model; empty: its qpos0"),
+        rtcf::Fixed()};
     rtcf::Parameter<double> timestep{
         this,           "timestep",      0.0,
         rtcf::Min(0.0), rtcf::Unit("s"), rtcf::Doc("longest time step; 0: the model's")};
@@ -439,7 +439,8 @@ class Simulation final : public rtcf::Component {
         rtcf::Unit("1/turn"),
         rtcf::Doc("resolution of the positions of hinge joints; 0: exact")};
     rtcf::Parameter<std::string> pushed_body{
-        this, "pushed_body", "", rtcf::Doc("body that push acts on; empty: the model's last one")};
+        this, "pushed_body", "", rtcf::Doc("body that push acts on; empty: the model's last one"),
+        rtcf::Fixed()};
 
     rtcf::Parameter<double> brake_friction{
         this,
@@ -459,15 +460,6 @@ class Simulation final : public rtcf::Component {
     rtcf::State<bool> was_reset_{this, "was_reset", false, rtcf::Doc("the last value of reset")};
 
     std::unique_ptr<Plant> plant_;
-
-    bool prepare(const rtcf::Values& proposed) override {
-        if (plant_ == nullptr) return true;  // configure() checks them
-        const bool same = proposed[model] == model.value() &&
-                          proposed[keyframe] == keyframe.value() &&
-                          proposed[pushed_body] == pushed_body.value();
-        return same ||
-               fail("model, keyframe and pushed_body are fixed at load: replace the component");
-    }
 
     bool configure() override {
         const std::string& file = model.value();

@@ -106,10 +106,11 @@ class Parameter(Declarable):
     """A parameter: `self.kp`. Users set it within its bounds; it is constant during a cycle.
 
     `name` is its name outside the component, and may contain groups: `Parameter(1.0,
-    name="gains/p")`.
+    name="gains/p")`. With `fixed=True`, the value does not change after the load: `rtcfctl set`
+    rejects another one, and `rtcfctl apply` replaces the component.
     """
 
-    allowed = ("unit", "doc", "min", "max", "name")
+    allowed = ("unit", "doc", "min", "max", "name", "fixed")
 
 
 class State(Declarable):

@@ -412,6 +412,10 @@ def _flags(port: graph_pb2.PortInfo) -> str:
 
 
 def _range(found: graph_pb2.ParameterInfo) -> str:
+    return " ".join(filter(None, (_bounds(found), "fixed" if found.fixed else "")))
+
+
+def _bounds(found: graph_pb2.ParameterInfo) -> str:
     if found.choices:
         return "|".join(found.choices)
     low = f"{found.minimum:g}" if found.HasField("minimum") else ""

@@ -74,6 +74,7 @@ class ParameterField final : public ParameterBase {
         declaration.doc = table.doc;
         if (table.has_minimum != 0) declaration.minimum = table.minimum;
         if (table.has_maximum != 0) declaration.maximum = table.maximum;
+        declaration.fixed = table.fixed != 0;
         withScalar(table.scalar, [&](auto scalar) {
             std::memcpy(&scalar, record + table.offset, sizeof scalar);
             describe(declaration, scalar);

@@ -61,11 +61,6 @@ class GravityCompensation final : public rtcf::Component {
         std::string urdf;
         std::string description;
         RobotChain::Selection selection;
-        bool operator!=(const Setup& other) const {
-            return urdf != other.urdf || description != other.description ||
-                   selection.base != other.selection.base || selection.tip != other.selection.tip ||
-                   selection.joints != other.selection.joints;
-        }
     };
 
     rtcf::Input<sensor_msgs::JointState> measured{this, "measured"};
@@ -75,21 +70,24 @@ class GravityCompensation final : public rtcf::Component {
     rtcf::Parameter<std::string> urdf{
         this, "urdf", "",
         rtcf::Doc("path of the robot's URDF, or its text; empty: the ROS parameter that "
-                  "description names; fixed after the load")};
-    rtcf::Parameter<std::string> description{
-        this, "description", "robot_description",
-        rtcf::Doc("ROS parameter with the text of the URDF; fixed after the load")};
-    rtcf::Parameter<std::string> base{
-        this, "base", "",
-        rtcf::Doc("link at which the chain begins; empty: the root; fixed after the load")};
+                  "description names"),
+        rtcf::Fixed()};
+    rtcf::Parameter<std::string> description{this, "description", "robot_description",
+                                             rtcf::Doc("ROS parameter with the text of the URDF"),
+                                             rtcf::Fixed()};
+    rtcf::Parameter<std::string> base{this, "base", "",
+                                      rtcf::Doc("link at which the chain begins; empty: the root"),
+                                      rtcf::Fixed()};
     rtcf::Parameter<std::string> tip{
         this, "tip", "",
         rtcf::Doc("link at which the chain ends; empty: the end of a robot that does not branch, "
-                  "or the link of the last joint; fixed after the load")};
+                  "or the link of the last joint"),
+        rtcf::Fixed()};
     rtcf::Parameter<std::string> joints{
         this, "joints", "",
         rtcf::Doc("names of all moving joints from base to tip, at most 16, in the order of the "
-                  "output; empty: the order of the chain; fixed after the load")};
+                  "output; empty: the order of the chain"),
+        rtcf::Fixed()};
     rtcf::Parameter<double> gravity_x{
         this, "gravity_x", 0.0, rtcf::Unit("m/s^2"),
         rtcf::Doc("acceleration of gravity along the x axis of the base")};
@@ -136,10 +134,6 @@ class GravityCompensation final : public rtcf::Component {
         }
         if (setup.urdf.empty() && setup.description.empty())
             return fail("urdf and description are empty: set one of them");
-        if (chain_ && setup != *setup_)
-            return fail(
-                "urdf, description, base, tip and joints cannot change after the load; replace "
-                "the component");
         setup_.stage(std::move(setup));
         return true;
     }

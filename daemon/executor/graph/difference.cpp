@@ -6,14 +6,11 @@
 #include <set>
 
 #include "common/error.hpp"
+#include "graph/inherited_parameters.hpp"
 
 namespace rtcf::executor {
 
 namespace {
-
-std::string text(const ParameterValue& value) {
-    return std::visit([](const auto& held) { return fmt::format("{}", held); }, value);
-}
 
 // The reason for replacing a component; empty = it can stay.
 std::string replacementReason(const Instance& present, const WantedComponent& wanted) {
@@ -38,8 +35,9 @@ std::string replacementReason(const Instance& present, const WantedComponent& wa
 }
 
 // The parameters whose present value differs from the wanted one, with the wanted value.
+// @param detail, fixed the changes as text, and whether one is of a fixed parameter
 std::vector<std::pair<std::string, ParameterValue>> otherParameters(
-    const Instance& present, const ComponentDefinition& shall, std::string& detail) {
+    const Instance& present, const ComponentDefinition& shall, std::string& detail, bool& fixed) {
     std::vector<std::pair<std::string, ParameterValue>> others;
     const auto& declared = accessTo(present.component()).parameters();
     for (const auto& [name, value] : shall.parameters) {
@@ -60,8 +58,9 @@ std::vector<std::pair<std::string, ParameterValue>> otherParameters(
         const bool bad = !declared[i]->check(checked).empty();
         if (!bad && sameValue(checked, present.parameterValues()[i])) continue;
         detail += fmt::format("{}{} {} -> {}", detail.empty() ? "" : ", ", name,
-                              text(present.parameterValues()[i]), text(value));
+                              parameterText(present.parameterValues()[i]), parameterText(value));
         others.emplace_back(name, value);
+        fixed = fixed || declared[i]->declaration().fixed;
     }
     return others;
 }
@@ -95,12 +94,17 @@ std::vector<Difference> compare(const Graph& graph, const std::vector<WantedComp
             differences.push_back({Difference::Kind::Replace, name, reason, &component, {}});
             continue;
         }
+        std::string detail;
+        bool fixed = false;
+        auto parameters = otherParameters(*node->instance, shall, detail, fixed);
+        if (fixed) {
+            differences.push_back({Difference::Kind::Replace, name, detail, &component, {}});
+            continue;
+        }
         if (node->breaks != shall.breaks) {
             differences.push_back(
                 {Difference::Kind::Breaks, name, "other loop breaks", &component, {}});
         }
-        std::string detail;
-        auto parameters = otherParameters(*node->instance, shall, detail);
         if (!parameters.empty()) {
             differences.push_back(
                 {Difference::Kind::Parameters, name, detail, &component, std::move(parameters)});

@@ -120,6 +120,7 @@ void Instance::setFirstParameters() {
     batch.insert(batch.end(), kept_parameters_.begin(), kept_parameters_.end());
     for (StagedValue* value : stageParameters(batch)) value->commit();
     releaseStaged();
+    has_parameters_ = true;
     definition_->parameters = std::move(batch);
     definition_->inherited.clear();
 }
@@ -327,7 +328,16 @@ std::vector<StagedValue*> Instance::stageParameters(
         if (const std::string why = (*found)->check(value); !why.empty()) {
             throw Error(ErrorKind::InvalidArgument, fmt::format("{}: {}", context_.full_name, why));
         }
-        checked.emplace_back(found - declared.begin(), std::move(value));
+        const auto index = static_cast<std::size_t>(found - declared.begin());
+        if (has_parameters_ && (*found)->declaration().fixed &&
+            !sameValue(value, parameter_values_[index])) {
+            throw Error(ErrorKind::FailedPrecondition,
+                        fmt::format("{}: parameter {} is fixed at the load: `rtcfctl replace` with "
+                                    "--param {}:={} or `rtcfctl apply` of a graph file replaces "
+                                    "the component, also in a running loop",
+                                    context_.full_name, name, name, parameterText(given)));
+        }
+        checked.emplace_back(index, std::move(value));
     }
     for (const auto& [index, value] : checked) declared[index]->stage(value);
     try {

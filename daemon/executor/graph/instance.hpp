@@ -176,6 +176,7 @@ class Instance {
 
     std::optional<std::uint32_t> phase_;
     std::vector<ParameterValue> parameter_values_;
+    bool has_parameters_ = false;  // of the load; fixed ones no longer change
     std::vector<std::pair<std::string, ParameterValue>> kept_parameters_;
     std::vector<std::string> lost_parameters_;
     std::shared_ptr<const std::vector<MappedPort>> ports_;

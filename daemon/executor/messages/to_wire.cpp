@@ -25,6 +25,7 @@ pb::ParameterInfo parameterTo(const ParameterDeclaration& declaration,
     for (const Choice& choice : declaration.choices) info.add_choices(choice.name);
     info.set_type(declaration.type);
     info.set_vector(declaration.vectorName());
+    info.set_fixed(declaration.fixed);
     return info;
 }
 

@@ -105,7 +105,7 @@ class Seldom(Component):
     """Counts cycles, and writes some of the counts."""
 
     count: Output[int]
-    every: Parameter[int] = Parameter(1, min=1)
+    every: Parameter[int] = Parameter(1, min=1, fixed=True)
     total: State[int]
 
     def update(self):

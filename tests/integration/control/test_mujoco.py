@@ -263,7 +263,7 @@ def test_the_model_is_fixed_while_loaded(daemon: Daemon, client: rtcf.Client) ->
     load(client)
     done = daemon.ctl("set", "sim", "keyframe:=raised")
     assert done.returncode == 1
-    assert "model, keyframe and pushed_body are fixed at load: replace the component" in done.stderr
+    assert "/sim: parameter keyframe is fixed at the load" in done.stderr
     assert daemon.ctl("set", "sim", "encoder_counts:=4096").returncode == 0
 
 

@@ -107,6 +107,15 @@ def test_an_input_keeps_its_value_between_writers(client: rtcf.Client, daemon: D
     assert seen(2) == ["4", "6", "1", "2000000", "1"]
 
 
+def test_a_fixed_parameter_is_set_at_the_load_only(client: rtcf.Client, daemon: Daemon) -> None:
+    client.load(rtcf.component("py", "Seldom", name="writer", parameters=["every:=4"]))
+    (every,) = (each for each in client.get_component("writer").parameters if each.fixed)
+    assert (every.name, every.value.int_value) == ("every", 4)
+    with pytest.raises(rtcf.RefusedError, match="every is fixed at the load: `rtcfctl replace`"):
+        client.set_parameters("writer", [rtcf.parse_parameter("every:=3")])
+    client.set_parameters("writer", [rtcf.parse_parameter("every:=4")])
+
+
 def test_a_queue_holds_messages_of_cycles_that_its_reader_skips(
     client: rtcf.Client, daemon: Daemon
 ) -> None:

@@ -149,6 +149,7 @@ struct ParameterTable {
     double maximum;
     const ChoiceTable* choices;  ///< enumerators of an enum, an Int64
     std::int64_t choice_count;   ///< 0: not an enum
+    std::int64_t fixed;          ///< 1: see rtcf::Fixed
 };
 
 struct DerivedTable {
@@ -256,6 +257,6 @@ struct LibraryTable {
 };
 
 /// The suffix of the symbol that points to the tables of a library.
-#define RTCF_PYTHON_TABLES 2
+#define RTCF_PYTHON_TABLES 3
 
 }  // namespace rtcf::python

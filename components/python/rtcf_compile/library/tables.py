@@ -29,7 +29,7 @@ from rtcf_compile.rewriting.logs import LogCall
 from rtcf_compile.source.mistake import display, source_line
 from rtcf_compile.source.prefix_map import mapped
 
-TABLES = 2
+TABLES = 3
 _WHOLE = ("int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
 SCALARS = {name: i for i, name in enumerate(("bool", *_WHOLE, "float32", "float64"))}
 _LEVELS = {"debug": 1, "info": 2, "warn": 3, "error": 4, "fatal": 5}
@@ -220,6 +220,7 @@ class _Library:
                 *(int(each is not None) for each in bounds),
                 *(float(each if each is not None else 0.0) for each in bounds),
                 *table,
+                int(bool(options.get("fixed", False))),
             )
             for i, name in enumerate(member.elements)
         ]

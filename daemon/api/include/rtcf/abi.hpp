@@ -124,8 +124,8 @@ struct AbiProbe {
              offsetof(Declaration, default_value), offsetof(Declaration, minimum),
              offsetof(Declaration, maximum), offsetof(Declaration, unit),
              offsetof(Declaration, doc), offsetof(Declaration, choices),
-             offsetof(Declaration, is_size), sizeof(Choice), sizeof(DerivedBase),
-             sizeof(StagedValue)});
+             offsetof(Declaration, is_size), offsetof(Declaration, fixed), sizeof(Choice),
+             sizeof(DerivedBase), sizeof(StagedValue)});
         add({sizeof(StateDeclaration), offsetof(StateDeclaration, name),
              offsetof(StateDeclaration, type), offsetof(StateDeclaration, identity),
              offsetof(StateDeclaration, size), offsetof(StateDeclaration, value),

@@ -384,7 +384,8 @@ inline ParameterBase::ParameterBase(Component* owner, ParameterDeclaration decla
 }
 
 inline std::string ParameterBase::check(ParameterValue& value) const {
-    const auto& [name, type, initial, minimum, maximum, unit, doc, choices, is_size] = declaration_;
+    const auto& [name, type, initial, minimum, maximum, unit, doc, choices, is_size, fixed] =
+        declaration_;
     if (type == "double" && std::holds_alternative<std::int64_t>(value)) {
         value = static_cast<double>(std::get<std::int64_t>(value));
     }

@@ -11,6 +11,7 @@
 #include <deque>
 #include <limits>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -49,6 +50,9 @@ struct Doc {
     explicit Doc(std::string line) : value(std::move(line)) {}
     std::string value;
 };
+/// The value does not change after the load: it determines what the component allocates, opens or
+/// reads from a file. `set` rejects another value; `apply` replaces the component.
+struct Fixed {};
 /// One enumerator of an enum parameter: its name and value.
 struct Choice {
     template <typename E>
@@ -77,6 +81,7 @@ struct ParameterDeclaration {
     std::string doc;
     std::vector<Choice> choices;
     bool is_size = false;  ///< of a BoundedVector: `<vector>_size`
+    bool fixed = false;    ///< see Fixed
 
     /// Name of the vector if this is its size, else empty. Not real-time safe.
     std::string vectorName() const {
@@ -136,33 +141,46 @@ class ParameterBase : public StagedValue {
 
 namespace detail {
 
-/// Declaration and staged value of a parameter, or of an element of an array. Kept outside the
-/// component, so that the values that each cycle touches lie close together.
+/// Converts a value that has passed ParameterBase::check() to the parameter's C++ type.
+template <typename T>
+T typedValue(const ParameterDeclaration& declaration, const ParameterValue& checked) {
+    if constexpr (std::is_same_v<T, bool> || std::is_same_v<T, std::string>) {
+        return std::get<T>(checked);
+    } else if constexpr (std::is_enum_v<T>) {
+        for (const Choice& choice : declaration.choices) {
+            if (choice.name == std::get<std::string>(checked)) return static_cast<T>(choice.value);
+        }
+        return T{};  // check() has found its name among the choices
+    } else if constexpr (std::is_integral_v<T>) {
+        return static_cast<T>(std::get<std::int64_t>(checked));
+    } else {
+        return static_cast<T>(std::get<double>(checked));
+    }
+}
+
+/// Declaration and staged value of a parameter that is one word. Kept outside the component, so
+/// that the values that each cycle touches lie close together.
 template <typename T>
 class ParameterSetting final : public ParameterBase {
+    static_assert(sizeof(T) <= sizeof(std::uint64_t), "a number of at most 64 bits");
+
    public:
     ParameterSetting(Component* owner, ParameterDeclaration declaration, T& value)
         : ParameterBase(owner, std::move(declaration), &value), value_(value), staged_(value) {}
 
     const T& proposed() const noexcept { return is_staged_ ? staged_ : value_; }
+    T copy() const noexcept {
+        T value{};
+        __atomic_load(&value_, &value, __ATOMIC_RELAXED);
+        return value;
+    }
 
     void stage(const ParameterValue& checked) override {
         is_staged_ = true;
-        if constexpr (std::is_same_v<T, bool> || std::is_same_v<T, std::string>) {
-            staged_ = std::get<T>(checked);
-        } else if constexpr (std::is_enum_v<T>) {
-            for (const Choice& choice : declaration_.choices) {
-                if (choice.name == std::get<std::string>(checked))
-                    staged_ = static_cast<T>(choice.value);
-            }
-        } else if constexpr (std::is_integral_v<T>) {
-            staged_ = static_cast<T>(std::get<std::int64_t>(checked));
-        } else {
-            staged_ = static_cast<T>(std::get<double>(checked));
-        }
+        staged_ = typedValue<T>(declaration_, checked);
     }
     void commit() noexcept RTCF_NONBLOCKING override {
-        std::swap(value_, staged_);
+        __atomic_store(&value_, &staged_, __ATOMIC_RELAXED);
         is_staged_ = false;
     }
     void release() noexcept override { is_staged_ = false; }
@@ -170,6 +188,83 @@ class ParameterSetting final : public ParameterBase {
    private:
     T& value_;
     T staged_;
+};
+
+/// The value of a parameter that is several words, in two buffers: the present value, and the next
+/// or last one. commit() exchanges them by one store, so the cycle thread never waits, and a thread
+/// that copies gets one value or the other.
+template <typename Whole>
+class ParameterBuffers {
+   public:
+    /// @param present is set to the present value here and by commit()
+    ParameterBuffers(const Whole& initial, const Whole*& present)
+        : buffers_{{initial, initial}}, present_(present) {
+        present_ = &buffers_[0];
+    }
+    ParameterBuffers(const ParameterBuffers&) = delete;
+    ParameterBuffers& operator=(const ParameterBuffers&) = delete;
+
+    const Whole& proposed() const noexcept { return is_staged_ ? buffers_[other()] : *present_; }
+    Whole copy() const {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        return *__atomic_load_n(&present_, __ATOMIC_ACQUIRE);
+    }
+    template <typename T>
+    void stage(T& (*element)(Whole&, std::size_t), std::size_t index, T value) {
+        const std::lock_guard<std::mutex> lock(mutex_);  // copy() may read this buffer
+        Whole& next = buffers_[other()];
+        if (!is_staged_) next = *present_;
+        is_staged_ = true;
+        element(next, index) = std::move(value);
+    }
+    void commit() noexcept RTCF_NONBLOCKING {
+        if (!is_staged_) return;  // with another element
+        __atomic_store_n(&present_, &buffers_[other()], __ATOMIC_RELEASE);
+        is_staged_ = false;
+    }
+    void release() noexcept { is_staged_ = false; }
+
+   private:
+    std::size_t other() const noexcept RTCF_NONBLOCKING {
+        return present_ == buffers_.data() ? 1 : 0;
+    }
+
+    std::array<Whole, 2> buffers_;
+    const Whole*& present_;
+    bool is_staged_ = false;
+    mutable std::mutex mutex_;  // never of the cycle thread
+};
+
+/// Declaration of an element of a parameter that is several words.
+template <typename T, typename Whole>
+class ElementSetting final : public ParameterBase {
+   public:
+    using Element = T& (*)(Whole&, std::size_t);
+
+    ElementSetting(Component* owner, ParameterDeclaration declaration,
+                   ParameterBuffers<Whole>& buffers, Element element, std::size_t index = 0)
+        : ParameterBase(owner, std::move(declaration)),
+          buffers_(buffers),
+          element_(element),
+          index_(index) {}
+
+    void stage(const ParameterValue& checked) override {
+        is_staged_ = true;
+        buffers_.stage(element_, index_, typedValue<T>(declaration_, checked));
+    }
+    void commit() noexcept RTCF_NONBLOCKING override {
+        buffers_.commit();
+        is_staged_ = false;
+    }
+    void release() noexcept override {
+        buffers_.release();
+        is_staged_ = false;
+    }
+
+   private:
+    ParameterBuffers<Whole>& buffers_;
+    const Element element_;
+    const std::size_t index_;
 };
 
 /// Makes the declaration of a parameter of type T.
@@ -254,6 +349,9 @@ class DeclarationOf {
     static void apply(ParameterDeclaration& declaration, Doc doc) {
         declaration.doc = std::move(doc.value);
     }
+    static void apply(ParameterDeclaration& declaration, Fixed /*fixed*/) {
+        declaration.fixed = true;
+    }
     static void apply(ParameterDeclaration& declaration, Choice choice) {
         declaration.choices.push_back(std::move(choice));
     }
@@ -261,7 +359,8 @@ class DeclarationOf {
 
 }  // namespace detail
 
-/// A parameter of type bool, integer, floating point, std::string or enum.
+/// A parameter of type bool, integer, floating point, std::string or enum. Its functions are for
+/// the cycle and for hooks, except copy(), which is for all other threads.
 template <typename T>
 class Parameter final {
    public:
@@ -269,7 +368,7 @@ class Parameter final {
     /// @param name  unique among the component's parameters; a ROS base name, or a path of groups
     ///     that ends in one: `gains/p`
     /// @param initial default value
-    /// @param options any of Min, Max, Unit, Doc, Choice
+    /// @param options any of Min, Max, Unit, Doc, Fixed, Choice
     template <typename... Options>
     Parameter(Component* owner, std::string name, const T& initial, Options... options)
         : value_(initial),
@@ -286,6 +385,8 @@ class Parameter final {
         return value_;
     }  // NOLINT(google-explicit-constructor)
 
+    /// The value, for callbacks and other threads of the component. Real-time safe.
+    T copy() const noexcept RTCF_NONBLOCKING { return setting_->copy(); }
     /// The staged value, or the present one if none is staged. In prepare(); not real-time safe.
     const T& proposed() const noexcept { return setting_->proposed(); }
     /// Name, type, default and bounds. Real-time safe.
@@ -295,6 +396,49 @@ class Parameter final {
     friend struct AbiProbe;
     T value_;
     const std::unique_ptr<detail::ParameterSetting<T>> setting_;
+};
+
+/// A parameter that is a text.
+template <>
+class Parameter<std::string> final {
+   public:
+    /// @param owner, name, initial, options as of other parameters
+    template <typename... Options>
+    Parameter(Component* owner, std::string name, const std::string& initial, Options... options)
+        : settings_(
+              std::make_unique<Settings>(initial, present_, owner,
+                                         detail::DeclarationOf<std::string>::make(
+                                             std::move(name), initial, std::move(options)...))) {}
+    Parameter(const Parameter&) = delete;
+    Parameter& operator=(const Parameter&) = delete;
+
+    /// The value; constant during a cycle. Real-time safe.
+    const std::string& value() const noexcept RTCF_NONBLOCKING { return *present_; }
+    operator const std::string&() const noexcept RTCF_NONBLOCKING {
+        return *present_;
+    }  // NOLINT(google-explicit-constructor)
+    /// The value, for callbacks and other threads of the component. Not real-time safe.
+    std::string copy() const { return settings_->buffers.copy(); }
+    /// The staged value, or the present one if none is staged. In prepare(); not real-time safe.
+    const std::string& proposed() const noexcept { return settings_->buffers.proposed(); }
+    /// Name, type, default and bounds. Real-time safe.
+    const ParameterDeclaration& declaration() const noexcept {
+        return settings_->element.declaration();
+    }
+
+   private:
+    friend struct AbiProbe;
+    static std::string& itself(std::string& value, std::size_t /*index*/) { return value; }
+
+    struct Settings {
+        Settings(const std::string& initial, const std::string*& present, Component* owner,
+                 ParameterDeclaration declaration)
+            : buffers(initial, present), element(owner, std::move(declaration), buffers, &itself) {}
+        detail::ParameterBuffers<std::string> buffers;
+        detail::ElementSetting<std::string, std::string> element;
+    };
+    const std::string* present_ = nullptr;
+    const std::unique_ptr<Settings> settings_;
 };
 
 /// An array parameter. Outside the component, each element is a parameter: `gain_0`, `gain_1`, as
@@ -307,48 +451,52 @@ class Parameter<std::array<T, N>> final {
     /// @param owner the component, `this`
     /// @param name  as of other parameters; `<name>_<index>` are unique
     /// @param initial default values
-    /// @param options any of Min, Max, Unit, Doc, Choice; they hold for each element
+    /// @param options any of Min, Max, Unit, Doc, Fixed, Choice; they hold for each element
     template <typename... Options>
     Parameter(Component* owner, const std::string& name, const Array& initial,
               const Options&... options)
-        : value_(initial), settings_(std::make_unique<Settings>()) {
+        : settings_(std::make_unique<Settings>(initial, present_)) {
         for (std::size_t i = 0; i < N; ++i) {
-            std::string element = name + '_' + std::to_string(i);
             settings_->elements.emplace_back(
-                owner, detail::DeclarationOf<T>::make(std::move(element), initial[i], options...),
-                value_[i]);
+                owner,
+                detail::DeclarationOf<T>::make(name + '_' + std::to_string(i), initial[i],
+                                               options...),
+                settings_->buffers, &element, i);
         }
     }
     Parameter(const Parameter&) = delete;
     Parameter& operator=(const Parameter&) = delete;
 
     /// The values; constant during a cycle. Real-time safe.
-    const Array& value() const noexcept RTCF_NONBLOCKING { return value_; }
+    const Array& value() const noexcept RTCF_NONBLOCKING { return *present_; }
     operator const Array&() const noexcept RTCF_NONBLOCKING {
-        return value_;
+        return *present_;
     }  // NOLINT(google-explicit-constructor)
     /// One of the values. Real-time safe.
-    const T& operator[](std::size_t index) const noexcept RTCF_NONBLOCKING { return value_[index]; }
-
-    auto begin() const noexcept RTCF_NONBLOCKING { return value_.begin(); }
-    auto end() const noexcept RTCF_NONBLOCKING { return value_.end(); }
-    static constexpr std::size_t size() noexcept RTCF_NONBLOCKING { return N; }
-
-    /// The staged values, and the present ones where none is staged. In prepare(); not real-time
-    /// safe.
-    const Array& proposed() const {
-        std::transform(settings_->elements.begin(), settings_->elements.end(),
-                       settings_->proposed.begin(),
-                       [](const auto& element) { return element.proposed(); });
-        return settings_->proposed;
+    const T& operator[](std::size_t index) const noexcept RTCF_NONBLOCKING {
+        return (*present_)[index];
     }
 
+    auto begin() const noexcept RTCF_NONBLOCKING { return present_->begin(); }
+    auto end() const noexcept RTCF_NONBLOCKING { return present_->end(); }
+    static constexpr std::size_t size() noexcept RTCF_NONBLOCKING { return N; }
+
+    /// The values, all of one change, for callbacks and other threads of the component. Not
+    /// real-time safe.
+    Array copy() const { return settings_->buffers.copy(); }
+    /// The staged values, and the present ones where none is staged. In prepare(); not real-time
+    /// safe.
+    const Array& proposed() const noexcept { return settings_->buffers.proposed(); }
+
    private:
+    static T& element(Array& values, std::size_t index) { return values[index]; }
+
     struct Settings {
-        std::deque<detail::ParameterSetting<T>> elements;
-        Array proposed{};  // result of the last proposed()
+        Settings(const Array& initial, const Array*& present) : buffers(initial, present) {}
+        detail::ParameterBuffers<Array> buffers;
+        std::deque<detail::ElementSetting<T, Array>> elements;
     };
-    Array value_;
+    const Array* present_ = nullptr;
     const std::unique_ptr<Settings> settings_;
 };
 
@@ -363,62 +511,71 @@ class Parameter<BoundedVector<T, N>> final {
     /// @param owner the component, `this`
     /// @param name  as of other parameters; `<name>_<index>` and `<name>_size` are unique
     /// @param initial default values
-    /// @param options any of Min, Max, Unit, Doc, Choice; they hold for each element
+    /// @param options any of Min, Max, Unit, Doc, Fixed, Choice; they hold for each element
     template <typename... Options>
     Parameter(Component* owner, const std::string& name, const Vector& initial,
               const Options&... options)
-        : value_(initial), settings_(std::make_unique<Settings>()) {
-        // The elements behind the end must be valid, too.
-        std::fill(value_.elements_.begin() + value_.size_, value_.elements_.end(),
-                  initial.empty() ? detail::DeclarationOf<T>::anyValid(options...)
-                                  : value_.elements_[initial.size() - 1]);
+        : settings_(std::make_unique<Settings>(filled(initial, options...), present_)) {
+        const Vector& whole = *present_;
         for (std::size_t i = 0; i < N; ++i) {
-            T& place = value_.elements_[i];
-            std::string element = name + '_' + std::to_string(i);
             settings_->elements.emplace_back(
-                owner, detail::DeclarationOf<T>::make(std::move(element), place, options...),
-                place);
+                owner,
+                detail::DeclarationOf<T>::make(name + '_' + std::to_string(i), whole.elements_[i],
+                                               options...),
+                settings_->buffers, &element, i);
         }
         auto size = detail::DeclarationOf<std::int64_t>::make(
-            name + std::string(ParameterDeclaration::kSizeSuffix), value_.size_, Min(0.0),
+            name + std::string(ParameterDeclaration::kSizeSuffix), whole.size_, Min(0.0),
             Max(static_cast<double>(N)), Doc("number of elements of " + name));
         size.is_size = true;
-        settings_->size.emplace(owner, std::move(size), value_.size_);
+        size.fixed = !settings_->elements.empty() && settings_->elements[0].declaration().fixed;
+        settings_->size.emplace(owner, std::move(size), settings_->buffers, &sizeOf);
     }
     Parameter(const Parameter&) = delete;
     Parameter& operator=(const Parameter&) = delete;
 
     /// The values; constant during a cycle. Real-time safe.
-    const Vector& value() const noexcept RTCF_NONBLOCKING { return value_; }
+    const Vector& value() const noexcept RTCF_NONBLOCKING { return *present_; }
     operator const Vector&() const noexcept RTCF_NONBLOCKING {
-        return value_;
+        return *present_;
     }  // NOLINT(google-explicit-constructor)
     /// One of the values. Real-time safe.
     /// @param index below size()
-    const T& operator[](std::size_t index) const noexcept RTCF_NONBLOCKING { return value_[index]; }
-
-    auto begin() const noexcept RTCF_NONBLOCKING { return value_.begin(); }
-    auto end() const noexcept RTCF_NONBLOCKING { return value_.end(); }
-    std::size_t size() const noexcept RTCF_NONBLOCKING { return value_.size(); }
-    bool empty() const noexcept RTCF_NONBLOCKING { return value_.empty(); }
-
-    /// The staged values, and the present ones where none is staged. In prepare(); not real-time
-    /// safe.
-    const Vector& proposed() const {
-        std::transform(settings_->elements.begin(), settings_->elements.end(),
-                       settings_->proposed.elements_.begin(),
-                       [](const auto& element) { return element.proposed(); });
-        settings_->proposed.size_ = settings_->size->proposed();
-        return settings_->proposed;
+    const T& operator[](std::size_t index) const noexcept RTCF_NONBLOCKING {
+        return (*present_)[index];
     }
 
+    auto begin() const noexcept RTCF_NONBLOCKING { return present_->begin(); }
+    auto end() const noexcept RTCF_NONBLOCKING { return present_->end(); }
+    std::size_t size() const noexcept RTCF_NONBLOCKING { return present_->size(); }
+    bool empty() const noexcept RTCF_NONBLOCKING { return present_->empty(); }
+
+    /// The values, all of one change, for callbacks and other threads of the component. Not
+    /// real-time safe.
+    Vector copy() const { return settings_->buffers.copy(); }
+    /// The staged values, and the present ones where none is staged. In prepare(); not real-time
+    /// safe.
+    const Vector& proposed() const noexcept { return settings_->buffers.proposed(); }
+
    private:
+    static T& element(Vector& vector, std::size_t index) { return vector.elements_[index]; }
+    static std::int64_t& sizeOf(Vector& vector, std::size_t /*index*/) { return vector.size_; }
+    // The elements behind the end must be valid, too.
+    template <typename... Options>
+    static Vector filled(Vector vector, const Options&... options) {
+        std::fill(vector.elements_.begin() + vector.size_, vector.elements_.end(),
+                  vector.empty() ? detail::DeclarationOf<T>::anyValid(options...)
+                                 : vector.elements_[vector.size() - 1]);
+        return vector;
+    }
+
     struct Settings {
-        std::deque<detail::ParameterSetting<T>> elements;
-        std::optional<detail::ParameterSetting<std::int64_t>> size;
-        Vector proposed{};  // result of the last proposed()
+        Settings(const Vector& initial, const Vector*& present) : buffers(initial, present) {}
+        detail::ParameterBuffers<Vector> buffers;
+        std::deque<detail::ElementSetting<T, Vector>> elements;
+        std::optional<detail::ElementSetting<std::int64_t, Vector>> size;
     };
-    Vector value_;
+    const Vector* present_ = nullptr;
     const std::unique_ptr<Settings> settings_;
 };
 

@@ -56,6 +56,7 @@ class Bench {
         accessTo(*component_).freezeParameters();
         set(parameters);
         call("configure", [this] { return component_->configure(); });
+        configured_ = true;
         if (const auto& ended = accessTo(*component_).ended(); !ended.empty())
             throw std::runtime_error(ended[0] + " ended before the component");
         accessTo(*component_).freeze();
@@ -71,6 +72,7 @@ class Bench {
 
     /// Sets a batch of parameters, as `rtcfctl set` does.
     void set(const Parameters& batch) {
+        std::map<std::string, ParameterValue> next;
         try {
             for (const auto& [name, given] : batch) {
                 ParameterBase& parameter =
@@ -78,7 +80,13 @@ class Bench {
                 ParameterValue value = given;
                 if (const std::string why = parameter.check(value); !why.empty())
                     throw std::invalid_argument(why);
+                const auto present =
+                    values_.try_emplace(name, parameter.declaration().default_value);
+                if (parameter.declaration().fixed && configured_ &&
+                    !sameValue(value, present.first->second))
+                    throw std::invalid_argument("parameter " + name + " is fixed at the load");
                 parameter.stage(value);
+                next[name] = value;
             }
             call("prepare", [this] { return component_->prepare(Values{}); });
         } catch (...) {
@@ -92,6 +100,7 @@ class Bench {
             if (derived->staged()) derived->commit();
         }
         release();
+        for (auto& [name, value] : next) values_[name] = std::move(value);
     }
 
     /// Writes a new value to an input, or one more message to a queue.
@@ -294,6 +303,8 @@ class Bench {
     std::map<const InputPort*, std::shared_ptr<SlotHeader>> slots_;
     std::map<const OutputPort*, Writes> writes_;
     std::uint64_t non_finite_ = 0;
+    std::map<std::string, ParameterValue> values_;  // of parameters that were set
+    bool configured_ = false;
     bool started_ = false;
     std::unique_ptr<Component> component_;
 };

@@ -1,12 +1,14 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
@@ -107,7 +109,6 @@ TEST_F(ParameterTest, ChangesAtCommitOnly) {
 
 TEST_F(ParameterTest, IsItsValueAndAPointer) {
     EXPECT_EQ(sizeof(Parameter<double>), sizeof(double) + sizeof(void*));
-    EXPECT_EQ(sizeof(Parameter<std::array<double, 6>>), 6 * sizeof(double) + sizeof(void*));
     const Parameter<double> gain{&component, "gain", 1.0};
     EXPECT_EQ(named("gain").place(), &gain.value());
 }
@@ -300,8 +301,8 @@ TEST_F(ParameterTest, AnArrayIsARange) {
     EXPECT_EQ(sum, 6.0);
     EXPECT_EQ(gains.size(), 3U);
     // The proposed values outlive the expression.
-    const double& last = Values{}[gains][2];
     named("gains_2").stage(5.0);
+    const double& last = Values{}[gains][2];
     (void)gains.proposed();
     EXPECT_EQ(last, 5.0);
 }
@@ -317,6 +318,58 @@ TEST_F(ParameterTest, ElementsOfAnArrayChangeTogether) {
     named("limits_0").stage(Int{-7});
     named("limits_0").release();
     EXPECT_EQ(limits.proposed(), (std::array<int, 2>{-5, 5}));
+    // Nor does a value that was staged and released return with the next one.
+    named("limits_1").stage(Int{6});
+    EXPECT_EQ(limits.proposed(), (std::array<int, 2>{-5, 6}));
+}
+
+// A callback of ROS or a driver's thread copies while the graph thread stages and the cycle thread
+// commits.
+TEST_F(ParameterTest, AnotherThreadCopiesWholeValues) {
+    constexpr std::size_t kLong = 60;  // beyond the characters that std::string keeps in itself
+    constexpr std::size_t kName = 3 * kLong;
+    constexpr int kChanges = 3000;
+    const Parameter<double> gain{&component, "gain", 0.0};
+    const Parameter<std::string> frame{&component, "frame", std::string(kLong, 'a')};
+    const Parameter<std::array<double, 3>> gains{&component, "gains", {}};
+    const Parameter<BoundedVector<std::string, 3>> names{&component, "names", {}};
+    std::atomic<bool> changing{true};
+    std::atomic<int> copies{0};
+    int torn = 0;
+    std::thread reader([&] {
+        do {
+            const std::string text = frame.copy();
+            const bool is_long = text.find_first_not_of('a') == std::string::npos;
+            const bool is_short = text.find_first_not_of('b') == std::string::npos;
+            if (!(is_long && text.size() == kLong) && !(is_short && text.size() == kLong / 2))
+                ++torn;
+            const std::array<double, 3> array = gains.copy();
+            if (array[0] != array[1] || array[0] != array[2]) ++torn;
+            for (const std::string& name : names.copy()) {
+                if (name.size() != kName) ++torn;
+            }
+            if (gain.copy() != std::floor(gain.copy())) ++torn;
+            ++copies;
+        } while (changing);
+    });
+    for (int i = 0; i < kChanges || copies < 100; ++i) {
+        const auto number = static_cast<double>(i);
+        const std::size_t size = static_cast<std::size_t>(i) % 3 + 1;
+        named("gain").stage(number);
+        named("frame").stage(i % 2 == 0 ? std::string(kLong / 2, 'b') : std::string(kLong, 'a'));
+        for (const char* name : {"gains_0", "gains_1", "gains_2"}) named(name).stage(number);
+        for (std::size_t k = 0; k < size; ++k)
+            named("names_" + std::to_string(k)).stage(std::string(kName, 'c'));
+        named("names_size").stage(static_cast<Int>(size));
+        for (ParameterBase* parameter : accessTo(component).parameters()) {
+            if (parameter->staged()) parameter->commit();
+        }
+    }
+    changing = false;
+    reader.join();
+    EXPECT_EQ(torn, 0);
+    EXPECT_EQ(gains.value(), gains.copy());
+    EXPECT_EQ(frame.value(), frame.copy());
 }
 
 }  // namespace

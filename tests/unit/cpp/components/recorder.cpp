@@ -24,6 +24,7 @@ class Recorder : public rtcf::Component {
     rtcf::Parameter<double> gain{this, "gain", 1.0, rtcf::Min(0.0), rtcf::Max(10.0)};
 
     rtcf::Parameter<double> limit{this, "limit", std::numeric_limits<double>::infinity()};
+    rtcf::Parameter<std::string> device{this, "device", "none", rtcf::Fixed()};
 
     bool prepare(const rtcf::Values& proposed) override {
         if (proposed[refuses] != "prepare") return true;

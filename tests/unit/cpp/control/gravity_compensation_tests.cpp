@@ -353,7 +353,7 @@ TEST(GravityCompensation, RejectsSelectionsWithOneLine) {
     };
     for (const auto& [parameters, why] : cases) EXPECT_EQ(whyNot(kGripper, parameters), why);
     Gravity gravity(kArm);
-    EXPECT_THROW(gravity.bench.set({{"tip", text("upper")}}), std::runtime_error);
+    EXPECT_THROW(gravity.bench.set({{"tip", text("upper")}}), std::invalid_argument);
     gravity.bench.set({{"tip", text("")}, {"gravity_z", -1.0}});
 }
 

@@ -322,7 +322,7 @@ TEST(JointMessages, RejectParametersWithOneLine) {
         }
         Bench bench(type, arm());
         bench.set(arm());
-        EXPECT_THROW(bench.set({{"joints", std::string("a b")}}), std::runtime_error);
+        EXPECT_THROW(bench.set({{"joints", std::string("a b")}}), std::invalid_argument);
     }
     EXPECT_THROW(Bench("JointStatePublisher", {{"timeout", -1.0}}), std::invalid_argument);
 }

@@ -18,15 +18,15 @@ using executor::FrameKind;
 using executor::FrameRing;
 
 #ifdef RTCF_SANITIZED
-constexpr std::uint64_t kFrames = 20'000;
+constexpr std::uint64_t kManyFrames = 20'000;
 #else
-constexpr std::uint64_t kFrames = 200'000;
+constexpr std::uint64_t kManyFrames = 200'000;
 #endif
 
-const CycleCounter kCounter;  // one tick takes 1 ns
+const CycleCounter kNsCounter;  // one tick takes 1 ns
 
 FrameRing ringOf(std::vector<FrameRing::Source> sources, std::size_t frames = 16) {
-    return {std::move(sources), 0, frames, kCounter};
+    return {std::move(sources), 0, frames, kNsCounter};
 }
 
 void fill(FrameRing& ring, std::uint64_t iteration) {
@@ -129,7 +129,7 @@ TEST(FrameRing, KnowsWhichCyclesCount) {
 
 TEST(FrameRing, HasTheEndOfEachComponent) {
     const double number = 2.5;
-    FrameRing ring({{&number, sizeof number}}, 3, 16, kCounter);
+    FrameRing ring({{&number, sizeof number}}, 3, 16, kNsCounter);
     FrameRing::Word* const ended = ring.begin({0, 0, 0, 1, 2});
     for (std::size_t i = 0; i < 3; ++i) ended[i] = 10 * (i + 1);
     ring.take();
@@ -224,7 +224,7 @@ TEST(FrameRing, NoReaderSeesATornFrame) {
     FrameRing ring = ringOf({{values.data(), sizeof values}});
     std::atomic<bool> done{false};
     std::thread writer([&] {
-        for (std::uint64_t i = 0; i < kFrames; ++i) {
+        for (std::uint64_t i = 0; i < kManyFrames; ++i) {
             values.fill(i);
             fill(ring, i);
         }

@@ -89,8 +89,8 @@ const InputTable kInput{"u",
                         {LogLevel::Warn, "gain.py", 3, "update", "too large"}};
 const OutputTable kOutput{"x",     "m", &kNumber, nullptr, 0, offsetof(Record, is_written),
                           nullptr, 0,   nullptr,  0};
-const ParameterTable kGain{"gain", "",      "", Scalar::Double, offsetof(Record, gain), 1, 0, 0.0,
-                           0.0,    nullptr, 0};
+const ParameterTable kGain{"gain",  "", "", Scalar::Double, offsetof(Record, gain), 1, 0, 0.0, 0.0,
+                           nullptr, 0,  0};
 const StateTable kCount{"count", "", "", &kInteger, offsetof(Record, count)};
 const RaiseTable kRaise{hashOf("limit"), 0, "IndexError: index {} beyond size {}", 1};
 const LineTable kLine{12, "self.x.write(y)"};
@@ -164,7 +164,7 @@ TEST_F(PythonComponents, AParameterTakesEffectAtItsCommit) {
 TEST(PythonParameters, AnEnumIsSetByName) {
     static constexpr std::array<ChoiceTable, 3> kChoices{{{"IDLE", 0}, {"RUN", -4}, {"GO", -4}}};
     const ParameterTable parameter{"mode", "",  "",  Scalar::Int64,   offsetof(Record, count), 0,
-                                   0,      0.0, 0.0, kChoices.data(), kChoices.size()};
+                                   0,      0.0, 0.0, kChoices.data(), kChoices.size(),         0};
     Record fresh = kFresh;
     fresh.count = -4;
     ComponentTable table = kTable;

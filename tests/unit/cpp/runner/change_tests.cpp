@@ -269,6 +269,27 @@ TEST_F(Change, ValuesOfParametersNeedNoNewSchedule) {
     EXPECT_EQ(builtPlans().count, before + 1) << "a change of the graph is planned again";
 }
 
+TEST_F(Change, AFixedParameterIsSetAtTheLoadOnly) {
+    ComponentDefinition a = recorder("A");
+    a.parameters = {{"device", std::string("can0")}};
+    load(a);
+    start();
+    const std::string text =
+        errorOf([&] { setParameters("/A", {{"gain", 2.0}, {"device", std::string("can1")}}); });
+    EXPECT_EQ(
+        text.rfind("/A: parameter device is fixed at the load: `rtcfctl replace` with --param "
+                   "device:=can1",
+                   0),
+        0U)
+        << text;
+    ASSERT_TRUE(runs());
+    setParameters("/A", {{"gain", 2.0}, {"device", std::string("can0")}});  // the same value
+    ComponentDefinition next = recorder("A");
+    next.parameters = {{"device", std::string("can1")}};
+    replace("/A", next);
+    EXPECT_EQ(errorOf([&] { setParameters("/A", {{"device", std::string("can1")}}); }), "");
+}
+
 TEST_F(Change, BatchWithABadValueSetsNothing) {
     startWithA();
     const std::string text =
