@@ -14,6 +14,7 @@ import grpc
 from google.protobuf.message import DecodeError
 from rtcf.v1 import errors_pb2
 
+from rtcfd import VERSION
 from rtcfd.access import calls
 from rtcfd.access.caller import ASKED_KEY, Caller, enter
 from rtcfd.access.calls import Call, Level
@@ -179,9 +180,14 @@ def _asked_ns(context: Any) -> int:
     suspended since then."""
     now = time.monotonic_ns()
     for key, value in context.invocation_metadata() or ():
-        if key == ASKED_KEY and isinstance(value, str) and value.isdigit() and len(value) < 20:
+        if key == ASKED_KEY and _is_number(value):
             return min(int(value), now)
     return now
+
+
+def _is_number(value: object) -> bool:
+    """Return whether metadata is a number of ns: of ASCII digits, unlike what int() rejects."""
+    return isinstance(value, str) and value.isascii() and value.isdigit() and len(value) < 20
 
 
 def _runner(request: Any) -> str:
@@ -194,6 +200,13 @@ def _require_formed(request: Any) -> None:
     if hasattr(request, "DESCRIPTOR"):
         calls.check_texts(request)
         enumerators.check(request)
+
+
+def _has_unknown_fields(request: Any) -> bool:
+    """Return whether a message has fields without a definition here, and drop them."""
+    size = request.ByteSize()
+    request.DiscardUnknownFields()
+    return bool(request.ByteSize() != size)
 
 
 def _forgiving(
@@ -214,7 +227,17 @@ def _forgiving(
                 )
             )
         try:
-            return deserialize(data)
+            request = deserialize(data)
+            if requirements.right > Level.OBSERVE and _has_unknown_fields(request):
+                return _Malformed(
+                    InvalidArgument(
+                        f"the request of {method} has fields that rtcfd {VERSION} does not know, "
+                        "perhaps of a newer client: rtcfd would not do all that it asks for; "
+                        "install both in one version",
+                        errors_pb2.REASON_REQUEST_MALFORMED,
+                    )
+                )
+            return request
         except DecodeError as error:
             return _Malformed(
                 InvalidArgument(

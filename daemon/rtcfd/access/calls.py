@@ -49,6 +49,8 @@ _NAME_FIELDS = frozenset(
         "token", "holder",
     }
 )  # fmt: skip
+# Free texts that other users see.
+_LINE_FIELDS = frozenset({"holder", "reason", "run_id", "token", "hold"})
 _VALUES = "rtcf.v1.ParameterValue"
 _BULK = frozenset({"rtcf.v1.RecordedMessage"})
 
@@ -115,7 +117,7 @@ def of(method: str) -> Call:
 
 
 def check_texts(message: Any) -> None:
-    """Raise InvalidArgument if a text in a request, at any depth, is too long.
+    """Raise InvalidArgument if a text in a request, at any depth, is too long, or not one line.
 
     Names go into look-ups, suggestions, log records and errors.  The cost of each grows with their
     length, so this comes before all other work.
@@ -142,5 +144,12 @@ def check_texts(message: Any) -> None:
                         f"{field.name} of {len(text)} characters is too long: at most {longest} "
                         f"({text[:40]}…)",
                         errors_pb2.REASON_TEXT_TOO_LONG,
+                        field=field.name,
+                    )
+                if field.name in _LINE_FIELDS and not text.isprintable():
+                    raise InvalidArgument(
+                        f"{field.name} {text[:40]!a} has unprintable characters: write one "
+                        "line without them",
+                        errors_pb2.REASON_NAME_INVALID,
                         field=field.name,
                     )

@@ -23,10 +23,12 @@ from pathlib import Path
 from rtcf.v1 import errors_pb2
 
 from rtcfd.access.calls import Level
+from rtcfd.access.frame_pace import UNITS_PER_S, FramePace
 from rtcfd.access.peer import Credentials, Directory, Peer, credentials, user_of
 from rtcfd.common.budget import Budget
 from rtcfd.common.errors import RequestError, ResourceExhausted
 from rtcfd.common.limits import Limits
+from rtcfd.common.pace import Pace
 
 log = logging.getLogger(__name__)
 
@@ -37,7 +39,7 @@ _AT_ONCE = 4096
 # New connections per user and second; further ones are closed at once.
 _ARRIVALS_PER_S = 20.0
 _MOST_USERS = 4096
-# Connections above the limit that receive an error message; further ones are closed at once.
+# Connections above the limit that receive an error message; beyond, the oldest of them is closed.
 _MOST_REJECTED = 64
 _MOST_REJECTED_OF_A_USER = 8
 _FIRST_CALL_S = 20.0  # longest time from the connection to the first call
@@ -52,7 +54,9 @@ _CALLS_AT_A_TIME = 64
 _WATCHES_AT_A_TIME = 8
 _CALLS_PER_S = 100.0
 _BYTES_PER_S = 1024 * 1024.0
-_SAVED_S = 0.5  # seconds of unused rate that a burst may use
+# A client whose frames were delayed for so long, and that still sends more than the relay reads at
+# a time, does not wait for answers.
+_FLOOD_S = 5.0
 
 
 @dataclass(frozen=True)
@@ -61,20 +65,6 @@ class GrpcSockets:
 
     trusted: Path
     others: Path  # accepts only small messages and few streams
-
-
-class Pace:
-    """A rate limit that delays instead of rejecting."""
-
-    def __init__(self, per_s: float) -> None:
-        self._per_s = per_s
-        self._due = time.monotonic()
-
-    def take(self, amount: float = 1.0) -> float:
-        """Account for `amount`; return how many seconds to wait before using it."""
-        now = time.monotonic()
-        self._due = max(self._due, now - _SAVED_S) + amount / self._per_s
-        return max(self._due - now, 0.0)
 
 
 class Usage:
@@ -90,6 +80,7 @@ class Usage:
         self._watches = 0
         self._pace = Pace(_CALLS_PER_S)
         self.bytes = Pace(_BYTES_PER_S)
+        self.frames = Pace(UNITS_PER_S)
 
     @property
     def idle(self) -> bool:
@@ -138,6 +129,7 @@ class Client:
     peer: Peer | None = None  # None: its names are not known yet
     level: Level = Level.NONE
     rejected: bool = False  # above the limit: its calls fail until there is room
+    relay: "asyncio.Task[None] | None" = None
     calls: int = 0  # running
     last_call: float = 0.0  # 0 = none yet
     name: str = field(default_factory=lambda: f"rtcfd-client-{secrets.token_hex(16)}")
@@ -273,23 +265,45 @@ class Clients:
             connection.close()
             return
         found = credentials(connection)
+        # Not at the end of a connection: a user that reconnects would have unused rates again.
+        if len(self._usage) >= _MOST_USERS:
+            self._usage = defaultdict(
+                Usage, {uid: usage for uid, usage in self._usage.items() if not usage.idle}
+            )
         client = Client(found, connection, time.monotonic(), self._usage[found.uid])
         known = self._directory.known(found)
         if known is not None:
             client.peer, client.level = known, self._level_of(known)
         if self._full(client):
             client.rejected = True
-            rejected = [each for each in self._clients.values() if each.rejected]
-            of_user = sum(each.found.uid == found.uid for each in rejected)
-            if len(rejected) >= _MOST_REJECTED or of_user >= _MOST_REJECTED_OF_A_USER:
-                connection.close()
-                return
+            self._make_room_for_rejected(found.uid)
             self._warn("too many clients: rejecting some of uid %d", found.uid)
         self._clients[client.name] = client
         client.usage.connections += 1
-        task = asyncio.get_running_loop().create_task(self._serve(client))
-        self._relays.add(task)
-        task.add_done_callback(self._relays.discard)
+        relay = client.relay = asyncio.get_running_loop().create_task(self._serve(client))
+        self._relays.add(relay)
+        # Not at the end of _serve(), which a cancelled task may not even begin.
+        relay.add_done_callback(lambda _: self._gone(client, relay))
+
+    def _gone(self, client: Client, relay: "asyncio.Task[None]") -> None:
+        self._relays.discard(relay)
+        client.connection.close()
+        self._clients.pop(client.name, None)
+        client.usage.connections -= 1
+
+    def _make_room_for_rejected(self, uid: int) -> None:
+        """Disconnect the oldest of too many rejected clients, so that the newest gets its error."""
+        rejected = [each for each in self._clients.values() if each.rejected]
+        of_user = [each for each in rejected if each.found.uid == uid]
+        if len(of_user) >= _MOST_REJECTED_OF_A_USER:
+            oldest = of_user[0]
+        elif len(rejected) >= _MOST_REJECTED:
+            oldest = rejected[0]
+        else:
+            return
+        del self._clients[oldest.name]
+        if oldest.relay is not None:
+            oldest.relay.cancel()
 
     def _arrivals_of(self, uid: int) -> Budget:
         found = self._arrivals.get(uid)
@@ -324,12 +338,6 @@ class Clients:
             await self._relay(client)
         except OSError as error:
             self._warn("a client's connection failed: %s", error.strerror or error)
-        finally:
-            client.connection.close()
-            del self._clients[client.name]
-            client.usage.connections -= 1
-            if client.usage.idle:
-                self._usage.pop(client.found.uid, None)
 
     async def _relay(self, client: Client) -> None:
         server = self._servers.trusted if client.trusted else self._servers.others
@@ -340,7 +348,7 @@ class Clients:
             inner.bind("\0" + client.name)
             await asyncio.get_running_loop().sock_connect(inner, str(server))
             # When one side closes, close the other too: gRPC never closes a single direction.
-            there = asyncio.create_task(_pump(client.connection, inner, client))
+            there = asyncio.create_task(self._pump_paced(client, inner))
             back = asyncio.create_task(_pump(inner, client.connection))
             ways = {there, back}
             try:
@@ -361,6 +369,36 @@ class Clients:
                 await asyncio.gather(*ways, return_exceptions=True)
             if hung_up:
                 await _linger(client.connection)
+
+    async def _pump_paced(self, client: Client, sink: socket.socket) -> bool:
+        """Copy from a client to `sink`, like _pump(), at the rates of its user.
+
+        Also ends when the client floods: it sends more than we read at a time, while its frames
+        have to wait.
+        """
+        loop = asyncio.get_running_loop()
+        frames = FramePace(client.usage.frames)
+        prompt = time.monotonic()  # the last time at which no frame had to wait
+        with contextlib.suppress(OSError):
+            while data := await loop.sock_recv(client.connection, _CHUNK):
+                if not client.trusted and (wait_s := client.usage.bytes.take(len(data))):
+                    await asyncio.sleep(wait_s)
+                delayed = False
+                for part, wait_s in frames.cut(data, paced=not client.trusted):
+                    try:
+                        await loop.sock_sendall(sink, part)
+                    except OSError:
+                        return False
+                    if not wait_s:
+                        continue
+                    delayed = True
+                    if len(data) == _CHUNK and time.monotonic() - prompt > _FLOOD_S:
+                        self._warn("disconnecting a client of %s: it floods", client.peer)
+                        return True
+                    await asyncio.sleep(wait_s)
+                if not delayed:
+                    prompt = time.monotonic()
+        return True
 
     def _warn(self, text: str, *arguments: object) -> None:
         """Log a warning, at most one per _LOOK_S: its cause may occur 1000 times a second."""
@@ -385,18 +423,11 @@ async def _linger(connection: socket.socket) -> None:
                 await asyncio.sleep(0)
 
 
-async def _pump(source: socket.socket, sink: socket.socket, client: Client | None = None) -> bool:
-    """Copy from `source` to `sink` until the source closes; return False if the sink failed.
-
-    The rate is limited for a `client` that is not trusted.
-    """
+async def _pump(source: socket.socket, sink: socket.socket) -> bool:
+    """Copy from `source` to `sink` until the source closes; return False if the sink failed."""
     loop = asyncio.get_running_loop()
     with contextlib.suppress(OSError):
         while data := await loop.sock_recv(source, _CHUNK):
-            if client is not None and not client.trusted:
-                wait_s = client.usage.bytes.take(len(data))
-                if wait_s:
-                    await asyncio.sleep(wait_s)
             try:
                 await loop.sock_sendall(sink, data)
             except OSError:

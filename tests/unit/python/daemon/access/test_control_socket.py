@@ -4,6 +4,7 @@ import random
 import signal
 import socket
 import subprocess
+from contextlib import ExitStack
 from pathlib import Path
 
 import grpc
@@ -83,6 +84,91 @@ def test_a_client_beyond_the_limit_gets_an_error(stopped_daemon: DaemonUnderTest
     # Disconnected clients make room.
     with daemon.client() as four:
         wait_for(lambda: _answers(four), "an answer")
+
+
+def test_every_client_beyond_the_limit_gets_an_error(stopped_daemon: DaemonUnderTest) -> None:
+    config = stopped_daemon.folder / "rtcfd.toml"
+    config.write_text("[limits]\nclients = 2\n")
+    daemon = stopped_daemon.start("--config", str(config))
+    with ExitStack() as ends:
+        for _ in range(2):
+            ends.enter_context(daemon.client()).get_status()
+        # Also if many clients that are rejected do not end.
+        for _ in range(30):
+            client = ends.enter_context(daemon.client())
+            with pytest.raises(rtcf.RefusedError, match="serves 2 clients already"):
+                client.get_status()
+        idle = ends.enter_context(socket.socket(socket.AF_UNIX))
+        idle.connect(str(daemon.socket))
+    with daemon.client() as four:
+        wait_for(lambda: _answers(four), "an answer")
+    assert daemon.process is not None
+    descriptors = Path(f"/proc/{daemon.process.pid}/fd")
+    wait_for(lambda: len(list(descriptors.iterdir())) < 60, "the end of all connections")
+    assert "Traceback" not in daemon.log()
+
+
+@pytest.mark.parametrize(
+    "value", [b"\xc2\xb2", b"\xd9\xa1", b"\xb2", b"1" * 19, b"9" * 20, b"-1", b"", b"\xff"]
+)
+def test_odd_metadata_is_ignored(daemon: DaemonUnderTest, value: bytes) -> None:
+    pairs = (
+        *((b":method", b"POST"), (b":scheme", b"http"), (b":path", b"/rtcf.v1.Control/GetStatus")),
+        *((b":authority", b"localhost"), (b"content-type", b"application/grpc")),
+        *((b"te", b"trailers"), (b"rtcf-asked-ns", value)),
+    )
+    headers = b"".join(
+        b"\0" + bytes([len(name)]) + name + bytes([len(text)]) + text for name, text in pairs
+    )
+
+    def frame(kind: int, flags: int, payload: bytes) -> bytes:
+        head = len(payload).to_bytes(3, "big") + bytes([kind, flags, 0, 0, 0, kind < 2])
+        return head + payload
+
+    with socket.socket(socket.AF_UNIX) as client:
+        client.settimeout(DEADLINE_S)
+        client.connect(str(daemon.socket))
+        client.sendall(
+            b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
+            + frame(4, 0, b"") + frame(1, 4, headers) + frame(0, 1, bytes(5))
+        )  # fmt: skip
+        ended = (
+            False  # the call, by the end of its stream; gRPC itself rejects some values by a reset
+        )
+        with client.makefile("rb") as answer:
+            while not ended:
+                head = answer.read(9)
+                assert len(head) == 9
+                answer.read(int.from_bytes(head[:3], "big"))
+                of_call = head[8] == 1
+                ended = of_call and (head[3] == 3 or bool(head[4] & 1))
+    with daemon.client() as other:
+        other.get_status()
+    assert "Traceback" not in daemon.log()
+
+
+def test_a_change_with_unknown_fields_is_rejected(daemon: DaemonUnderTest) -> None:
+    with daemon.client() as client:
+        client.load(rtcf.component("demo", "Fine", name="pid"))
+        known = control_pb2.SetParametersRequest(
+            component="pid", parameters=[rtcf.parse_parameter("kp:=2.5")]
+        )
+        # Field 99, for example a later `dry_run`; also inside another message.
+        unknown = b"\x98\x06\x01"
+        inner = known.parameters[0].SerializeToString() + unknown
+        nested = b"\x1a" + bytes([len(inner)]) + inner
+        assert control_pb2.SetParametersRequest.FromString(nested).parameters[0].name == "kp"
+        with grpc.insecure_channel(f"unix:{daemon.socket}") as channel:
+            call = channel.unary_stream("/rtcf.v1.Control/SetParameters")
+            for data in (known.SerializeToString() + unknown, b"\x12\x03pid" + nested):
+                with pytest.raises(grpc.RpcError) as refused:
+                    list(call(data, timeout=DEADLINE_S))
+                assert "fields that rtcfd" in str(refused.value.details())
+            status = channel.unary_unary("/rtcf.v1.Control/GetStatus")
+            status(unknown, timeout=DEADLINE_S)  # a query does nothing that it should not
+        assert client.get_component("pid").parameters[0].value.double_value != 2.5
+        with pytest.raises(rtcf.RefusedError, match="/pid: no parameter is given: name one"):
+            client.set_parameters("pid", [])
 
 
 def _answers(client: rtcf.Client) -> bool:

@@ -1,0 +1,56 @@
+"""Paces the HTTP/2 frames of a client, before they reach gRPC.
+
+gRPC keeps state for each stream that a client opens, even if the client resets it at once, and
+answers pings and settings.  The limits of calls come too late: a client that opens and resets
+streams (rapid reset, CVE-2023-44487) exhausts the memory of rtcfd without a call.  The kernel keeps
+what a delayed client sends, and then the client waits.
+
+Frames are described in RFC 9113, section 4.1.  Owned by the relay of one connection.
+"""
+
+from collections.abc import Iterator
+
+from rtcfd.common.pace import Pace
+
+_PREFACE_BYTES = 24  # before the first frame
+_HEADER_BYTES = 9  # of a frame: length, type, flags, stream
+_KIND = 3  # the type's place among them
+# Units of the pace by type of frame: DATA, PRIORITY and WINDOW_UPDATE only cost processor time.  A
+# call has HEADERS and DATA, and some of the others.
+_CHEAP = {0: 1.0, 2: 1.0, 8: 1.0}
+_OTHER = 10.0
+UNITS_PER_S = 3000.0
+_SHORT_S = 0.05  # waits up to this are put off, so that each frame does not need one of its own
+
+
+class FramePace:
+    """Cuts the bytes of one connection at frames that must wait.
+
+    `pace` belongs to the user, who may have other connections.
+    """
+
+    def __init__(self, pace: Pace) -> None:
+        self._pace = pace
+        self._skipped = _PREFACE_BYTES  # bytes before the next header
+        self._header = b""  # of the next frame, as far as it is known
+
+    def cut(self, data: bytes, *, paced: bool) -> Iterator[tuple[bytes, float]]:
+        """Yield the parts of `data`, each with the seconds to wait after it; not `paced`: 0."""
+        begin = at = 0
+        while at < len(data):
+            step = min(self._skipped or _HEADER_BYTES - len(self._header), len(data) - at)
+            if self._skipped:
+                self._skipped -= step
+            else:
+                self._header += data[at : at + step]
+            at += step
+            if len(self._header) < _HEADER_BYTES:
+                continue
+            units = _CHEAP.get(self._header[_KIND], _OTHER)
+            self._skipped = int.from_bytes(self._header[:_KIND], "big")
+            self._header = b""
+            if paced and (wait_s := self._pace.take(units)) > _SHORT_S:
+                # The end of the frame's header waits, so gRPC does not see the frame.
+                yield data[begin : at - step], wait_s
+                begin = at - step
+        yield data[begin:], 0.0

@@ -1,0 +1,164 @@
+"""HTTP/2 frames of a user without rights: paced one by one, and no flood of them costs memory."""
+
+import random
+import time
+from pathlib import Path
+
+import pytest
+from daemon_under_test import DaemonUnderTest
+from rtcfd.access.frame_pace import FramePace
+from rtcfd.common.pace import Pace
+from strangers import open_to_strangers, root_only, stranger
+
+PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
+
+
+def frame(kind: int, payload: bytes) -> bytes:
+    """Return a frame of stream 1, without flags."""
+    return len(payload).to_bytes(3, "big") + bytes([kind, 0, 0, 0, 0, 1]) + payload
+
+
+class Recorded(Pace):
+    """A pace that notes what is taken, and lets frames of more than one unit wait."""
+
+    def __init__(self) -> None:
+        super().__init__(1.0)
+        self.taken: list[float] = []
+
+    def take(self, amount: float = 1.0) -> float:
+        self.taken.append(amount)
+        return amount - 1.0
+
+
+def test_frames_are_found_in_chunks_of_any_size() -> None:
+    seed = random.randrange(1 << 32)
+    print(f"seed {seed}")
+    draw = random.Random(seed)
+    for _ in range(200):
+        kinds = [draw.randrange(12) for _ in range(draw.randrange(1, 20))]
+        frames = [frame(kind, draw.randbytes(draw.choice((0, 1, 8, 300)))) for kind in kinds]
+        sent = PREFACE + b"".join(frames)
+        pace = Recorded()
+        cutter = FramePace(pace)
+        passed = b""
+        begins = [len(PREFACE) + sum(map(len, frames[:k])) for k in range(len(frames))]
+        rest = sent
+        while rest:
+            size = draw.choice((1, 3, 9, 10, 40, 10_000))
+            for part, wait_s in cutter.cut(rest[:size], paced=True):
+                passed += part
+                if wait_s:
+                    # gRPC has a part of the frame's header at most.
+                    kind = len(pace.taken) - 1
+                    assert begins[kind] <= len(passed) < begins[kind] + 9
+            rest = rest[size:]
+        assert passed == sent
+        assert pace.taken == [1.0 if kind in (0, 2, 8) else 10.0 for kind in kinds]
+
+
+def test_frames_of_trusted_users_do_not_wait() -> None:
+    pace = Recorded()
+    cutter = FramePace(pace)
+    sent = PREFACE + frame(6, b"12345678") * 100
+    assert list(cutter.cut(sent, paced=False)) == [(sent, 0.0)]
+    assert pace.taken == []
+    # The rules have changed.
+    assert [wait_s for _, wait_s in cutter.cut(frame(6, b"12345678"), paced=True)] == [9.0, 0.0]
+
+
+# Sends frames of one kind for some seconds, on a new connection after each end.
+FLOOD = """
+import socket, sys, time
+
+def frame(kind, flags, stream, payload=b""):
+    head = len(payload).to_bytes(3, "big") + bytes([kind, flags]) + stream.to_bytes(4, "big")
+    return head + payload
+
+def literal(name, value):
+    return b"@" + bytes([len(name)]) + name + bytes([len(value)]) + value
+
+PAIRS = [(b":method", b"POST"), (b":scheme", b"http"), (b":path", b"/rtcf.v1.Control/GetStatus"),
+         (b":authority", b"localhost"), (b"content-type", b"application/grpc"),
+         (b"te", b"trailers")]
+FIRST = b"".join(literal(*pair) for pair in PAIRS)
+AGAIN = bytes(0x80 | (67 - place) for place in range(6))  # indexed, as of the dynamic table
+WORD = (8).to_bytes(4, "big")
+KINDS = {
+    "reset": lambda n: frame(1, 4, n, AGAIN) + frame(3, 0, n, WORD),
+    "open": lambda n: frame(1, 4, n, AGAIN),
+    "call": lambda n: frame(1, 4, n, AGAIN) + frame(0, 1, n, bytes(5)),
+    "rst": lambda n: frame(3, 0, 1, WORD),
+    "data": lambda n: frame(0, 0, 1),
+    "priority": lambda n: frame(2, 0, n, bytes(5)),
+    "settings": lambda n: frame(4, 0, 0, b"\\0\\4\\0\\1\\0\\0"),
+    "ping": lambda n: frame(6, 0, 0, bytes(8)),
+    "goaway": lambda n: frame(7, 0, 0, bytes(8)),
+    "window": lambda n: frame(8, 0, 0, (1).to_bytes(4, "big")),
+    "continuation": lambda n: frame(9, 0, 1, b"\\0\\1a\\1b"),
+    "unknown": lambda n: frame(99, 0, 0),
+}
+path, kind, seconds = sys.argv[1], sys.argv[2], float(sys.argv[3])
+end = time.monotonic() + seconds
+while time.monotonic() < end:
+    peer = socket.socket(socket.AF_UNIX)
+    try:
+        peer.connect(path)
+        begun = 0 if kind == "continuation" else 4
+        peer.sendall(b"PRI * HTTP/2.0\\r\\n\\r\\nSM\\r\\n\\r\\n" + frame(4, 0, 0)
+                     + frame(1, begun, 1, FIRST))
+        peer.setblocking(False)
+        left, number = b"", 3
+        while time.monotonic() < end:
+            if not left:
+                left = b"".join(KINDS[kind](number + 2 * k) for k in range(1000))
+                number += 2000
+            try:
+                left = left[peer.send(left):]
+            except BlockingIOError:
+                time.sleep(0.002)
+            try:
+                while True:
+                    if not peer.recv(65536):
+                        raise ConnectionError
+            except BlockingIOError:
+                pass
+    except OSError:
+        time.sleep(0.01)
+    peer.close()
+print("done", flush=True)
+"""
+KINDS = (
+    *("reset", "open", "call", "rst", "data", "priority", "settings", "ping", "goaway", "window"),
+    *("continuation", "unknown"),
+)
+MOST_KB = 10_000
+
+
+def resident_kb(daemon: DaemonUnderTest) -> int:
+    assert daemon.process is not None
+    lines = Path(f"/proc/{daemon.process.pid}/status").read_text().splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS"))
+
+
+@root_only
+@pytest.mark.parametrize("seconds", [1, pytest.param(60, marks=pytest.mark.long)])
+def test_no_flood_of_frames_takes_memory_or_delays_a_stop(seconds: int) -> None:
+    with open_to_strangers("[access]\ndefault = 'none'\n") as daemon, daemon.client() as client:
+        for kind in KINDS:
+            with stranger(FLOOD, str(daemon.socket), "settings", "0.2") as first:
+                first.wait(60)
+            before = largest = resident_kb(daemon)
+            slowest_s = 0.0
+            with stranger(FLOOD, str(daemon.socket), kind, str(seconds)) as flood:
+                while flood.poll() is None:
+                    begin = time.monotonic()
+                    client.get_status()
+                    client.start()
+                    client.stop()
+                    slowest_s = max(slowest_s, time.monotonic() - begin)
+                    largest = max(largest, resident_kb(daemon))
+                    time.sleep(0.02)
+                assert flood.stdout is not None
+                assert flood.stdout.read() == "done\n"
+            print(f"{kind}: {largest - before} kB, status, start and stop in {slowest_s:.3f} s")
+            assert largest - before < MOST_KB, kind
