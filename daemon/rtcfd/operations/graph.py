@@ -140,10 +140,14 @@ async def replace(
     code = f"{package}/{type_name}"
     spec = graph_pb2.ComponentSpec()
     kept: tuned.Tuned | None = None
+    values: dict[str, graph_pb2.ParameterValue] = {}  # before
 
     async def replace_request() -> wire.Request:
         nonlocal kept
         await parameters.settle_lists(runner, old)
+        values.clear()
+        with contextlib.suppress(RequestError, KeyError):  # then the request fails, too
+            values.update(await parameters.values_of(runner, old))
         spec.CopyFrom(replacement(runner.desired.components.get(old), given))
         library.set_vector_sizes(spec)
         if request.HasField("given_before"):
@@ -169,9 +173,11 @@ async def replace(
         )
 
     def commit(result: control_pb2.ChangeResult) -> None:
-        known = runner.desired.components.get(old, graph_pb2.ComponentSpec()).parameters
-        values = {each.name: each.value for each in known}
-        set_now = list(spec.parameters)
+        set_now = [
+            each
+            for each in spec.parameters
+            if each.name not in values or not same_value(values[each.name], each.value)
+        ]
         spec.parameters.extend(result.kept)
         runner.desired.drop([old])
         runner.desired.put(result.component, spec)

@@ -7,6 +7,7 @@ import asyncio
 import contextlib
 import time
 from collections.abc import Iterable, Mapping
+from ctypes import c_float
 
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, errors_pb2, graph_pb2
@@ -34,6 +35,13 @@ async def set_parameters(
 ) -> control_pb2.ChangeResult:
     """Change parameters of one component."""
     name = absolute(request.component)
+    if not request.parameters and not request.lists:
+        raise InvalidArgument(
+            f"{name}: no parameter is given: name one and its value, as in kp:=2.0",
+            errors_pb2.REASON_NAME_MISSING,
+            component=name,
+            field="parameters",
+        )
     # Looked up here: the turn may begin in the context of another call.
     acting = caller.current()
 
@@ -61,7 +69,7 @@ async def undo(
                 errors_pb2.REASON_NOTHING_TO_UNDO,
                 component=name,
             )
-        now = await _values(runner, name)
+        now = await values_of(runner, name)
         settings = [_taken_back(runner, each, now) for each in last]
         result = await _set(runner, name, settings, acting, progress, last[0].number)
         words = ", ".join(f"{each.name} = {word(each.value)}" for each in settings)
@@ -212,17 +220,29 @@ async def _set(
     takes_back: int = 0,
 ) -> control_pb2.ChangeResult:
     await settle_lists(runner, name)
-    before = await _values(runner, name)
+    before = await values_of(runner, name)
     if acting is not None and acting.tuning is not None:
         _require_tuning(runner, name, settings, before, acting)
     if name in runner.desired.left_out:
         result = await _check_left_out(runner, name, settings)
     else:
         result = await _ask(runner, PendingParameters(name, settings, before, acting), progress)
+        with contextlib.suppress(RequestError):  # its executor has died meanwhile
+            settings = _adopted(settings, await values_of(runner, name))
     runner.desired.set_parameters(name, settings)
     note(runner, name, settings, before, acting, "undo" if takes_back else "set", "", takes_back)
     result.notes.extend(await runner.save())
     return result
+
+
+def _adopted(
+    settings: Settings, values: Mapping[str, graph_pb2.ParameterValue]
+) -> list[graph_pb2.ParameterSetting]:
+    """Return settings with the values that the component has: in their types, rounded to them."""
+    return [
+        graph_pb2.ParameterSetting(name=each.name, value=values.get(each.name, each.value))
+        for each in settings
+    ]
 
 
 async def _ask(
@@ -271,7 +291,7 @@ def _taken_back(
             parameter=change.parameter,
         )
     found = now.get(change.parameter)
-    if found is None or not same_value(found, change.value):
+    if found is None or not _is_adopted(found, change.value):
         raise FailedPrecondition(
             f"{name} is {'gone' if found is None else word(found)}, not "
             f"{word(change.value)} as {change.who} set it: it was changed otherwise since; "
@@ -281,6 +301,16 @@ def _taken_back(
             parameter=change.parameter,
         )
     return graph_pb2.ParameterSetting(name=change.parameter, value=change.before)
+
+
+def _is_adopted(found: graph_pb2.ParameterValue, given: graph_pb2.ParameterValue) -> bool:
+    """Return whether a component has a value that was given to it, perhaps in single precision."""
+    if same_value(found, given):
+        return True
+    number = _plain(given)
+    if not isinstance(number, int | float) or isinstance(number, bool):
+        return False
+    return same_value(found, graph_pb2.ParameterValue(double_value=c_float(number).value))
 
 
 def _require_tuning(
@@ -343,7 +373,8 @@ async def _of_type(runner: RunnerCore, name: str) -> list[graph_pb2.ParameterInf
     return list((await runner.shared.catalog.find(spec.package, spec.type)).parameters)
 
 
-async def _values(runner: RunnerCore, name: str) -> dict[str, graph_pb2.ParameterValue]:
+async def values_of(runner: RunnerCore, name: str) -> dict[str, graph_pb2.ParameterValue]:
+    """Return the present values of a component's parameters, in their declared types."""
     declared = await _declared(runner, name)
     if name in runner.desired.left_out:
         return _last_values(runner, name, declared)

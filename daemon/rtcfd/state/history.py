@@ -2,14 +2,15 @@
 
 Part of its Desired; store.py keeps it on disk.  Number and bytes are limited in total,
 and for each component, so that a component that is tuned all day does not displace the
-others.
+others.  Changes at one cycle boundary are dropped together, since undo restores all or none
+of them; the newest ones stay, however many and large.
 """
 
 import json
 import time
 from collections import deque
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from google.protobuf import json_format
@@ -19,7 +20,7 @@ from rtcfd.common.regular_files import PARSE_ERRORS
 
 MOST_OF_A_COMPONENT = 200
 MOST = 4000
-# String values may be long.  The newest changes of one cycle boundary stay, however large.
+# String values may be long.
 MOST_BYTES_OF_A_COMPONENT = 1024 * 1024
 MOST_BYTES = 8 * 1024 * 1024
 
@@ -45,13 +46,30 @@ class ParameterChange:
     takes_back: int = 0  # number of the change that it undoes; 0 = none
 
 
+_Key = tuple[int, str]  # number and component of simultaneous changes
+
+
+@dataclass
+class _Kept:
+    """The changes kept of one component."""
+
+    keys: deque[_Key] = field(default_factory=deque)  # oldest first
+    count: int = 0
+    bytes: int = 0
+
+    @property
+    def too_large(self) -> bool:
+        return self.count > MOST_OF_A_COMPONENT or self.bytes > MOST_BYTES_OF_A_COMPONENT
+
+
 class History:
     """The changes, oldest first."""
 
     def __init__(self) -> None:
-        self._changes: dict[str, deque[ParameterChange]] = {}  # by component
+        self._changes: dict[_Key, list[ParameterChange]] = {}
+        self._kept: dict[str, _Kept] = {}  # by component
         self._count = 0
-        self._bytes: dict[str, int] = {}  # by component
+        self._bytes = 0
         self._bytes_on_disk = 0
         self._last = 0  # number of the newest change
         self._new: list[ParameterChange] = []  # not on disk yet
@@ -74,13 +92,15 @@ class History:
             )
             self._put(change)
             self._new.append(change)
+        self._trim(component)
 
     def of(self, component: str = "", parameter: str = "") -> list[ParameterChange]:
         """Return the changes of a component, or of all, and of a parameter, or of all."""
+        keys = self._keys(component) if component else self._changes
         chosen = [
             each
-            for name in ([component] if component else self._changes)
-            for each in self._changes.get(name, ())
+            for key in keys
+            for each in self._changes[key]
             if not parameter or each.parameter == parameter
         ]
         return sorted(chosen, key=lambda each: each.number)
@@ -90,14 +110,13 @@ class History:
 
         Empty if there is none.
         """
-        changes = self._changes.get(component, ())
-        undone = {each.takes_back for each in changes}
-        numbers = [
-            each.number
-            for each in changes
-            if not each.takes_back and each.number not in undone and each.how != UNANSWERED
-        ]
-        return [each for each in changes if numbers and each.number == numbers[-1]]
+        changes = [self._changes[key] for key in self._keys(component)]
+        undone = {each[0].takes_back for each in changes}
+        for each in reversed(changes):
+            first = each[0]
+            if not first.takes_back and first.number not in undone and first.how != UNANSWERED:
+                return list(each)
+        return []
 
     def to_write(self) -> tuple[list[ParameterChange], bool]:
         """Return the changes to write, and whether they replace the file instead of being appended.
@@ -131,42 +150,43 @@ class History:
             except PARSE_ERRORS:
                 continue
             self._put(change)
+            self._trim(change.component)
             self._last = max(self._last, change.number)
 
+    def _keys(self, component: str) -> Iterable[_Key]:
+        kept = self._kept.get(component)
+        return () if kept is None else kept.keys
+
     def _put(self, change: ParameterChange) -> None:
-        name = change.component
-        changes = self._changes.setdefault(name, deque())
-        changes.append(change)
-        self._count += 1
-        self._bytes[name] = self._bytes.get(name, 0) + _size(change)
-        while self._bytes[name] > MOST_BYTES_OF_A_COMPONENT and changes[0].number != change.number:
-            self._drop_oldest(name)
-        while sum(self._bytes.values()) > MOST_BYTES:
-            oldest = self._with_oldest()
-            if self._changes[oldest][0].number == change.number:
-                break
-            self._drop_oldest(oldest)
-        if len(changes) > MOST_OF_A_COMPONENT:
-            self._drop(name)
-        elif self._count > MOST:
-            self._drop(self._with_oldest())
+        key = (change.number, change.component)
+        kept = self._kept.setdefault(change.component, _Kept())
+        if key not in self._changes:
+            self._changes[key] = []
+            kept.keys.append(key)
+        self._changes[key].append(change)
+        self._add(kept, 1, _size(change))
 
-    def _with_oldest(self) -> str:
-        """Return the component with the oldest change."""
-        return min(self._changes, key=lambda name: self._changes[name][0].number)
+    def _trim(self, component: str) -> None:
+        """Drop what is above the limits, after changes of a component."""
+        kept = self._kept.get(component)
+        while kept is not None and kept.too_large and len(kept.keys) > 1:
+            self._drop(kept.keys[0])
+        while (self._count > MOST or self._bytes > MOST_BYTES) and len(self._changes) > 1:
+            self._drop(next(iter(self._changes)))
 
-    def _drop_oldest(self, component: str) -> None:
-        """Drop all changes of the oldest number, because undo must restore all or none of them."""
-        number = self._changes[component][0].number
-        while component in self._changes and self._changes[component][0].number == number:
-            self._drop(component)
+    def _drop(self, key: _Key) -> None:
+        kept = self._kept[key[1]]
+        kept.keys.popleft()  # the oldest of all is the oldest of its component
+        changes = self._changes.pop(key)
+        self._add(kept, -len(changes), -sum(map(_size, changes)))
+        if not kept.keys:
+            del self._kept[key[1]]
 
-    def _drop(self, component: str) -> None:
-        changes = self._changes[component]
-        self._bytes[component] -= _size(changes.popleft())
-        self._count -= 1
-        if not changes:
-            del self._changes[component], self._bytes[component]
+    def _add(self, kept: _Kept, count: int, size: int) -> None:
+        kept.count += count
+        kept.bytes += size
+        self._count += count
+        self._bytes += size
 
 
 def text(changes: Iterable[ParameterChange]) -> str:

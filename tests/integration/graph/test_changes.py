@@ -13,6 +13,14 @@ from values import iteration, parameter_values, port_value, wait_until_after
 ROUNDS = 20
 
 
+def test_the_history_has_the_value_in_the_type_of_the_parameter(client: rtcf.Client) -> None:
+    client.load(rtcf.component("rtcf_test", "Knobs", name="knobs"))
+    client.set_parameters("knobs", [rtcf.parse_parameter("rate:=2")])
+    change = client.get_history("knobs")[-1]
+    assert change.value.WhichOneof("kind") == "double_value"
+    assert change.value.double_value == 2.0
+
+
 def _counter(name: str) -> graph_pb2.ComponentSpec:
     return rtcf.component(
         "rtcf_test", "Counter", name=name, remaps=[f"in:=/{name}/in", f"out:=/{name}/out"]

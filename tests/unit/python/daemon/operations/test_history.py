@@ -83,6 +83,50 @@ def test_the_total_is_bounded_and_the_oldest_change_is_dropped() -> None:
     assert (len(found), found[0].component) == (history.MOST, "/c10")
 
 
+def test_undo_finds_all_of_a_change_however_many_changes_follow() -> None:
+    changes = History()
+    names = [f"taps_{k}" for k in range(2 * history.MOST_OF_A_COMPONENT)]
+    changes.note("/fir", [(each, value(0.0), value(1.0)) for each in names], "ann", "set")
+    assert [each.parameter for each in changes.to_take_back("/fir")] == names
+    for number in range(13):
+        changes.note("/iir", [(f"b_{k}", None, value(number)) for k in range(16)], "ann", "set")
+    undone = 0
+    while last := changes.to_take_back("/iir"):
+        assert len(last) == 16
+        back = [(each.parameter, each.value, value(0.0)) for each in last]
+        changes.note("/iir", back, "ann", "undo", last[0].number)
+        undone += 1
+    assert undone >= 6
+
+
+notes = st.lists(st.tuples(st.sampled_from("abc"), st.integers(1, 12)), max_size=40)
+
+
+@seed(SEED)
+@given(notes)
+def test_only_whole_changes_are_dropped_and_never_the_newest(
+    sequence: list[tuple[str, int]],
+) -> None:
+    with pytest.MonkeyPatch.context() as limits:
+        limits.setattr(history, "MOST_OF_A_COMPONENT", 10)
+        limits.setattr(history, "MOST", 20)
+        changes = History()
+        for number, (component, size) in enumerate(sequence, 1):
+            changes.note(component, [(f"p{k}", None, value(k)) for k in range(size)], "a", "set")
+            kept: dict[int, int] = defaultdict(int)
+            of: dict[str, int] = defaultdict(int)
+            for each in changes.of():
+                kept[each.number] += 1
+                of[each.component] += 1
+            assert all(sequence[k - 1][1] == found for k, found in kept.items())
+            assert kept[number] == size
+            assert of[component] <= 10 or of[component] == size
+            assert sum(of.values()) <= 20
+            again = History()
+            again.read(history.text(changes.of()))
+            assert again.of() == changes.of()
+
+
 def test_the_file_is_bounded(tmp_path: Path) -> None:
     store = Store(tmp_path)
     desired = Desired("arm")
@@ -161,6 +205,17 @@ def test_changes_are_undone_step_by_step_even_after_a_restart(
     assert len(shown) == 3
     assert all(len(line) <= 80 for line in shown)
     assert "/pid.kp" in shown[2]
+
+
+def test_a_value_that_came_with_a_replacement_is_undone(client: rtcf.Client) -> None:
+    client.load(rtcf.component("demo", "Fine", name="pid"))
+    default = kp(client)
+    client.replace("pid", rtcf.component("demo", "Fine", name="pid", parameters=["kp:=7.0"]))
+    assert kp(client) == 7.0
+    (change,) = client.get_history("pid")
+    assert (change.how, change.before.double_value) == ("replace", default)
+    client.undo_parameters("pid")
+    assert kp(client) == default
 
 
 def test_a_parameter_changed_since_is_not_undone(client: rtcf.Client) -> None:
