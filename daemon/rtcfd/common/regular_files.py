@@ -42,6 +42,13 @@ def read_bytes(file: Path) -> bytes:
         return content.read()
 
 
+def read_piece(file: Path, most: int, at: int = 0) -> bytes:
+    """Return at most `most` bytes of a file, from byte `at` on; raises OSError."""
+    with open(_opened(file, os.O_RDONLY), "rb") as content:
+        content.seek(at)
+        return content.read(most)
+
+
 def read_text(file: Path, encoding: str = "utf-8", errors: str = "strict") -> str:
     """Return the text of a file; raises OSError, UnicodeDecodeError."""
     with open(_opened(file, os.O_RDONLY), encoding=encoding, errors=errors) as content:

@@ -6,6 +6,8 @@ Reads only the beginning of the file, and needs no NumPy.
 import struct
 from pathlib import Path
 
+from rtcfd.common import regular_files
+
 _MAGIC = b"\x89MCAP0\r\n"
 _METADATA = 0x0C
 _RECORD = struct.Struct("<BQ")
@@ -14,9 +16,9 @@ NAME = "incident"
 
 
 def read(file: Path) -> dict[str, str]:
-    """Return the keys and values; empty if the file is not an incident.  Raises OSError."""
-    with file.open("rb") as content:
-        data = content.read(_LONGEST)
+    """Return the keys and values; empty if the file is not an incident.  Raises OSError, also for
+    anything but a regular file."""
+    data = regular_files.read_piece(file, _LONGEST)
     try:
         return _pairs(data)
     except (struct.error, ValueError):

@@ -13,7 +13,7 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from google.protobuf import json_format
 from rtcf.v1 import errors_pb2, incidents_pb2
 
 import rtcfd
+from rtcfd.common import regular_files
 from rtcfd.common.errors import FailedPrecondition, NotFound, Unavailable
 from rtcfd.common.limits import Limits
 from rtcfd.incidents import frame_memory, head
@@ -151,11 +152,10 @@ class Incidents:
 
 
 def _unknown(name: str, found: Sequence[incidents_pb2.Incident]) -> NotFound:
-    there = ", ".join(each.name for each in found[-4:]) or "none"
+    newest = ", ".join(each.name for each in found[-4:])
+    there = f"the newest are {newest}" if found else "there are none"
     return NotFound(
-        f"there is no incident {name}; the newest are {there}"
-        if name
-        else "there are no incidents",
+        f"there is no incident {name}; {there}" if name else "there are no incidents",
         errors_pb2.REASON_INCIDENT_NOT_FOUND,
     )
 
@@ -228,18 +228,23 @@ def _incident(file: Path) -> incidents_pb2.Incident:
     return incidents_pb2.Incident(
         name=file.stem,
         runner=fields.get("runner", ""),
-        time_ns=int(fields.get("time_ns", status.st_mtime_ns)),
+        time_ns=_number(fields, "time_ns", status.st_mtime_ns),
         bytes=status.st_size,
         file=str(file),
         reason=fields.get("reason", ""),
-        sequence=int(fields.get("sequence", 0)),
+        sequence=_number(fields, "sequence", 0),
     )
 
 
+def _number(fields: Mapping[str, str], key: str, default: int) -> int:
+    """Return a number of the description, `default` if the file is damaged there."""
+    text = fields.get(key, "")
+    # Far below the largest number of the protocol: the next sequence must fit, too.
+    return int(text) if text.isascii() and text.isdigit() and len(text) <= 18 else default
+
+
 def _piece(file: Path, at: int) -> bytes:
-    with file.open("rb") as content:
-        content.seek(at)
-        return content.read(_PIECE)
+    return regular_files.read_piece(file, _PIECE, at)
 
 
 def _remove(file: Path) -> None:

@@ -8,6 +8,7 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -327,6 +328,34 @@ def test_the_end_of_rtcfd_ends_loops_with_a_hanging_disk(
     daemon.start()
     with rtcf.Client(daemon.socket) as client:
         assert not runs(client)
+
+
+def test_an_incident_in_work_does_not_keep_rtcfd_with_a_hanging_disk(
+    daemon_on_it: Daemon, hanging_disk: HangingDisk
+) -> None:
+    daemon = daemon_on_it
+    with rtcf.Client(daemon.socket) as client:
+        begin(client)
+        client.take_incident()  # creates the folder
+
+    def children() -> int:
+        threads = Path(f"/proc/{daemon.pid}/task").glob("*/children")
+        return sum(len(each.read_text().split()) for each in threads)
+
+    def take() -> None:
+        with contextlib.suppress(rtcf.RtcfError), rtcf.Client(daemon.socket) as client:
+            client.take_incident()
+
+    with hanging_disk.hanging():
+        before = children()
+        taking = threading.Thread(target=take)
+        taking.start()
+        wait_for(lambda: children() > before, "its writer")
+        os.kill(daemon.pid, signal.SIGTERM)
+        wait_for(lambda: daemon.ended, "the end of rtcfd")
+        taking.join()
+    assert "an incident is not written after" in daemon.log()
+    daemon.start()
 
 
 def test_a_stopping_executor_reports_a_read_only_disk(

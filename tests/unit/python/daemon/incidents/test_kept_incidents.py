@@ -289,6 +289,42 @@ def test_stored_incidents_are_listed_while_another_is_written(
     asyncio.run(play())
 
 
+def test_damaged_files_and_others_in_the_folder_hinder_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(incident_files, "_write", _written)
+    folder = tmp_path / "incidents"
+    folder.mkdir()
+    numbers = ("nonsense", "-1", "9" * 19, "9" * 400, "²", "", "1e3")
+    for place, text in enumerate(numbers):
+        facts = {"runner": "arm", "time_ns": text, "sequence": text}
+        _written(0, folder / f"number-{place}.mcap", facts)
+    whole = (folder / "number-0.mcap").read_bytes()
+    for cut in range(0, len(whole), 7):
+        (folder / f"cut-{cut}.mcap").write_bytes(whole[:cut])
+        damaged = bytearray(whole)
+        damaged[cut] ^= 0xFF
+        (folder / f"flipped-{cut}.mcap").write_bytes(damaged)
+    os.mkfifo(folder / "pipe.mcap")
+    (folder / "folder.mcap").mkdir()
+    (folder / "nowhere.mcap").symlink_to("gone")
+    (folder / "zero.mcap").symlink_to("/dev/zero")
+
+    async def play() -> None:
+        kept = Incidents(folder, Limits)
+        async with asyncio.timeout(DEADLINE_S):
+            there = {each.name for each in await kept.all()}
+            assert {f"number-{place}" for place in range(len(numbers))} <= there
+            assert not there & {"pipe", "folder", "nowhere", "zero"}
+            for _ in range(2):
+                new = await kept.keep(_frames(b"x"), {"runner": "arm", "time_ns": time.time_ns()})
+                assert await kept.get("") == new
+            for name in there:
+                await kept.read(await kept.get(name), 0)
+
+    asyncio.run(play())
+
+
 def test_incidents_are_ordered_by_number_not_by_clock(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
