@@ -5,10 +5,11 @@ import contextlib
 import logging
 from collections.abc import Awaitable, Callable, Iterable, Sequence
 
+from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, errors_pb2, runner_pb2
 from rtcf_shared.naming import closest, listing, suggestion
 
-from rtcfd.catalog.catalog import loads
+from rtcfd.catalog.catalog import whole_graph
 from rtcfd.common import runner_settings
 from rtcfd.common.errors import AlreadyExists, NotFound, RequestError, Silent, Unavailable
 from rtcfd.common.names import DEFAULT_RUNNER, check_base_name, check_graph, full_name
@@ -24,6 +25,7 @@ log = logging.getLogger(__name__)
 
 _Take = Callable[[Runner], Awaitable[None]]
 
+_KEEP_S = 10.0  # at the end of rtcfd, for incidents that are being written
 _LOOK_AGAIN_S = 2.0  # between attempts to adopt an executor that does not answer
 
 
@@ -223,9 +225,9 @@ class Runners:
         check_graph(request.components)
         self._shared.limits.check_components(len(request.components))
         if request.dry_run:
-            await loads(self._shared.catalog, request.components)
+            await self._try_elsewhere(request, progress)
             return control_pb2.ChangeResult(
-                notes=[f"runner {name} would be added; its graph is wired when it is applied"],
+                notes=[f"runner {name} would be added"],
                 differences=[
                     control_pb2.Difference(
                         kind=control_pb2.Difference.KIND_LOAD, component=full_name(spec)
@@ -244,6 +246,22 @@ class Runners:
                 raise
 
         return await self.operations.begin(f"the application of a graph to {name}", work)
+
+    async def _try_elsewhere(self, request: control_pb2.ApplyRequest, progress: Progress) -> None:
+        """Check the graph of a runner that does not exist, by the executor of another one.
+
+        Raises the error that applying it would raise; without an executor, only errors of types.
+        """
+        apply = await whole_graph(self._shared.catalog, request.components, dry_run=True)
+        for runner in self._runners.values():
+            if not runner.up:
+                continue
+
+            async def work(runner: Runner = runner) -> None:
+                await runner.ask(wire.Request(apply=apply), progress)
+
+            await runner.change(f"the check of a graph for {request.runner}", work)
+            return
 
     async def remove(self, name: str) -> None:
         """Stop and remove a runner."""
@@ -305,4 +323,11 @@ class Runners:
 
     async def _drain(self) -> None:
         await self.operations.drain()
-        await self._shared.keeping.drain()
+        try:
+            await asyncio.wait_for(self._shared.keeping.drain(), _KEEP_S)
+        except TimeoutError:
+            log.error(
+                "an incident is not written after %g s, and lost: does the disk of the state "
+                "directory answer?",
+                _KEEP_S,
+            )

@@ -8,6 +8,8 @@ import pytest
 import rtcf
 import yaml
 from daemon_process import BUILD_TREE, Daemon, wait_for
+from rtcf.v1 import runner_pb2
+from values import state
 
 GRAPH = """\
 settings:
@@ -81,6 +83,58 @@ def test_unchanged_components_are_not_touched(
         if each.name == "rate"
     ]
     assert rate == 1.0
+
+
+def test_another_fixed_parameter_replaces_the_component(
+    daemon: Daemon, client: rtcf.Client, file: Path
+) -> None:
+    arm = "runner: rt_runner\ncomponents:\n- {{package: rtcf_control, type: {}, name: {}, {}}}\n"
+    client.start()
+    for joints, initial in (("a b", "0 0"), ("a b c", "0 0 0"), ("c b", "0 0")):
+        given = f"parameters: {{joints: '{joints}', initial: '{initial}'}}"
+        file.write_text(arm.format("TrajectoryGenerator", "arm", given))
+        changed = changes(daemon, str(file))
+        assert changed == {("load" if joints == "a b" else "replace", "/arm")}
+        assert changes(daemon, str(file)) == set()
+        (found,) = (
+            each for each in client.get_component("arm").parameters if each.name == "joints"
+        )
+        assert (found.value.string_value, found.fixed) == (joints, True)
+    assert state(client).state == runner_pb2.RUNNER_STATE_RUNNING
+    assert "fixed" in daemon.ctl("info", "arm").stdout
+    done = daemon.ctl("set", "arm", "joints:=d e")
+    assert done.returncode == 1
+    assert "/arm: parameter joints is fixed at the load: `rtcfctl replace` with" in done.stderr
+
+
+LOOP = """\
+    - {package: rtcf_examples, type: Identity, name: i1, remaps: {in: /x, out: /y}}
+    - {package: rtcf_examples, type: Identity, name: i2, remaps: {in: /y, out: /x}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("components", "said"),
+    [
+        (LOOP, "the connections form a loop"),
+        ("    - {package: rtcf_test, type: Counter, name: 2nd}\n", "2nd"),
+        ("    - {package: rtcf_test, type: Counter, remaps: {out: a b}}\n", "a b"),
+        ("    - {package: rtcf_test, type: Knobs, parameters: {rate: fast}}\n", "rate"),
+        (2 * "    - {package: rtcf_test, type: Counter, name: twice}\n", "twice"),
+    ],
+    ids=["loop", "name", "remap", "parameter", "twice"],
+)
+def test_several_graphs_of_which_one_is_wrong_change_nothing(
+    daemon: Daemon, client: rtcf.Client, file: Path, components: str, said: str
+) -> None:
+    first = "  aa:\n    components:\n    - {package: rtcf_test, type: Counter, name: a}\n"
+    file.write_text(f"runners:\n{first}  bb:\n    components:\n{components}")
+    for arguments in (("--dry-run",), ()):
+        done = daemon.ctl("apply", str(file), *arguments)
+        assert done.returncode != 0
+        assert said in done.stderr
+        assert [each.runner for each in client.get_status().runners] == ["rt_runner"]
+    assert not client.get_order()
 
 
 def test_a_rejected_file_changes_nothing(daemon: Daemon, client: rtcf.Client, file: Path) -> None:
