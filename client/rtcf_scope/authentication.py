@@ -21,10 +21,10 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from aiohttp import web
+from rtcf_shared.printable import printable
 
 from rtcf_scope.connection import HEADERS, Connection
 from rtcf_scope.options import LOOPBACK
-from rtcf_scope.printable import printable
 
 _MOST_SESSIONS = 256  # the least recently used ones are removed
 _SESSION_PROTOCOL = "session."  # subprotocol prefix; pages cannot set WebSocket headers

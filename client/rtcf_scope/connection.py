@@ -8,8 +8,7 @@ from typing import Any
 
 from aiohttp import web
 from aiohttp.http_exceptions import HttpProcessingError
-
-from rtcf_scope.printable import printable
+from rtcf_shared.printable import printable
 
 HEADERS = {
     "Content-Security-Policy": (

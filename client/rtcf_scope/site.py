@@ -13,13 +13,13 @@ import rtcf
 from aiohttp import web
 from rtcf_shared.errors import RtcfError
 from rtcf_shared.mcap_writer import McapWriter
+from rtcf_shared.printable import printable
 from rtcf_shared.recorder import Recorder
 
 from rtcf_scope import catalog
 from rtcf_scope.authentication import Authentication
 from rtcf_scope.hub import Hub
 from rtcf_scope.layouts import MOST_BYTES, LayoutError, Layouts
-from rtcf_scope.printable import printable
 from rtcf_scope.recordings import Recordings
 from rtcf_scope.robot import Robots
 from rtcf_scope.status_feed import StatusFeed

@@ -14,11 +14,11 @@ import numpy as np
 from aiohttp import WSMsgType, web
 from numpy.typing import NDArray
 from rtcf_shared.ports import PortSchema
+from rtcf_shared.printable import printable
 
 from rtcf_scope import wire
 from rtcf_scope.chunk import Chunk, column_of, has_trace
 from rtcf_scope.hub import Hub
-from rtcf_scope.printable import printable
 from rtcf_scope.trigger import CYCLE, Search, Trigger, TriggerError, parse
 
 PROTOCOL = "rtcf-scope"  # subprotocol of the WebSocket

@@ -9,12 +9,13 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from types import FrameType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import rtcf
 from rtcf.connection import DEFAULT_SOCKET
 
 from rtcfctl.terminal.repeated_signals import kill_at_next
+from rtcfctl.terminal.safe_streams import safe_streams
 
 if TYPE_CHECKING:
     from rtcfctl.terminal.output import Output
@@ -82,7 +83,11 @@ _OF_THIS_MACHINE = ("check", "doctor", "run")
 
 def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None) -> int:
     """Run one command; return its exit code."""
-    words = sys.argv[1:] if arguments is None else list(arguments)
+    with safe_streams():
+        return _main(sys.argv[1:] if arguments is None else list(arguments), build_tree)
+
+
+def _main(words: list[str], build_tree: Path | None) -> int:
     if words[:1] == [_COMPLETION]:
         from rtcfctl import completion
 
@@ -193,9 +198,16 @@ def _drop_output() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser without abbreviations of options: a new option would change their meaning."""
+
+    def __init__(self, **arguments: Any) -> None:
+        super().__init__(allow_abbrev=False, **arguments)
+
+
 def parser(verb: str = "") -> argparse.ArgumentParser:
     """Return the parser of all commands, or only of the given verb."""
-    result = argparse.ArgumentParser(
+    result = _Parser(
         prog="rtcfctl",
         description="Controls the real-time loops of rtcfd.",
         epilog="Exit codes: 0 success, 1 error, 2 usage error, 3 rtcfd cannot be reached.",
@@ -207,7 +219,7 @@ def parser(verb: str = "") -> argparse.ArgumentParser:
     # override a value given before the verb.
     for module in [_MODULES[verb]] if verb else dict.fromkeys(_MODULES.values()):
         # A new parser for each module: verbs that use -o for a file remove it from the parser.
-        common = argparse.ArgumentParser(add_help=False)
+        common = _Parser(add_help=False)
         _global_options(common, defaults=False)
         importlib.import_module(f"rtcfctl.{module}").register(verbs, common)
     return result

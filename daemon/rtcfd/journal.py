@@ -13,6 +13,8 @@ import time
 from array import array
 from collections.abc import Mapping
 
+from rtcf_shared.printable import printable
+
 ADDRESS = "/run/systemd/journal/socket"
 
 # The size that libsystemd requests; the kernel grants at most net.core.wmem_max.
@@ -140,7 +142,7 @@ class JournalHandler(logging.Handler):
 
         Raises OSError if there is no journal.
         """
-        message = standing_alone(record, self.format(record))
+        message = printable(standing_alone(record, self.format(record)), "\n\t")
         self._journal.send({"MESSAGE": message, **fields(record)})
 
 
@@ -152,7 +154,8 @@ class LineFormatter(logging.Formatter):
         clock = time.strftime("%H:%M:%S", time.localtime(record.created))
         words = [f"{clock}.{int(record.msecs):03d}", f"{record.levelname:<7}"]
         component = getattr(record, "component", "")
-        words.append(standing_alone(record, " ".join(record.getMessage().splitlines())))
+        message = " ".join(record.getMessage().splitlines())
+        words.append(printable(standing_alone(record, message), "\t"))
         if component and record.pathname:
             iteration = getattr(record, "iteration", 0)
             words.append(f"({os.path.basename(record.pathname)}:{record.lineno}, #{iteration})")
@@ -236,3 +239,7 @@ def set_up(verbose: bool) -> None:
     root.handlers[:] = [LogThread(handler)]
     root.setLevel(logging.DEBUG if verbose else logging.INFO)
     logging.getLogger("asyncio").setLevel(logging.WARNING)
+    # gRPC logs a traceback for each metadata that is not UTF-8, which any client may send.
+    logging.getLogger("grpc._cython.cygrpc").addFilter(
+        lambda record: record.msg != "Invalid encoding on %s"
+    )

@@ -12,6 +12,8 @@ import re
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
+from rtcf_shared.printable import printable
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
@@ -58,7 +60,7 @@ class Condition:
         except (SyntaxError, RecursionError, MemoryError):
             raise ConditionError(_no_condition(text)) from None
         if _is_deep(tree):
-            raise ConditionError(f'"{_line(text[:40])}…" has too many parentheses')
+            raise ConditionError(f'"{printable(text[:40])}…" has too many parentheses')
         functions = set()
         for node in ast.walk(tree):
             if not isinstance(node, _NODES):
@@ -71,10 +73,10 @@ class Condition:
         self._tree = tree.body
         if not self.signals:
             raise ConditionError(
-                f'"{_line(text)}" names no signal: write one as in `wave.phase > 0.5`'
+                f'"{printable(text)}" names no signal: write one as in `wave.phase > 0.5`'
             )
         if not _is_truth(self._tree):
-            line = _line(text)
+            line = printable(text)
             raise ConditionError(f'"{line}" is a number: compare it, as in `{line} > 0`')
 
     @property
@@ -124,24 +126,19 @@ class Condition:
                 at, last = word.end(), _WORDS.get(word[0], word[0])
                 if word[0] not in _WORDS and word[0] not in _FUNCTIONS:
                     raise ConditionError(
-                        f'"{word[0]}" in "{_line(self.text)}" is not a signal: name one as '
+                        f'"{word[0]}" in "{printable(self.text)}" is not a signal: name one as '
                         "COMPONENT.PORT, COMPONENT.STATE or COMPONENT.PORT.FIELD"
                     )
             elif sign := _SIGN.match(self.text, at):
                 at, last = sign.end(), _WORDS.get(sign[0], sign[0])
             else:
-                part, line = _line(self.text[at : at + 10]), _line(self.text)
+                part, line = printable(self.text[at : at + 10]), printable(self.text)
                 raise ConditionError(f'"{part}" in "{line}" is not valid in a condition')
             yield last
 
 
 def _no_condition(text: str) -> str:
-    return f'"{_line(text)}" is not a condition: write one as in `wave.phase > 0.5`'
-
-
-def _line(text: str) -> str:
-    """Return a text with unprintable characters, including line ends, as escapes."""
-    return "".join(each if each.isprintable() else ascii(each)[1:-1] for each in text)
+    return f'"{printable(text)}" is not a condition: write one as in `wave.phase > 0.5`'
 
 
 def _matched(pattern: re.Pattern[str], text: str, at: int) -> re.Match[str]:

@@ -59,6 +59,10 @@ def save(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         )
         for runner in runners
     )
+    if output.in_json:
+        import yaml
+
+        text = output.json(yaml.safe_load(text)) + "\n"  # a graph file, too: JSON is YAML
     if args.file == "-":
         print(text, end="")
         return

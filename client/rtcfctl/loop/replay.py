@@ -5,9 +5,10 @@ from pathlib import Path
 from typing import Any
 
 import rtcf
-from rtcf.replay import Summary, replay
+from rtcf.replay import LONGEST_GAP_S, Summary, replay
 
 from rtcfctl.terminal.output import Output
+from rtcfctl.terminal.words import amount
 
 
 def register(verbs: Any, common: argparse.ArgumentParser) -> None:
@@ -19,12 +20,19 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     replaying.add_argument(
         "--write", metavar="BAG", type=Path, help="write the mapped outputs to a bag"
     )
+    replaying.add_argument(
+        "--gap",
+        type=amount("s"),
+        default=LONGEST_GAP_S,
+        metavar="S",
+        help="permit this time without messages (default: 3600 s)",
+    )
     replaying.set_defaults(run=run)
 
 
 def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Replay a bag."""
-    summary = replay(client, args.bag, args.runner, args.write, output.progress)
+    summary = replay(client, args.bag, args.runner, args.write, output.progress, args.gap)
     if not output.for_people:
         output.data(vars(summary))
         return

@@ -12,6 +12,7 @@ from typing import Any
 import rtcf
 from rtcf.diagnosis import Finding, Grade, Host, Loop, cpu_of_next_loop, diagnose
 from rtcf.v1 import control_pb2, runner_pb2
+from rtcf_shared.enums import word
 
 from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.words import amount
@@ -88,12 +89,13 @@ def _ask(client: rtcf.Client, name: str) -> _Answer:
 def _loop(host: Host, found: _Answer) -> Loop:
     status = found.runner
     if status is None:
-        return Loop(max(os.sched_getaffinity(0)), 80, hidden=found.keeps_silent)
+        cpu = max(os.sched_getaffinity(0))
+        return Loop(cpu=cpu, priority=80, hidden=found.keeps_silent)
     return Loop(
-        _cpu_of(host, status, found.every),
-        status.settings.priority,
-        status.pid,
-        status.settings.lock_memory,
+        cpu=_cpu_of(host, status, found.every),
+        priority=status.settings.priority,
+        pid=status.pid,
+        lock_memory=status.settings.lock_memory,
     )
 
 
@@ -113,7 +115,8 @@ def _of_rtcfd(found: _Answer) -> list[Finding]:
     if status.status:
         findings.append(Finding(topic, Grade.WARNING, status.status, "no notes"))
     if not status.degraded and not status.status:
-        text = f"answers; its loop is {runner_pb2.RunnerState.Name(status.state)[13:].lower()}"
+        state = word(runner_pb2.RunnerState.DESCRIPTOR, status.state)
+        text = f"answers; its loop is {state}"
         findings.append(Finding(topic, Grade.GOOD, text))
     return findings
 

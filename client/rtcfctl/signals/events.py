@@ -1,6 +1,7 @@
 """`rtcfctl events`: prints past and new events."""
 
 import argparse
+import contextlib
 import sys
 from typing import Any
 
@@ -33,7 +34,10 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
 def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Print events; for programs, one document each."""
     runners = [args.runner] if args.runner else []
-    with client.watch_events(runners, Place(), until_now=not args.follow) as events:
+    with (
+        contextlib.suppress(KeyboardInterrupt) if args.follow else contextlib.nullcontext(),
+        client.watch_events(runners, Place(), until_now=not args.follow) as events,
+    ):
         for event in events:
             if output.for_people:
                 _print(event, output)

@@ -16,6 +16,7 @@ from rtcf_shared.ports import PortBatch
 from rtcfctl.signals.idle_loop import say_if_ended, say_if_idle
 from rtcfctl.signals.termination import ended_by_signals
 from rtcfctl.terminal.output import Output
+from rtcfctl.terminal.safe_streams import control
 from rtcfctl.terminal.words import amount, counted
 
 _PRINT_PERIOD_S = 1.0
@@ -157,8 +158,10 @@ def _follow(
                 printed = now
                 waits = moment is not None and moment.cycle is None
                 print(
-                    f"\r{counted(files.cycles, 'cycle')}, {files.size / 1e6:.1f} MB, "
+                    control("\r"),
+                    f"{counted(files.cycles, 'cycle')}, {files.size / 1e6:.1f} MB, "
                     f"{files.lost} lost{', waiting for the condition' if waits else ''} ",
+                    sep="",
                     end="",
                     file=sys.stderr,
                     flush=True,
@@ -172,7 +175,7 @@ def _follow(
             files.next()
     finally:
         if sys.stderr.isatty():
-            print("\r\x1b[K", end="", file=sys.stderr, flush=True)
+            print(control("\r\x1b[K"), end="", file=sys.stderr, flush=True)
 
 
 def _is_full(files: Files, batch: PortBatch, args: argparse.Namespace) -> bool:

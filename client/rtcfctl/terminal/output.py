@@ -12,6 +12,7 @@ from typing import Any, TextIO
 from rtcf.v1 import control_pb2
 
 from rtcfctl.terminal.plain import number, plain
+from rtcfctl.terminal.safe_streams import control
 from rtcfctl.terminal.table import Cell, format_table
 
 _PATIENCE_S = 10.0  # time from the start until progress is printed without --verbose
@@ -33,21 +34,38 @@ class Output:
         return self._kind == "table"
 
     @property
+    def in_json(self) -> bool:
+        """Whether the output is JSON."""
+        return self._kind == "json"
+
+    @property
     def width(self) -> int | None:
         """Columns of the terminal; None if standard output is not a terminal."""
         return _width()
 
     def data(self, value: Any) -> None:
         """Print messages, lists or dicts for programs."""
-        document = _plain(value)
         if self._kind == "yaml":
             import yaml
 
-            print(yaml.safe_dump(document, sort_keys=False, allow_unicode=True), end="")
+            document = _plain(value)
+            text = yaml.safe_dump(document, sort_keys=False, allow_unicode=True)
+            if not text.replace("\n", "").isprintable():  # yaml takes more for printable
+                text = yaml.safe_dump(document, sort_keys=False)
+            print(text, end="")
         else:
-            import json
+            print(self.json(value))
 
-            print(json.dumps(document, indent=2, ensure_ascii=False))
+    def json(self, value: Any, indent: int | None = 2) -> str:
+        """Return messages, lists or dicts as JSON."""
+        import json
+
+        text = json.dumps(_plain(value), indent=indent, ensure_ascii=False)
+        if text.replace("\n", "").isprintable():
+            return text
+        return "".join(
+            each if each.isprintable() or each == "\n" else json.dumps(each)[1:-1] for each in text
+        )
 
     def record(self, value: Any) -> None:
         """Print one of several documents: a line of JSON, or a YAML document."""
@@ -55,9 +73,7 @@ class Output:
             print("---")
             self.data(value)
         else:
-            import json
-
-            print(json.dumps(_plain(value), ensure_ascii=False))
+            print(self.json(value, indent=None))
 
     def line(self, text: str, style: str = "", to: TextIO | None = None) -> None:
         """Print a line for people; `style` consists of words, e.g. "bold red"."""
@@ -87,7 +103,7 @@ class Output:
             if self._kind == "yaml":
                 print("---")
         elif sys.stdout.isatty():
-            print("\x1b[2J\x1b[H", end="")
+            print(control("\x1b[2J\x1b[H"), end="")
 
     def progress(self, line: str) -> None:
         """Print the progress of a call, if verbose or after 10 s."""
@@ -134,7 +150,9 @@ def coloured(stream: TextIO) -> bool:
 def styled(text: str, style: str, in_colours: bool) -> str:
     """Return a text in a style, e.g. "bold red"."""
     codes = ";".join(_ANSI[word] for word in style.split())
-    return f"\x1b[{codes}m{text}\x1b[0m" if in_colours and codes and text.strip() else text
+    if not (in_colours and codes and text.strip()):
+        return text
+    return control(f"\x1b[{codes}m") + text + control("\x1b[0m")
 
 
 def _plain(value: Any) -> Any:

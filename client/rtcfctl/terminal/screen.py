@@ -14,11 +14,13 @@ from types import FrameType
 from typing import Any, Self
 
 from rtcfctl.terminal.repeated_signals import kill_at_next
+from rtcfctl.terminal.safe_streams import control
 
-_ENTER, _LEAVE = "\x1b[?1049h\x1b[?25l\x1b[?7l", "\x1b[?7h\x1b[?25h\x1b[?1049l"
+_ENTER = control("\x1b[?1049h\x1b[?25l\x1b[?7l")
+_LEAVE = control("\x1b[?7h\x1b[?25h\x1b[?1049l")
 # Synchronized update: terminals that support it show the output between these at once.
-_BEGIN, _END = "\x1b[?2026h", "\x1b[?2026l"
-_HOME, _REST_OF_LINE, _BELOW = "\x1b[H", "\x1b[K", "\x1b[J"
+_BEGIN, _END = control("\x1b[?2026h"), control("\x1b[?2026l")
+_HOME, _REST_OF_LINE, _BELOW = control("\x1b[H"), control("\x1b[K"), control("\x1b[J")
 _ESCAPE = "\x1b"
 _WHOLE_S = 0.05  # time for the rest of a key's characters to arrive, also over ssh
 # Characters of one key; a single ESC is a key only if no characters follow in time.

@@ -47,7 +47,7 @@ FIT = {
     "/etc/hosts": "127.0.0.1 localhost",
     "/var/log/journal/x": "",
 }
-LOOP = Loop(3, 80, PID)
+LOOP = Loop(cpu=3, priority=80, pid=PID)
 STAT = "7 (spinner) S " + " ".join(["0"] * 36) + " 90 1 0 0"
 CHANGES = [
     ("kernel preemption", "/sys/kernel/realtime", "0", Grade.BAD, "linux-image-rt-amd64"),
@@ -105,7 +105,7 @@ def test_each_finding_follows_the_machine(
 def test_swap_is_a_finding_for_an_unlocked_loop(tmp_path: Path) -> None:
     swaps = {"/proc/swaps": "Filename Type\n/dev/sda2 partition"}
     assert findings(tmp_path, swaps)["swap"].grade == Grade.GOOD
-    loose = Loop(3, 80, PID, lock_memory=False)
+    loose = Loop(cpu=3, priority=80, pid=PID, lock_memory=False)
     assert findings(tmp_path, swaps, loose)["swap"].grade == Grade.BAD
 
 
@@ -125,7 +125,7 @@ def test_a_group_without_real_time_run_time_is_found(tmp_path: Path) -> None:
 
 
 def test_unreadable_files_are_reported_as_unknown_or_absent(tmp_path: Path) -> None:
-    for finding in diagnose(Host(tmp_path), Loop(0, 80)):
+    for finding in diagnose(Host(tmp_path), Loop(cpu=0, priority=80)):
         assert finding.found
 
 
@@ -141,6 +141,9 @@ def test_a_real_measurement_gives_a_verdict_and_leaves_nothing(
     document = json.loads(done.stdout)
     grades = {each["topic"]: each["grade"] for each in document["findings"]}
     assert {"kernel preemption", "wake-up latency", "runner rt_runner"} <= set(grades)
+    # The executor's own limits and memory are checked.
+    for topic in ("capabilities and limits", "locked memory"):
+        assert grades[topic] != "unknown", done.stdout
     # The verdict is also the exit code.
     assert done.returncode == {"good": 0, "warning": 4, "bad": 5}[document["verdict"]["grade"]]
     with daemon.client() as client:
