@@ -51,7 +51,7 @@ class Host:
         return sorted(self.root.glob(pattern.lstrip("/")))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Loop:
     """The loop for which the machine is checked."""
 

@@ -5,6 +5,7 @@ written to another bag. The same bag always results in bit-identical outputs.
 """
 
 import contextlib
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,6 +21,8 @@ from rtcf.v1 import control_pb2
 # Of one request; far below the maximum size of a message.
 _MAX_MESSAGES = 2000
 _MAX_BYTES = 2 * 1024 * 1024
+
+LONGEST_GAP_S = 3600.0
 
 OnProgress = Callable[[str], None]
 
@@ -43,12 +46,14 @@ def replay(
     runner: str = "",
     output: Path | None = None,
     on_progress: OnProgress | None = None,
+    longest_gap_s: float = LONGEST_GAP_S,
 ) -> Summary:
     """Replay a bag in a stopped loop, with newly created components.
 
-    recording    the bag to read
-    output       a bag for the outputs, stamped with the times of the cycles
-    on_progress  called from time to time with a line of progress
+    recording      the bag to read
+    output         a bag for the outputs, stamped with the times of the cycles
+    on_progress    called from time to time with a line of progress
+    longest_gap_s  longest time between two messages, s; the loop runs all its cycles in it
 
     Raises RefusedError, and RecordingError for errors of the files.
     """
@@ -59,6 +64,7 @@ def replay(
             control_pb2.RecordedTopic(topic=each.topic, type=each.datatype, md5=each.md5sum)
             for each in bag._get_connections()
         ]
+        _require_no_gap(recording, bag, longest_gap_s)
         messages = bag.read_messages(raw=True)
         first = next(messages, None)
         if first is None:
@@ -81,6 +87,26 @@ def replay(
                     on_progress(f"{seconds:.1f} s, {session.summary.cycles} cycles")
             session.run(writer, end=True)
         return session.summary
+
+
+def _require_no_gap(recording: Path, bag: Any, longest_gap_s: float) -> None:
+    """Raise RecordingError for a time without messages that no recording has, as after the clock
+    of a robot was set."""
+    before: int | None = None
+    for entry in bag._get_entries():
+        now = int(entry.time.to_nsec())
+        if before is not None and now - before > longest_gap_s * 1e9:
+            gap = round((now - before) / 1e9)
+            raise RecordingError(
+                f"{recording} has no message for {gap} s after {_date(before)}, as if its clock "
+                f"was set then: `rosbag filter {recording} PART.bag 't.secs >= {now // 10**9}'` "
+                "writes the part after that; --gap permits it, and runs all cycles of this time"
+            )
+        before = now
+
+
+def _date(time_ns: int) -> str:
+    return time.strftime("%Y-%m-%d %H:%M:%S UTC", time.gmtime(time_ns / 1e9))
 
 
 class _Session:

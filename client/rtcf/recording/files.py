@@ -23,7 +23,15 @@ class Files(Closing):
     """
 
     def __init__(self, path: Path, runner: str, *, force: bool = False) -> None:
-        """Create the first file; raises ValueError if it exists, unless `force` is set."""
+        """Create the first file; raises ValueError if it exists, unless `force` is set, or if its
+        name promises another format than MCAP."""
+        if path.name == "-":
+            raise ValueError("-: a recording is written to a file, name one: FILE.mcap")
+        if path.suffix in (".bag", ".csv"):
+            raise ValueError(
+                f"{path}: recordings are MCAP files: write {path.with_suffix('.mcap')}, then "
+                f"`rtcfctl convert {path.with_suffix('.mcap')} {path}`"
+            )
         self.paths: list[Path] = []
         self._cycles = self._lost = 0  # of the files that are closed
         self._first = path

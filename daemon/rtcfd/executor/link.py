@@ -238,7 +238,9 @@ def _error_of(error: wire.Error) -> errors.RequestError:
     kind, reason = _ERRORS.get(
         error.code, (errors.FailedPrecondition, errors_pb2.REASON_COMPONENT_REFUSED)
     )
-    return kind(error.message, error.reason or reason)
+    # A newer executor may have reasons that this rtcfd does not know.
+    known = error.reason in errors_pb2.Reason.values()
+    return kind(error.message, (known and error.reason) or reason)
 
 
 def pack_message(message: bytes) -> bytes:

@@ -109,8 +109,10 @@ class Notifications:
             log.error("%s", response.error.message, extra={"runner": self._runner})
 
     def _log(self, record: wire.LogRecord) -> None:
+        if record.level not in _LEVELS:  # of a newer executor
+            record.level = wire.LogRecord.LEVEL_INFO
         self._listener.take_log(record)
-        level = _LEVELS.get(record.level, logging.INFO)
+        level = _LEVELS[record.level]
         # A component that logs in each cycle must not fill the disk.
         self._budget.per_s = self._limits().log_records_per_s
         if not self._budget.take():

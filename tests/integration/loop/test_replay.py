@@ -105,6 +105,22 @@ def test_the_output_can_be_parsed(daemon: Daemon, tmp_path: Path) -> None:
     assert status["runners"][0]["state"] == "stopped"
 
 
+def test_a_gap_as_of_a_clock_that_was_set_is_rejected(daemon: Daemon, tmp_path: Path) -> None:
+    bag = tmp_path / "gap.bag"
+    with rosbag.Bag(str(bag), "w") as writing:
+        for second in (5, 1_700_000_000, 1_700_000_001):
+            writing.write("/G2_R2", Float64(second), rospy.Time(second, 0))
+    done = daemon.ctl("replay", str(bag))
+    assert (done.returncode, done.stdout) == (1, "")
+    (line,) = done.stderr.splitlines()
+    assert "has no message for 1699999995 s after 1970-01-01 00:00:05 UTC" in line
+    assert f"`rosbag filter {bag} PART.bag 't.secs >= 1700000000'`" in line
+    part = tmp_path / "part.bag"
+    subprocess.run(["rosbag", "filter", bag, part, "t.secs >= 1700000000"], check=True)
+    assert daemon.ctl("replay", str(part)).stdout.startswith("replayed 1.000 s in 1001 cycles")
+    assert daemon.ctl("replay", str(part), "--gap", "0.5").returncode == 1
+
+
 def test_an_unsuitable_bag_is_rejected_in_one_line(daemon: Daemon, tmp_path: Path) -> None:
     text = tmp_path / "text.bag"
     text.write_text("no bag")

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from daemon_process import DEADLINE_S
 from rtcf.executor.v1 import executor_pb2 as wire
+from rtcf.v1 import errors_pb2
 from rtcfd.common import errors
 from rtcfd.executor.link import MAX_MESSAGE, PROTOCOL, Link, pack_message, read_message
 
@@ -55,6 +56,24 @@ def test_answers_are_matched_to_requests_in_any_order(tmp_path: Path) -> None:
 
         answers = await asyncio.gather(ask("a"), ask("b"), ask("c"))
         assert list(answers) == ["a", "b", "c"]
+
+    against(tmp_path, peer, test)
+
+
+def test_an_unknown_reason_of_a_newer_executor_is_that_of_the_kind(tmp_path: Path) -> None:
+    async def peer(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        response = wire.Response(id=(await received(reader)).id)
+        response.error.code = wire.Error.CODE_INVALID_ARGUMENT
+        response.error.message = "no"
+        # Field 3, an enum, with a value that does not exist yet.
+        response.error.MergeFromString(b"\x18\xb9\x60")
+        assert response.error.reason == 12345
+        writer.write(pack_message(response.SerializeToString()))
+
+    async def test(link: Link) -> None:
+        with pytest.raises(errors.InvalidArgument, match="no") as raised:
+            await link.request(wire.Request(get_status=STATUS), DEADLINE_S)
+        assert raised.value.reason == errors_pb2.REASON_VALUE_INVALID
 
     against(tmp_path, peer, test)
 
