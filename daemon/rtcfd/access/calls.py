@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rtcf.v1 import errors_pb2, runner_pb2
+from rtcf_shared.printable import printable
 
 from rtcfd.common.errors import InvalidArgument
 
@@ -49,8 +50,6 @@ _NAME_FIELDS = frozenset(
         "token", "holder",
     }
 )  # fmt: skip
-# Free texts that other users see.
-_LINE_FIELDS = frozenset({"holder", "reason", "run_id", "token", "hold"})
 _VALUES = "rtcf.v1.ParameterValue"
 _BULK = frozenset({"rtcf.v1.RecordedMessage"})
 
@@ -119,6 +118,8 @@ def of(method: str) -> Call:
 def check_texts(message: Any) -> None:
     """Raise InvalidArgument if a text in a request, at any depth, is too long, or not one line.
 
+    The names of holders, which other users see, become printable.
+
     Names go into look-ups, suggestions, log records and errors.  The cost of each grows with their
     length, so this comes before all other work.
     """
@@ -146,10 +147,12 @@ def check_texts(message: Any) -> None:
                         errors_pb2.REASON_TEXT_TOO_LONG,
                         field=field.name,
                     )
-                if field.name in _LINE_FIELDS and not text.isprintable():
+                if field.name == "reason" and not text.isprintable():
                     raise InvalidArgument(
                         f"{field.name} {text[:40]!a} has unprintable characters: write one "
                         "line without them",
                         errors_pb2.REASON_NAME_INVALID,
                         field=field.name,
                     )
+            if field.name == "holder":  # a name for messages, for example from a process title
+                message.holder = printable(value)

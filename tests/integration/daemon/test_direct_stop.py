@@ -336,25 +336,27 @@ def test_an_incident_in_work_does_not_keep_rtcfd_with_a_hanging_disk(
     daemon = daemon_on_it
     with rtcf.Client(daemon.socket) as client:
         begin(client)
-        client.take_incident()  # creates the folder
+        client.take_incident()
 
-    def children() -> int:
-        threads = Path(f"/proc/{daemon.pid}/task").glob("*/children")
-        return sum(len(each.read_text().split()) for each in threads)
+    def states() -> dict[str, str]:
+        """Return the state of each thread of rtcfd: D waits for a disk, Z has ended."""
+        stats = Path(f"/proc/{daemon.pid}/task").glob("*/stat")
+        return {each.parent.name: each.read_text().rpartition(")")[2].split()[0] for each in stats}
 
     def take() -> None:
         with contextlib.suppress(rtcf.RtcfError), rtcf.Client(daemon.socket) as client:
             client.take_incident()
 
     with hanging_disk.hanging():
-        before = children()
         taking = threading.Thread(target=take)
         taking.start()
-        wait_for(lambda: children() > before, "its writer")
+        wait_for(lambda: "D" in states().values(), "a thread that waits for the disk")
         os.kill(daemon.pid, signal.SIGTERM)
-        wait_for(lambda: daemon.ended, "the end of rtcfd")
+        # Only the kernel keeps the process, because of that thread.
+        wait_for(lambda: states()[str(daemon.pid)] == "Z", "the end of its main thread")
+        assert "an incident is not written after" in daemon.log()
         taking.join()
-    assert "an incident is not written after" in daemon.log()
+    wait_for(lambda: daemon.ended, "the end of rtcfd")
     daemon.start()
 
 

@@ -3,11 +3,12 @@
 import json
 import os
 import signal
+import subprocess
 from collections.abc import Callable
 
 import pytest
 import rtcf
-from daemon_process import Daemon, stopped, wait_for
+from daemon_process import BUILD_TREE, DEADLINE_S, Daemon, stopped, wait_for
 from fig_1 import mimo
 from rtcf.streams.numbered import Lost, NumberedStream, Place
 from rtcf.v1 import control_pb2, runner_pb2
@@ -82,6 +83,22 @@ def test_rtcfctl_prints_events_as_text_and_json(daemon: Daemon, client: rtcf.Cli
     assert documents[-1]["component"] == "/A"
     other = daemon.ctl("-r", "nobody", "events", "-o", "json").stdout.splitlines()
     assert {json.loads(line)["kind"] for line in other} == {"daemon"}
+
+
+def test_ctrl_c_ends_the_following_of_events_in_order(daemon: Daemon, client: rtcf.Client) -> None:
+    process = subprocess.Popen(
+        [BUILD_TREE / "bin" / "rtcfctl", "events", "-f"],
+        env=daemon.environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert process.stdout is not None and process.stdout.readline()
+    process.send_signal(signal.SIGINT)
+    _, said = process.communicate(timeout=DEADLINE_S)
+    assert (process.returncode, said) == (0, "")
+
+
+def test_options_have_no_abbreviations(daemon: Daemon) -> None:
+    done = daemon.ctl("events", "--foll")
+    assert (done.returncode, "unrecognized arguments: --foll" in done.stderr) == (2, True)
 
 
 def test_a_position_from_before_a_restart_of_rtcfd_starts_over(

@@ -160,6 +160,12 @@ def test_save_and_apply_are_inverse(daemon: Daemon, client: rtcf.Client, file: P
     client.unload(["steady", "/arm/knobs", "slow"])
     changes(daemon, str(saved))
     assert daemon.ctl("save").stdout == saved.read_text()
+    # JSON is a graph file, too.
+    in_json = daemon.ctl("-o", "json", "save").stdout
+    assert json.loads(in_json) == yaml.safe_load(saved.read_text())
+    saved.write_text(in_json)
+    assert changes(daemon, str(saved)) == set()
+    saved.write_text(daemon.ctl("save").stdout)
     (graph,) = rtcf.read_graphs(saved.read_text(), "saved")
     (knobs,) = [each for each in graph.components if each.name == "knobs"]
     values = {each.name: each.value for each in knobs.parameters}

@@ -21,6 +21,20 @@ def test_a_file_gets_its_name_once_it_is_readable(tmp_path: Path) -> None:
     begun.close()
 
 
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("-", "a recording is written to a file, name one"),
+        ("run.bag", r"run.mcap, then `rtcfctl convert \S*run.mcap \S*run.bag`"),
+        ("run.csv", "recordings are MCAP files"),
+    ],
+)
+def test_a_name_of_another_format_is_rejected(tmp_path: Path, name: str, said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        files.Files(tmp_path / name, "runner")
+    assert not list(tmp_path.iterdir())
+
+
 def test_an_existing_file_is_kept_until_its_replacement_is_readable(tmp_path: Path) -> None:
     path = tmp_path / "a.mcap"
     files.Files(path, "runner").close()

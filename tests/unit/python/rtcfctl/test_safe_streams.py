@@ -9,7 +9,7 @@ import unicodedata
 import pytest
 import rtcf
 import yaml
-from daemon_process import BUILD_TREE
+from daemon_process import BUILD_TREE, wait_for
 from daemon_under_test import DaemonUnderTest
 from rtcf.v1 import control_pb2
 from rtcfctl.terminal.output import Output, styled
@@ -62,9 +62,11 @@ def test_programs_get_the_text_itself(kind: str, capsys: pytest.CaptureFixture[s
 
 
 def test_holders_and_reasons_are_one_line(client: rtcf.Client) -> None:
-    opening = control_pb2.OpenLease(component=rtcf.component("demo", "Fine"), holder=ATTACK[:-1])
-    with pytest.raises(rtcf.RefusedError, match=r"holder '\\x1b.*unprintable characters: write"):
-        list(client.lease_component(opening))
+    spec = rtcf.component("demo", "Fine", name="held")
+    lease = client.lease_component(control_pb2.OpenLease(component=spec, holder=ATTACK[:-1]))
+    wait_for(lambda: client.get_order() == ["/held"], "the lease")
+    assert client.get_component("held").holder == printed(ATTACK[:-1])[:-1]
+    lease.end()
     with pytest.raises(rtcf.RefusedError, match="reason 'a.nb' has unprintable characters"):
         client.take_incident(reason="a\nb")
 
