@@ -12,8 +12,8 @@ class SetsLocale final : public rtcf::Component {
                fail("the locale of the environment is unknown");
     }
     void update() override {
-        half_.write(std::strtod("0.5", nullptr));
-    }  // in the locale of rtcf's threads
+        half_.write(std::strtod("0.5", nullptr));  // in the locale of the loop's thread
+    }
 
     rtcf::Output<double> half_{this, "half"};
 };

@@ -348,7 +348,8 @@ TEST_F(ParameterTest, AnotherThreadCopiesWholeValues) {
             for (const std::string& name : names.copy()) {
                 if (name.size() != kName) ++torn;
             }
-            if (gain.copy() != std::floor(gain.copy())) ++torn;
+            const double number = gain.copy();
+            if (number != std::floor(number)) ++torn;
             ++copies;
         } while (changing);
     });
