@@ -199,7 +199,7 @@ class ParameterBuffers {
     /// @param present is set to the present value here and by commit()
     ParameterBuffers(const Whole& initial, const Whole*& present)
         : buffers_{{initial, initial}}, present_(present) {
-        present_ = &buffers_[0];
+        present_ = buffers_.data();
     }
     ParameterBuffers(const ParameterBuffers&) = delete;
     ParameterBuffers& operator=(const ParameterBuffers&) = delete;

@@ -341,8 +341,9 @@ TEST_F(ParameterTest, AnotherThreadCopiesWholeValues) {
             const std::string text = frame.copy();
             const bool is_long = text.find_first_not_of('a') == std::string::npos;
             const bool is_short = text.find_first_not_of('b') == std::string::npos;
-            if (!(is_long && text.size() == kLong) && !(is_short && text.size() == kLong / 2))
-                ++torn;
+            const bool whole =
+                (is_long && text.size() == kLong) || (is_short && text.size() == kLong / 2);
+            if (!whole) ++torn;
             const std::array<double, 3> array = gains.copy();
             if (array[0] != array[1] || array[0] != array[2]) ++torn;
             for (const std::string& name : names.copy()) {

@@ -1,6 +1,8 @@
 #include <rtcf/read_number.hpp>
 
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <clocale>
 #include <cmath>
@@ -42,8 +44,15 @@ TEST(ReadNumber, TakesANumberOffTheBeginning) {
 TEST(ReadNumber, DoesNotDependOnTheLocaleOfTheProcess) {
     const test::TemporaryFolder folder;
     const std::string name = "de_DE.UTF-8";
-    const std::string make = "localedef -i de_DE -f UTF-8 " + folder.path(name);
-    ASSERT_EQ(std::system(make.c_str()), 0);
+    const std::string made = folder.path(name);
+    const pid_t localedef = ::fork();
+    if (localedef == 0) {
+        ::execlp("localedef", "localedef", "-i", "de_DE", "-f", "UTF-8", made.c_str(), nullptr);
+        ::_exit(127);
+    }
+    int status = -1;
+    ASSERT_EQ(::waitpid(localedef, &status, 0), localedef);
+    ASSERT_EQ(status, 0);
     ASSERT_EQ(::setenv("LOCPATH", folder.path("").c_str(), 1), 0);
     ASSERT_NE(std::setlocale(LC_ALL, name.c_str()), nullptr);
     const double half = std::strtod("0.5", nullptr);  // in this locale
