@@ -69,7 +69,6 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
                     client.watch_ports((), runner, component_times=args.components) as stream,
                     ended_by_signals(stream),
                 ):
-                    say_if_idle(client, runner, output)
                     error = _follow(client, stream, trace, late, args, output)
                     if late is not None:
                         late.finish()
@@ -142,7 +141,9 @@ def _follow(
     output: Output,
 ) -> rtcf.RtcfError | None:
     """Trace the loop.  Return the error that ended it; raise the error if there are no cycles."""
-    queries = _Queries(client, args.runner or "rt_runner", trace)
+    runner = args.runner or "rt_runner"
+    queries = _Queries(client, runner, trace)
+    say_if_idle(client, runner, output)  # from here on, nothing is lost
     try:
         _follow_cycles(stream, queries, trace, late, args, output)
         time.sleep(_SETTLE_S)
