@@ -191,6 +191,25 @@ def _fit(
     model = model_of(best.x)
     fit = _judged(model, y, model.simulate(u, period))
     others = [model_of(best.x + each) for each in _deviations(best.jac, best.fun)]
+
+    def refitted(p: Any, delay: float) -> tuple[Any, float]:
+        """Return the parameters with this delay that fit best, and the square of their error."""
+        found = optimize.least_squares(
+            lambda rest: linear((*rest, delay))[1], p[:-1], bounds=(low[:-1], high[:-1]),
+            xtol=1e-4, ftol=1e-4, gtol=1e-14, x_scale="jac", max_nfev=30,
+        )  # fmt: skip
+        return np.append(found.x, delay), 2.0 * float(found.cost)
+
+    # The covariance holds close to the best parameters only.  A longer delay, which a loop may not
+    # be stable with, may fit as well with other time constants: the profile of the likelihood.
+    most = float(best.fun @ best.fun) + _DEVIATIONS**2 * _variance(best.fun)
+    p, longer = np.clip(best.x, low, high), 1.0
+    while best.x[-1] + longer < high[-1]:
+        p, error = refitted(p, float(best.x[-1]) + longer)
+        if error > most:
+            break
+        others.append(model_of(p))
+        longer *= 2.0
     return replace(fit, others=tuple(others))
 
 
@@ -215,17 +234,21 @@ def _correlation(residuals: Array) -> float:
     return max(float(residuals[1:] @ residuals[:-1]) / power, 0.0) if power > 0.0 else 0.0
 
 
-def _deviations(jacobian: Array, residuals: Array) -> list[Array]:
-    """Return changes of the parameters along the axes of their covariance, both ways.
+def _variance(residuals: Array) -> float:
+    """Return the variance of residuals.
 
-    The residuals may be correlated: fewer of them count, as of an autoregression of first order.
+    They may be correlated: fewer of them count, as of an autoregression of first order.
     """
     correlation = min(_correlation(residuals), _MOST_CORRELATED)
-    inflated = (
-        float(residuals @ residuals) / len(residuals) * (1.0 + correlation) / (1.0 - correlation)
-    )
+    variance = float(residuals @ residuals) / len(residuals)
+    return variance * (1.0 + correlation) / (1.0 - correlation)
+
+
+def _deviations(jacobian: Array, residuals: Array) -> list[Array]:
+    """Return changes of the parameters along the axes of their covariance, both ways."""
     _, values, axes = np.linalg.svd(jacobian, full_matrices=False)
-    sizes = _DEVIATIONS * np.sqrt(inflated) / np.maximum(values, 1e-12 * values[0])
+    deviation = np.sqrt(_variance(residuals))
+    sizes = _DEVIATIONS * deviation / np.maximum(values, 1e-12 * values[0])
     # A parameter that the values leave open, e.g. the time constant of an integrator, stays close.
     sizes = np.minimum(sizes, _LARGEST_DEVIATION)
     return [sign * size * axis for size, axis in zip(sizes, axes, strict=True) for sign in (1, -1)]

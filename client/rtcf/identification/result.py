@@ -28,6 +28,9 @@ MOST_SYSTEMATIC = 4.0  # percent of the output, see Fit.systematic
 MOST_SYSTEMATIC_UNDAMPED = 1.0
 _BETTER = 1.0  # percent by which a model must be better to be used
 _CREDIBLE = 1.2  # residuals by the smallest ones, of models that a loop must be stable with
+# Phase in rad of an oscillation at the crossover that the record contains, of a plant that
+# integrates or oscillates: friction makes an integrator look like a plant with a gain at rest.
+_LEAST_PHASE = 0.5 * np.pi
 _SLOWER = 1.25  # from one attempt to the next
 _ATTEMPTS = 40
 _NOTCH_Q = 0.5  # turns a resonance into two equal lags
@@ -130,8 +133,15 @@ class Identified:
                 "cycles, or set a larger --amplitude"
             )
         gains, slower = max(found, key=lambda each: abs(each[0].ki))
+        margins = plants[0].margins(gains)
+        if self._is_undamped and margins.crossover * self._duration < _LEAST_PHASE:
+            raise RtcfError(
+                f"no gains: the loop by {method} would be slower than the record, whose "
+                f"{self._duration:.3g} s do not show what the plant does then: record at least "
+                f"{_LEAST_PHASE / margins.crossover:.2g} s"
+            )
         sensitivity = max(each.sensitivity(gains) for each in plants)
-        return Proposal(method, gains, plants[0].margins(gains), sensitivity, slower, notch)
+        return Proposal(method, gains, margins, sensitivity, slower, notch)
 
     def require_stable(self, gains: Gains) -> None:
         """Raise RtcfError unless a loop with these gains is as propose() requires it."""
@@ -146,8 +156,12 @@ class Identified:
         """Whether the plant integrates during the experiment, or oscillates."""
         model = max((self.first, self.second), key=lambda each: each.percent).model
         assert isinstance(model, Transfer)
-        duration = len(self.first.residuals) * self.period
-        return not model.time_constants or model.time_constants[0] > duration
+        return not model.time_constants or model.time_constants[0] > self._duration
+
+    @property
+    def _duration(self) -> float:
+        """Length of the record, s."""
+        return len(self.first.residuals) * self.period
 
     def _plants(self, notch: Notch | None) -> list[SampledPlant]:
         """Return the models that describe the values, the best one first."""

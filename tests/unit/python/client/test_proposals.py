@@ -221,6 +221,19 @@ def test_no_proposal_for_a_random_plant_is_unstable(count: int) -> None:
     assert len(given) > count / 2
 
 
+@pytest.mark.parametrize(
+    ("seed", "said"),
+    [
+        # Friction made an integrator look like a spring: true sensitivity 14.
+        (518, "no gains: the loop by simc would be slower than the record, whose 2 s do not show"),
+        # Noise hid a dead time of 6 cycles: 11.
+        (988, "no loop by simc is stable with a sensitivity of at most 2 for all models that"),
+    ],
+)
+def test_a_record_that_does_not_show_enough_is_refused(seed: int, said: str) -> None:
+    assert said in outcome(seed).said
+
+
 @pytest.mark.parametrize("delay", [40, 100, 200])
 def test_plants_with_long_dead_times_have_gains(delay: int) -> None:
     plant = Truth(np.array([[0.0, 1.0], [-200.0, -30.0]]), np.array([0.0, 200.0]), delay, 1)
