@@ -1,28 +1,15 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include <rtcf/component.hpp>
-#include <rtcf/read_number.hpp>
 
 #include "words.hpp"
 
 namespace rtcf_control {
 namespace {
-
-// Reads numbers separated by spaces or commas.
-/// @return empty, or the text that is not a finite number
-std::string parse(const std::string& text, std::vector<double>& numbers) {
-    for (const std::string& word : words(text)) {
-        const std::optional<double> number = rtcf::readNumber(word);
-        if (!number || !std::isfinite(*number)) return word;
-        numbers.push_back(*number);
-    }
-    return {};
-}
 
 bool rises(const std::vector<double>& points) {
     return std::adjacent_find(points.begin(), points.end(),
@@ -73,9 +60,9 @@ class LookupTable final : public rtcf::Component {
 
     bool prepare(const rtcf::Values& proposed) override {
         Table table;
-        if (const std::string wrong = parse(proposed[x], table.x); !wrong.empty())
+        if (const std::string wrong = readNumbers(proposed[x], table.x); !wrong.empty())
             return RTCF_FAIL(this, "x: {} is not a number; write a list as in \"0 1 2\"", wrong);
-        if (const std::string wrong = parse(proposed[y], table.y); !wrong.empty())
+        if (const std::string wrong = readNumbers(proposed[y], table.y); !wrong.empty())
             return RTCF_FAIL(this, "y: {} is not a number; write a list as in \"0 1 4\"", wrong);
         if (table.x.empty() || table.x.size() != table.y.size())
             return RTCF_FAIL(this, "x has {} numbers and y has {}: each point needs one of both",
@@ -127,11 +114,11 @@ class LookupTable2D final : public rtcf::Component {
 
     bool prepare(const rtcf::Values& proposed) override {
         Table table;
-        if (const std::string wrong = parse(proposed[columns], table.x); !wrong.empty())
+        if (const std::string wrong = readNumbers(proposed[columns], table.x); !wrong.empty())
             return RTCF_FAIL(this, "columns: {} is not a number", wrong);
-        if (const std::string wrong = parse(proposed[rows], table.y); !wrong.empty())
+        if (const std::string wrong = readNumbers(proposed[rows], table.y); !wrong.empty())
             return RTCF_FAIL(this, "rows: {} is not a number", wrong);
-        if (const std::string wrong = parse(proposed[values], table.z); !wrong.empty())
+        if (const std::string wrong = readNumbers(proposed[values], table.z); !wrong.empty())
             return RTCF_FAIL(this, "values: {} is not a number", wrong);
         if (table.x.size() < 2 || table.y.size() < 2)
             return fail("columns and rows need at least two numbers each");

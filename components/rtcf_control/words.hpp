@@ -1,10 +1,14 @@
 /// @file
-/// Words of a parameter that is a list.
+/// Words and numbers of a parameter that is a list.
 #pragma once
 
 #include <cctype>
+#include <cmath>
+#include <optional>
 #include <string>
 #include <vector>
+
+#include <rtcf/read_number.hpp>
 
 namespace rtcf_control {
 
@@ -21,6 +25,17 @@ inline std::vector<std::string> words(const std::string& text) {
         }
     }
     return found;
+}
+
+/// Reads finite numbers separated by spaces or commas. Not real-time safe.
+/// @return empty, or the first word that is not a finite number
+inline std::string readNumbers(const std::string& text, std::vector<double>& numbers) {
+    for (const std::string& word : words(text)) {
+        const std::optional<double> number = rtcf::readNumber(word);
+        if (!number || !std::isfinite(*number)) return word;
+        numbers.push_back(*number);
+    }
+    return {};
 }
 
 }  // namespace rtcf_control

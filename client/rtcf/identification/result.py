@@ -137,7 +137,7 @@ class Identified:
         if self._is_undamped and margins.crossover * self._duration < _LEAST_PHASE:
             raise RtcfError(
                 f"no gains: the loop by {method} would be slower than the record, whose "
-                f"{self._duration:.3g} s do not show what the plant does then: record at least "
+                f"{self._duration:.3g} s do not show such slow motions: record at least "
                 f"{_LEAST_PHASE / margins.crossover:.2g} s"
             )
         sensitivity = max(each.sensitivity(gains) for each in plants)

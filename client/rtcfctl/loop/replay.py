@@ -25,7 +25,7 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
         type=amount("s"),
         default=LONGEST_GAP_S,
         metavar="S",
-        help="permit this time without messages (default: 3600 s)",
+        help=f"permit this time without messages (default: {LONGEST_GAP_S:g} s)",
     )
     replaying.set_defaults(run=run)
 

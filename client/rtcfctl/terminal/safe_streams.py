@@ -45,7 +45,7 @@ class SafeStream:
 def safe_streams() -> Iterator[None]:
     """Make standard output and error safe.
 
-    One that is closed discards what is printed, since a change must not fail because of it.
+    A closed stream discards its text: a change must not fail because of it.
     """
     before = sys.stdout, sys.stderr
     out, error = (each or open(os.devnull, "w", encoding="utf-8") for each in before)  # noqa: SIM115

@@ -17,7 +17,6 @@
 namespace rtcf_control {
 namespace {
 
-using rtcf::readNumber;
 using rtcf::takeNumber;
 
 // Relative to the largest element: symmetry of a matrix, and eigenvalues that count as 0.
@@ -25,16 +24,6 @@ constexpr double kRounding = 1e-9;
 
 std::string named(const char* name, const std::string& error) {
     return fmt::format("{}: {}", name, error);
-}
-
-// Returns empty, or the text that is not a finite number.
-std::string readNumbers(const std::string& text, std::vector<double>& numbers) {
-    for (const std::string& word : words(text)) {
-        const std::optional<double> number = readNumber(word);
-        if (!number || !std::isfinite(*number)) return word;
-        numbers.push_back(*number);
-    }
-    return {};
 }
 
 // Reads a pole such as -2+1j, -2 or 1j.

@@ -2,8 +2,8 @@
 
 gRPC keeps state for each stream that a client opens, even if the client resets it at once, and
 answers pings and settings.  The limits of calls come too late: a client that opens and resets
-streams (rapid reset, CVE-2023-44487) exhausts the memory of rtcfd without a call.  The kernel keeps
-what a delayed client sends, and then the client waits.
+streams (rapid reset, CVE-2023-44487) exhausts the memory of rtcfd without a call.  The kernel
+buffers the bytes of a delayed client; when the buffer is full, the client waits.
 
 Frames are described in RFC 9113, section 4.1.  Owned by the relay of one connection.
 """
@@ -26,7 +26,7 @@ _SHORT_S = 0.05  # waits up to this are put off, so that each frame does not nee
 class FramePace:
     """Cuts the bytes of one connection at frames that must wait.
 
-    `pace` belongs to the user, who may have other connections.
+    All connections of a user share a `pace`.
     """
 
     def __init__(self, pace: Pace) -> None:

@@ -167,7 +167,7 @@ class History:
         self._add(kept, 1, _size(change))
 
     def _trim(self, component: str) -> None:
-        """Drop what is above the limits, after changes of a component."""
+        """Drop the oldest changes above the limits; `component` has the newest ones."""
         kept = self._kept.get(component)
         while kept is not None and kept.too_large and len(kept.keys) > 1:
             self._drop(kept.keys[0])

@@ -50,8 +50,8 @@ struct Doc {
     explicit Doc(std::string line) : value(std::move(line)) {}
     std::string value;
 };
-/// The value does not change after the load: it determines what the component allocates, opens or
-/// reads from a file. `set` rejects another value; `apply` replaces the component.
+/// The value does not change after the load, as the path of a device or the names of joints. `set`
+/// rejects another value; `apply` replaces the component.
 struct Fixed {};
 /// One enumerator of an enum parameter: its name and value.
 struct Choice {

@@ -19,7 +19,7 @@ def frame(kind: int, payload: bytes) -> bytes:
 
 
 class Recorded(Pace):
-    """A pace that notes what is taken, and lets frames of more than one unit wait."""
+    """A pace that records its units, and delays frames of more than one unit."""
 
     def __init__(self) -> None:
         super().__init__(1.0)
