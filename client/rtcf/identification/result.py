@@ -134,11 +134,13 @@ class Identified:
             )
         gains, slower = max(found, key=lambda each: abs(each[0].ki))
         margins = plants[0].margins(gains)
-        if self._is_undamped and margins.crossover * self._duration < _LEAST_PHASE:
+        # Without a crossover, the loop is slower than all frequencies that are searched.
+        crossover = margins.crossover if np.isfinite(margins.crossover) else 0.0
+        if self._is_undamped and crossover * self._duration < _LEAST_PHASE:
+            longer = f"at least {_LEAST_PHASE / crossover:.2g} s" if crossover else "for longer"
             raise RtcfError(
                 f"no gains: the loop by {method} would be slower than the record, whose "
-                f"{self._duration:.3g} s do not show such slow motions: record at least "
-                f"{_LEAST_PHASE / margins.crossover:.2g} s"
+                f"{self._duration:.3g} s do not show such slow motions: record {longer}"
             )
         sensitivity = max(each.sensitivity(gains) for each in plants)
         return Proposal(method, gains, margins, sensitivity, slower, notch)
