@@ -37,7 +37,8 @@ def follow_components(
     Returns a line for each difference, and the components that the executor does not have,
     with the reason; these stay in the desired state.  If the executor's graph was completely
     `restored` before, a missing component that was not left out has been unloaded since, by a
-    change whose save was lost; it is dropped.
+    change whose save was lost; it is dropped.  A new or different component shows such a change,
+    too: it is followed as a whole.
     """
     lines: list[str] = []
     known_left_out = dict(desired.left_out)
@@ -59,6 +60,7 @@ def follow_components(
         else:
             continue
         desired.put(name, present)
+    restored = restored or bool(lines)
     for name in [name for name in left_out if name not in desired.quarantined]:
         if restored and name not in known_left_out:
             lines.append(f"{name} was unloaded")

@@ -106,6 +106,22 @@ def test_an_interrupted_restore_is_completed(daemon: DaemonUnderTest, client: rt
         assert again.get_order() == ["/a", "/x"]
 
 
+def test_a_change_whose_save_was_lost_is_followed_as_a_whole(
+    daemon: DaemonUnderTest, client: rtcf.Client
+) -> None:
+    client.set_runner(LONG)
+    client.load(rtcf.component("demo", "Fine", name="old"))
+    before = (daemon.state / "rt_runner.json").read_text()
+    client.replace("old", rtcf.component("demo", "Fine", name="new"))
+    daemon.end(signal.SIGKILL)
+    (daemon.state / "rt_runner.json").write_text(before)
+    daemon.start()
+    with daemon.client() as again:
+        assert again.get_order() == ["/new"]
+        assert [each.full_name for each in again.list_components()] == ["/new"]
+    assert [each["name"] for each in daemon.saved()["components"]] == ["new"]
+
+
 def test_a_runner_missing_in_the_state_is_adopted(
     daemon: DaemonUnderTest, client: rtcf.Client
 ) -> None:
