@@ -133,7 +133,7 @@ class Daemon:
 
         def ready() -> bool:
             assert not self.ended, self.log()
-            return "ready;" in self.log()[begin:]
+            return b"ready;" in self.log_file.read_bytes()[begin:]
 
         wait_for(ready, "rtcfd")
 
