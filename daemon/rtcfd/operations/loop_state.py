@@ -30,7 +30,7 @@ class LoopState:
         """Note a request to stop.  It is valid from here on, even if the executor fails to stop."""
         self.stops += 1
         self.stop_owed = True
-        self.fault = ""
+        self.held = self.fault = ""
         self.want(False)
 
     def want(self, running: bool) -> None:

@@ -58,9 +58,11 @@ async def recover(runner: RunnerCore, verdict: Verdict, crashes: Crashes, cause:
                 await start_in_turn(runner, asked)
             except RequestError as error:
                 not_resumed = f"; not resumed: {error}"
-        runner.loop.held = _held(runner, verdict, cause) + not_resumed
+        held = _held(runner, verdict, cause) + not_resumed
+        if runner.loop.stops == asked:  # a loop that was stopped in order is not held
+            runner.loop.held = held
         took = time.monotonic() - begin
-        runner.log.warning("executor restarted in %.2f s: %s", took, runner.loop.held)
+        runner.log.warning("executor restarted in %.2f s: %s", took, held)
 
     try:
         await runner.change("the recovery of its executor", work, patient=True)

@@ -179,6 +179,31 @@ def test_calls_cut_off_by_the_end_of_an_executor_get_its_reason(
     assert "while /a.update was running" in known
 
 
+@pytest.mark.parametrize("when", ["during the recovery", "after the recovery"])
+def test_a_loop_is_stopped_in_order_after_a_crash(
+    service: DaemonUnderTest, held: Held, when: str
+) -> None:
+    with service.client() as client:
+        client.start()
+        with held.back("serve"):
+            with pytest.raises(rtcf.RefusedError):
+                client.set_parameters("/a", [rtcf.parse_parameter("die:=SIGSEGV")])
+            if when == "during the recovery":
+                wait_for(held.waits("serve"), "the recovery")
+                stop = Call(service, lambda c: c.stop())
+                wait_for(lambda: service.saved()["running"] is False, "the stop")
+        wait_for(lambda: "executor restarted in" in service.log(), "the recovery")
+        if when == "during the recovery":
+            assert stop.end() == ""
+        else:
+            assert status(service).state == runner_pb2.RUNNER_STATE_FAULTED
+            client.stop()
+    after = status(service)
+    assert after.state == runner_pb2.RUNNER_STATE_STOPPED
+    assert "held" not in after.status
+    assert "/a is left out: " in after.status
+
+
 def test_the_answer_to_a_start_does_not_hide_the_end_of_the_loop(
     service: DaemonUnderTest, held: Held
 ) -> None:
