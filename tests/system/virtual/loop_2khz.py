@@ -1,6 +1,9 @@
 """A loop at 2 kHz in the service of this machine, with a check that it ran without a break."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
 import rtcf
 from machine import wait_for
@@ -8,7 +11,19 @@ from rtcf.v1 import runner_pb2
 from rtcf_service import Service
 
 FREQUENCY_HZ = 2000.0
+RT_LIMIT = Path("/proc/sys/kernel/sched_rt_runtime_us")
 DROP_IN = "/etc/systemd/system/rtcfd.service.d/test.conf"
+
+
+@contextmanager
+def limit_of_real_time(us_per_s: int) -> Iterator[None]:
+    """Limit the CPU time of all real-time threads, us in a second (-1: no limit)."""
+    before = RT_LIMIT.read_text()
+    RT_LIMIT.write_text(str(us_per_s))
+    try:
+        yield
+    finally:
+        RT_LIMIT.write_text(before)
 
 
 @dataclass(frozen=True)

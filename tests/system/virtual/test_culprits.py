@@ -14,14 +14,13 @@ from pathlib import Path
 
 import pytest
 import rtcf
-from loop_2khz import Loop
+from loop_2khz import Loop, limit_of_real_time
 from machine import wait_for
 
 SEED = 25
 TRIALS = 100
 DOUBT = "though the loop is more urgent"  # the trace cannot distinguish several causes
 TRACEFS = Path("/sys/kernel/tracing")
-RT_LIMIT = Path("/proc/sys/kernel/sched_rt_runtime_us")
 # Uses the CPU once, and ends. Arguments: priority, time (s), name.
 HOG = """
 import os, sys, time
@@ -156,10 +155,8 @@ def traced(folder: Path) -> Iterator[list[dict[str, object]]]:
 @pytest.fixture
 def limited() -> Iterator[None]:
     """Limit the time of real-time threads, as kernels do by default."""
-    before = RT_LIMIT.read_text()
-    RT_LIMIT.write_text("950000")
-    yield
-    RT_LIMIT.write_text(before)
+    with limit_of_real_time(950_000):
+        yield
 
 
 def test_95_of_100_causes_are_named_correctly(loop: Loop, tmp_path: Path, limited: None) -> None:
