@@ -17,6 +17,14 @@ def shell_lines(text: str) -> list[str]:
     return [line for line in lines if line.strip() and not line.startswith("#")]
 
 
+def block(page: str, language: str, holding: str) -> str:
+    """Return the block of README.md or of a page in docs/ that contains a text."""
+    text = (README if page == "README.md" else TREE / "docs" / page).read_text()
+    blocks = re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    (found,) = (str(each) for each in blocks if holding in each)
+    return found
+
+
 def section(page: Path, title: str) -> str:
     """Return one section of a page."""
     found = page.read_text().partition(f"## {title}\n")[2].partition("\n## ")[0]

@@ -16,7 +16,7 @@ import rtcf
 from daemon_process import BUILD_TREE, MINDS_CTRL_C, NO_ROS, Daemon, clean_environment, wait_for
 from documentation_commands import pages_typed, typed
 from launch_processes import build_tree_environment
-from pages import TREE
+from pages import TREE, block
 from std_msgs.msg import Float64
 
 _COMPILE_DEADLINE_S = 900.0
@@ -50,7 +50,7 @@ def _loop_with_a_bag(daemon: Daemon, client: rtcf.Client) -> None:
 
 
 def _pendulum(daemon: Daemon, _: rtcf.Client) -> None:
-    (daemon.folder / "pendulum.xml").write_text(_block("mujoco.md", "xml", "<mujoco>"))
+    (daemon.folder / "pendulum.xml").write_text(block("mujoco.md", "xml", "<mujoco>"))
 
 
 # Setup that a page assumes.
@@ -107,7 +107,7 @@ def test_the_commands_of_a_page_succeed(page: str, daemon: Daemon, client: rtcf.
 def test_the_tour_of_the_robot_succeeds(daemon: Daemon, client: rtcf.Client) -> None:
     file = BUILD_TREE / "devel" / "share" / "rtcf_arm" / "arm.yaml"
     assert daemon.ctl("apply", str(file)).returncode == 0
-    (daemon.folder / "velocity_pi.py").write_text(_block("robot.md", "python", "VelocityPi"))
+    (daemon.folder / "velocity_pi.py").write_text(block("robot.md", "python", "VelocityPi"))
     client.start()
     lines = list(typed("robot.md"))
     assert any("1e9" in line for line in lines)
@@ -153,14 +153,6 @@ def _left_running(
             process.wait()
 
 
-def _block(page: str, language: str, holding: str) -> str:
-    """Return the block of a page that contains a text."""
-    text = (TREE / page if page == "README.md" else TREE / "docs" / page).read_text()
-    blocks = re.findall(rf"^```{language}\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
-    (found,) = (str(block) for block in blocks if holding in block)
-    return found
-
-
 def _environment(folder: Path) -> dict[str, str]:
     return clean_environment() | {
         "PATH": f"{BUILD_TREE / 'bin'}:{os.environ['PATH']}",
@@ -173,8 +165,8 @@ def _environment(folder: Path) -> dict[str, str]:
 
 def test_the_component_of_the_docs_is_built_and_loaded(tmp_path: Path) -> None:
     (tmp_path / "src").mkdir()
-    (tmp_path / "src" / "pi.cpp").write_text(_block("components.md", "cpp", "class Pi "))
-    (tmp_path / "CMakeLists.txt").write_text(_block("components.md", "cmake", "project("))
+    (tmp_path / "src" / "pi.cpp").write_text(block("components.md", "cpp", "class Pi "))
+    (tmp_path / "CMakeLists.txt").write_text(block("components.md", "cmake", "project("))
     environment = _environment(tmp_path)
     build, daemon, load = typed("components.md")
     _type(build, tmp_path, environment)
@@ -186,7 +178,7 @@ def test_the_component_of_the_docs_is_built_and_loaded(tmp_path: Path) -> None:
 
 
 def test_the_component_with_a_service_of_the_docs_is_built_and_described(tmp_path: Path) -> None:
-    (tmp_path / "brake.cpp").write_text(_block("components.md", "cpp", "class Brake "))
+    (tmp_path / "brake.cpp").write_text(block("components.md", "cpp", "class Brake "))
     (tmp_path / "CMakeLists.txt").write_text(
         "cmake_minimum_required(VERSION 3.25)\n"
         "project(brakes LANGUAGES CXX)\n"
@@ -206,8 +198,8 @@ def test_the_component_with_a_service_of_the_docs_is_built_and_described(tmp_pat
 
 def test_the_motor_of_the_docs_is_identified_tuned_and_tested(daemon: Daemon) -> None:
     page = "control/motor.md"
-    (daemon.folder / "motor.yaml").write_text(_block(page, "yaml", "rt_runner"))
-    (daemon.folder / "test_motor.py").write_text(_block(page, "python", "Bench"))
+    (daemon.folder / "motor.yaml").write_text(block(page, "yaml", "rt_runner"))
+    (daemon.folder / "test_motor.py").write_text(block(page, "python", "Bench"))
     environment = daemon.environment()
     environment |= {
         "PATH": f"{BUILD_TREE / 'bin'}:/usr/bin:{environment['PATH']}",
@@ -218,10 +210,9 @@ def test_the_motor_of_the_docs_is_identified_tuned_and_tested(daemon: Daemon) ->
 
 
 def test_the_python_component_of_the_docs_is_compiled_and_loaded(tmp_path: Path) -> None:
-    (tmp_path / "observer.py").write_text(_block("python-components.md", "python", "class Obs"))
+    (tmp_path / "observer.py").write_text(block("python-components.md", "python", "class Obs"))
     environment = _environment(tmp_path)
     compile_, daemon, watch, verify = typed("python-components.md")
-    (tmp_path / "lib" / "motor").mkdir(parents=True)
     _type(compile_, tmp_path, environment)
     with _left_running(daemon, tmp_path, environment, "ready;"):
         _type("rtcfctl --socket /tmp/rtcf.sock load motor Observer", tmp_path, environment)
@@ -237,11 +228,11 @@ def test_the_workspace_of_the_docs_is_built_and_loaded_from_its_folder(
     page = (TREE / "docs" / "ros-setup.md").read_text()
     package = tmp_path / "ws" / "src" / "my_package"
     environment = build_tree_environment(_environment(tmp_path)) | {"HOME": str(tmp_path)}
-    begin, build = (_block("ros-setup.md", "sh", each) for each in ("mkdir -p ~/ws", "catkin_make"))
+    begin, build = (block("ros-setup.md", "sh", each) for each in ("mkdir -p ~/ws", "catkin_make"))
     _type("\n".join(begin.splitlines()[1:]), tmp_path, environment)  # without apt's commands
-    (package / "package.xml").write_text(_block("ros-setup.md", "xml", "<name>my_package"))
-    (package / "CMakeLists.txt").write_text(_block("ros-setup.md", "cmake", "project(my_package"))
-    (package / "gain.cpp").write_text(_block("README.md", "cpp", "class Gain "))
+    (package / "package.xml").write_text(block("ros-setup.md", "xml", "<name>my_package"))
+    (package / "CMakeLists.txt").write_text(block("ros-setup.md", "cmake", "project(my_package"))
+    (package / "gain.cpp").write_text(block("README.md", "cpp", "class Gain "))
     # Debug information and speed do not matter here; the last line starts the launch.
     environment["CXXFLAGS"] = "-O0"
     _type(f"set -e\n{build}env -0 > ~/given", tmp_path, environment)
