@@ -114,9 +114,12 @@ def set_breaks(graph: Graph, ports: Iterable[tuple[str, str]], broken: bool) -> 
     for name, port in ports:
         if name not in changed or port not in INPUTS:
             raise Refused(f"no {name}.{port}")
-        breaks = changed[name].breaks
-        breaks = breaks | {port} if broken else breaks - {port}
-        changed[name] = replace(changed[name], breaks=breaks)
+        mixer = changed[name]
+        if broken:
+            changed[name] = replace(mixer, breaks=mixer.breaks | {port})
+        else:
+            breaks = frozenset(each for each in INPUTS if mixer.broken(each)) - {port}
+            changed[name] = replace(mixer, breaks=breaks, first=False)
     return _checked(changed)
 
 

@@ -307,7 +307,11 @@ class Peer:
         self.components[name] = spec
         return self.changed(name)
 
-    async def set_breaks(self, _: control_pb2.SetBreaksRequest, __: int) -> wire.Response:
+    async def set_breaks(self, request: control_pb2.SetBreaksRequest, _: int) -> wire.Response:
+        for each in request.ports:
+            breaks = self.components[f"/{each.component.lstrip('/')}"].breaks
+            others = [port for port in breaks if port != each.port]
+            breaks[:] = [*others, each.port] if request.broken else others
         return self.changed()
 
     async def set_parameters(

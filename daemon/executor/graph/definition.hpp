@@ -4,11 +4,11 @@
 
 #include <cstdint>
 #include <optional>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "graph/loop_breaks.hpp"
 #include "names/names.hpp"
 #include "rtcf/parameter.hpp"
 
@@ -31,11 +31,8 @@ struct ComponentDefinition {
     /// Values of the replaced component; used if they are valid and `parameters` has no other
     /// value.
     std::vector<InheritedParameter> inherited;
-    bool first = false;  ///< all connections into the component are loop breaks
-    /// Regular expression; matching connections into the component are loop breaks.
-    std::string ignore;
-    std::set<std::string> breaks;  ///< inputs whose connection is a loop break
-    std::uint32_t every = 1;       ///< runs in every n-th cycle
+    LoopBreaks breaks;
+    std::uint32_t every = 1;  ///< runs in every n-th cycle
     /// Cycle modulo `every` in which it runs; unset = chosen to spread the load.
     std::optional<std::uint32_t> phase;
     bool optional = false;  ///< a fault takes the component out, and the loop goes on

@@ -24,9 +24,6 @@ std::string replacementReason(const Instance& present, const WantedComponent& wa
     }
     if (wanted.anew) return "its library has changed";
     if (is.remaps != shall.remaps) return "other remaps";
-    if (is.first != shall.first) return shall.first ? "first" : "not first";
-    if (is.ignore != shall.ignore)
-        return fmt::format("ignore '{}' -> '{}'", is.ignore, shall.ignore);
     if (is.every != shall.every) return fmt::format("every {} -> {}", is.every, shall.every);
     if (shall.phase && *shall.phase != present.phase())
         return fmt::format("phase {} -> {}", present.phase(), *shall.phase);

@@ -58,19 +58,31 @@ void Graph::replace(const std::string& full_name, GraphNode node) {
     nodes_[index] = std::move(node);
 }
 
-void Graph::setBreaks(const std::string& full_name, const std::set<std::string>& ports) {
-    for (const std::string& port : ports) setBreak(full_name, port, true);
-    nodes_[indexOf(full_name)].breaks = ports;
+void Graph::setBreaks(const std::string& full_name, const LoopBreaks& breaks) {
+    GraphNode& node = nodes_[indexOf(full_name)];
+    for (const std::string& port : breaks.ports) (void)node.instance->requireInput(port);
+    node.breaks = breaks;
 }
 
 void Graph::setBreak(const std::string& full_name, const std::string& port, bool broken) {
     GraphNode& node = nodes_[indexOf(full_name)];
     (void)node.instance->requireInput(port);
     if (broken) {
-        node.breaks.insert(port);
-    } else {
-        node.breaks.erase(port);
+        node.breaks.ports.insert(port);
+        return;
     }
+    node.breaks.ports.erase(port);
+    LoopBreaks others;
+    bool remains = false;
+    for (const MappedPort& each : *node.instance->ports()) {
+        if (each.output || !node.breaks.include(each.name, each.mapped_name)) continue;
+        if (each.name == port) {
+            remains = true;
+        } else {
+            others.ports.insert(each.name);
+        }
+    }
+    if (remains) node.breaks = std::move(others);
 }
 
 }  // namespace rtcf::executor

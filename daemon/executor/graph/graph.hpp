@@ -4,17 +4,17 @@
 #pragma once
 
 #include <memory>
-#include <set>
 #include <string>
 #include <vector>
 
 #include "graph/instance.hpp"
+#include "graph/loop_breaks.hpp"
 
 namespace rtcf::executor {
 
 struct GraphNode {
     std::shared_ptr<Instance> instance;
-    std::set<std::string> breaks;  ///< inputs whose connection is a loop break
+    LoopBreaks breaks;  ///< at first those of its definition
 };
 
 class Graph {
@@ -31,9 +31,10 @@ class Graph {
     void add(GraphNode node);  ///< the name must be free
     void remove(const std::string& full_name);
     void replace(const std::string& full_name, GraphNode node);
+    /// Removing a loop break that `first` or `ignore` sets replaces these by loop breaks of all
+    /// other inputs that they apply to.
     void setBreak(const std::string& full_name, const std::string& port, bool broken);
-    /// Makes the connections into `ports`, and no others, loop breaks.
-    void setBreaks(const std::string& full_name, const std::set<std::string>& ports);
+    void setBreaks(const std::string& full_name, const LoopBreaks& breaks);
     /// @}
 
     /// Checks that a name is free, before a component is constructed.

@@ -69,7 +69,6 @@ Instance::Instance(ComponentDefinition definition, std::shared_ptr<const Library
     : definition_(std::make_shared<ComponentDefinition>(std::move(definition))),
       library_(std::move(library)),
       record_(&findRecord(*library_, *definition_)),
-      ignore_("ignore of " + definition_->fullName(), definition_->ignore),
       log_(log),
       recorder_(recorder),
       gate_(gate),
@@ -230,7 +229,7 @@ void Instance::freezePorts() {
         samples_.push_back(output->type().make_slot(output->sample()));
     }
     ports_ = std::move(ports);
-    for (const std::string& port : definition_->breaks) {
+    for (const std::string& port : definition_->breaks.ports) {
         if (findInput(port) != nullptr) continue;
         throw Error(ErrorKind::PortNotFound,
                     fmt::format("{} has no input {} to break", context_.full_name, port));

@@ -14,7 +14,6 @@
 #include "graph/hook_gate.hpp"
 #include "logging/log.hpp"
 #include "loop/schedule.hpp"
-#include "names/name_pattern.hpp"
 #include "plugins/library.hpp"
 #include "rtcf/component.hpp"
 
@@ -62,7 +61,6 @@ class Instance {
     /// The library as a shared pointer, which keeps the code loaded.
     const std::shared_ptr<const Library>& code() const noexcept { return library_; }
     const ComponentRecord& record() const noexcept { return *record_; }
-    const NamePattern& ignore() const noexcept { return ignore_; }
     Component& component() const noexcept { return *component_; }
     ComponentContext& context() noexcept { return context_; }
     const std::shared_ptr<ComponentStatistics>& statistics() const noexcept { return statistics_; }
@@ -127,7 +125,6 @@ class Instance {
     std::shared_ptr<ComponentDefinition> definition_;
     std::shared_ptr<const Library> library_;
     const ComponentRecord* record_;
-    NamePattern ignore_;
     Log& log_;
     FlightRecorder& recorder_;
     HookGate* gate_;

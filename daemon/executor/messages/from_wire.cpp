@@ -41,10 +41,10 @@ ComponentDefinition definitionFrom(const pb::ComponentSpec& spec) {
         definition.remaps.emplace_back(remap.source(), remap.target());
     }
     definition.parameters = parametersFrom(spec.parameters());
-    definition.first = spec.first();
-    definition.ignore = spec.ignore();
+    definition.breaks.first = spec.first();
+    definition.breaks.ignore = NamePattern("ignore of " + definition.fullName(), spec.ignore());
     for (const std::string& port : spec.breaks()) requireLength("port", port);
-    definition.breaks.insert(spec.breaks().begin(), spec.breaks().end());
+    definition.breaks.ports.insert(spec.breaks().begin(), spec.breaks().end());
     definition.every = std::max(1U, spec.every());
     definition.optional = spec.optional();
     constexpr std::uint32_t kSlowest = 100000;

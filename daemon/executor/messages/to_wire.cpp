@@ -70,9 +70,9 @@ pb::ComponentSpec specTo(const ComponentDefinition& definition) {
         parameter->set_name(name);
         *parameter->mutable_value() = parameterValueTo(value);
     }
-    spec.set_first(definition.first);
-    spec.set_ignore(definition.ignore);
-    for (const std::string& port : definition.breaks) spec.add_breaks(port);
+    spec.set_first(definition.breaks.first);
+    spec.set_ignore(definition.breaks.ignore.text());
+    for (const std::string& port : definition.breaks.ports) spec.add_breaks(port);
     spec.set_every(definition.every);
     if (definition.phase) spec.set_phase(*definition.phase);
     spec.set_optional(definition.optional);

@@ -50,6 +50,7 @@ const char* reason(std::regex_constants::error_type code, const std::string& exp
 }  // namespace
 
 struct NamePattern::Expression {
+    std::string text;
     std::regex regex;
 };
 
@@ -57,13 +58,18 @@ NamePattern::NamePattern(const std::string& what, const std::string& expression)
     if (expression.empty()) return;
     requireLength(what.c_str(), expression, kLongestPattern);
     try {
-        expression_ =
-            std::make_shared<const Expression>(Expression{std::regex(expression, kSyntax)});
+        expression_ = std::make_shared<const Expression>(
+            Expression{expression, std::regex(expression, kSyntax)});
     } catch (const std::regex_error& error) {
         throw Error(ErrorKind::ExpressionInvalid,
                     fmt::format("{}: bad regular expression '{}': {}", what, expression,
                                 reason(error.code(), expression)));
     }
+}
+
+const std::string& NamePattern::text() const noexcept {
+    static const std::string kNothing;
+    return expression_ == nullptr ? kNothing : expression_->text;
 }
 
 bool NamePattern::matches(const std::string& name) const {

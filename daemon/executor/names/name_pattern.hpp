@@ -17,6 +17,8 @@ class NamePattern {
     NamePattern(const std::string& what, const std::string& expression);
 
     bool matches(const std::string& name) const;
+    /// The expression; empty = matches nothing.
+    const std::string& text() const noexcept;
 
    private:
     struct Expression;

@@ -3,7 +3,6 @@
 #include <map>
 #include <string>
 
-#include "names/name_pattern.hpp"
 #include "names/names.hpp"
 #include "ordering/order.hpp"
 
@@ -23,20 +22,18 @@ std::vector<std::size_t> constructionOrder(const std::vector<const WantedCompone
     for (std::size_t i = 0; i < wanted.size(); ++i) {
         const ComponentDefinition& definition = wanted[i]->definition;
         problem.names.push_back(definition.fullName());
-        problem.first.push_back(definition.first);
+        problem.first.push_back(definition.breaks.first);
         if (wanted[i]->ports == nullptr) continue;
         for (const std::string& port : wanted[i]->ports->outputs)
             writers.emplace(mapped(definition, port), i);
     }
     for (std::size_t i = 0; i < wanted.size(); ++i) {
         const ComponentDefinition& definition = wanted[i]->definition;
-        if (definition.first || wanted[i]->ports == nullptr) continue;
-        const NamePattern ignore("ignore of " + definition.fullName(), definition.ignore);
+        if (wanted[i]->ports == nullptr) continue;
         for (const std::string& port : wanted[i]->ports->inputs) {
-            if (definition.breaks.count(port) != 0) continue;
             const std::string name = mapped(definition, port);
             const auto writer = writers.find(name);
-            if (writer == writers.end() || ignore.matches(name)) continue;
+            if (writer == writers.end() || definition.breaks.include(port, name)) continue;
             problem.edges.push_back({writer->second, i, {}, {}});
         }
     }

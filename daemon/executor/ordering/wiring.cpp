@@ -86,11 +86,8 @@ class Collector {
 
     void addInput(std::size_t index, const GraphNode& node, InputPort* input,
                   const std::string& name) {
-        const Instance& instance = *node.instance;
         ConnectionPlan& plan = planFor(name, index, input->name(), input->type());
-        const bool broken = instance.definition().first || node.breaks.count(input->name()) != 0 ||
-                            instance.ignore().matches(name);
-        plan.readers.push_back({index, input, broken});
+        plan.readers.push_back({index, input, node.breaks.include(input->name(), name)});
     }
 
     const Graph& graph_;
@@ -150,7 +147,7 @@ OrderProblem orderProblem(const Graph& graph, const Wiring& wiring) {
     OrderProblem problem;
     for (const GraphNode& node : graph.nodes()) {
         problem.names.push_back(node.instance->fullName());
-        problem.first.push_back(node.instance->definition().first);
+        problem.first.push_back(node.breaks.first);
     }
     for (const auto& [name, plan] : wiring.connections) {
         if (!plan.writer) continue;

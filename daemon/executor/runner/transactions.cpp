@@ -155,7 +155,7 @@ void Transactions::checkTaps(const Wiring& wiring) const {
 ChangeOutcome Transactions::load(ComponentDefinition definition, const std::string& library,
                                  const Progress& progress) {
     plan_->graph.requireFree(definition.fullName());
-    const std::set<std::string> breaks = definition.breaks;
+    const LoopBreaks breaks = definition.breaks;
     const std::shared_ptr<Instance> instance =
         loader_.make(std::move(definition), library, progress);
     Change change;
@@ -213,7 +213,7 @@ ChangeOutcome Transactions::replace(const std::string& name, ComponentDefinition
                 {declaration.name, value, !sameValue(value, declaration.default_value)});
         }
     }
-    const std::set<std::string> breaks = definition.breaks;
+    const LoopBreaks breaks = definition.breaks;
     const std::shared_ptr<Instance> instance =
         loader_.make(std::move(definition), library, progress);
     Change change;

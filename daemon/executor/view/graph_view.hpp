@@ -30,7 +30,7 @@ struct ComponentView : ParameterSet {
     const Instance* instance;  ///< for comparison only
     std::shared_ptr<const ComponentStatistics> statistics;
     std::shared_ptr<const ComponentDefinition> definition;  ///< with the first loop breaks
-    std::set<std::string> breaks;                           ///< the present ones
+    LoopBreaks breaks;                                      ///< the present ones
     std::shared_ptr<const std::vector<MappedPort>> ports;
     std::string library;
     std::string doc;

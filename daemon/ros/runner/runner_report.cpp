@@ -91,7 +91,7 @@ rtcf_msgs::GetLoop::Response describeRunner(const executor::RunnerView& runner) 
         info.name = component->full_name;
         info.package = component->definition->package;
         info.type = component->definition->type;
-        info.is_first = component->definition->first ? 1 : 0;
+        info.is_first = component->breaks.first ? 1 : 0;
         info.fault = component->fault;
         for (std::size_t i = 0; i < component->ports->size(); ++i) {
             const executor::MappedPort& port = (*component->ports)[i];

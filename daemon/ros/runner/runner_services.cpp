@@ -11,6 +11,8 @@
 
 #include <algorithm>
 
+#include "common/error.hpp"
+#include "names/name_pattern.hpp"
 #include "names/names.hpp"
 #include "ros/runner/runner_report.hpp"
 #include "ros/threads/quiet_thread.hpp"
@@ -32,7 +34,20 @@ void setName(executor::ComponentDefinition& component, const std::string& name,
     component.ns = full ? name.substr(0, std::max<std::size_t>(slash, 1)) : name_space;
 }
 
-// @return false and sets `why` if a remap is invalid
+// @return false and sets `why` if the expression is invalid
+bool setBreaks(executor::ComponentDefinition& component, bool first, const std::string& ignore,
+               std::string& why) {
+    component.breaks.first = first;
+    try {
+        component.breaks.ignore = executor::NamePattern("topics_ignore_for_graph", ignore);
+    } catch (const executor::Error& error) {
+        why = error.what();
+        return false;
+    }
+    return true;
+}
+
+// @return false and sets `why` if a remap or an expression is invalid
 bool loadCall(const rtcf_msgs::LoadComponent::Request& request, OutsideCall& call,
               std::string& why) {
     call.kind = OutsideCall::Kind::Load;
@@ -40,8 +55,6 @@ bool loadCall(const rtcf_msgs::LoadComponent::Request& request, OutsideCall& cal
     setName(component, request.name, request.ns);
     component.package = request.package;
     component.type = request.type;
-    component.first = request.is_first != 0;
-    component.ignore = request.topics_ignore_for_graph;
     for (const std::string& remap : request.remaps) {
         const std::size_t at = remap.find(":=");
         if (at == std::string::npos) {
@@ -50,21 +63,21 @@ bool loadCall(const rtcf_msgs::LoadComponent::Request& request, OutsideCall& cal
         }
         component.remaps.emplace_back(remap.substr(0, at), remap.substr(at + 2));
     }
-    return true;
+    return setBreaks(component, request.is_first != 0, request.topics_ignore_for_graph, why);
 }
 
-OutsideCall loadCall(const rtcf_msgs::LoadOrocosComponent::Request& request) {
-    OutsideCall call;
+// @return false and sets `why` if an expression is invalid
+bool loadCall(const rtcf_msgs::LoadOrocosComponent::Request& request, OutsideCall& call,
+              std::string& why) {
     call.kind = OutsideCall::Kind::Load;
     executor::ComponentDefinition& component = call.component;
     setName(component, request.component_name.data, request.ns.data);
     component.package = request.component_pkg.data;
     component.type = request.component_type.data;
-    component.first = request.is_first.data != 0;
-    component.ignore = request.topics_ignore_for_graph.data;
     for (const rtcf_msgs::Mapping& remap : request.mappings)
         component.remaps.emplace_back(remap.from_topic.data, remap.to_topic.data);
-    return call;
+    return setBreaks(component, request.is_first.data != 0, request.topics_ignore_for_graph.data,
+                     why);
 }
 
 OutsideCall unloadCall(const std::string& name, std::string ns) {
@@ -116,7 +129,11 @@ bool RunnerServices::change(const OutsideCall& call, Response& response) {
 void RunnerServices::changeAndLog(const OutsideCall& call, std_msgs::Bool& success) {
     const executor::OutsideAnswer answer = ask_(call, cancel_);
     success.data = answer.success ? 1 : 0;
-    if (!answer.success) log_.write(LogLevel::Error, "", "service call failed: " + answer.message);
+    if (!answer.success) logFailure(answer.message);
+}
+
+void RunnerServices::logFailure(const std::string& why) {
+    log_.write(LogLevel::Error, "", "service call failed: " + why);
 }
 
 template <typename Service, typename Callback>
@@ -172,7 +189,14 @@ void RunnerServices::openLikeRtcf2021(ros::NodeHandle& handle, const std::string
     using Load = rtcf_msgs::LoadOrocosComponent;
     advertise<Load>(handle, at("load_orocos_component"), changes_,
                     [this](Load::Request& request, Load::Response& response) {
-                        changeAndLog(loadCall(request), response.success);
+                        OutsideCall call;
+                        std::string why;
+                        response.success.data = 0;
+                        if (loadCall(request, call, why)) {
+                            changeAndLog(call, response.success);
+                        } else {
+                            logFailure(why);
+                        }
                         return true;
                     });
     using Unload = rtcf_msgs::UnloadOrocosComponent;

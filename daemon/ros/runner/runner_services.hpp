@@ -52,6 +52,7 @@ class RunnerServices {
     template <typename Response>
     bool change(const executor::OutsideCall& call, Response& response);
     void changeAndLog(const executor::OutsideCall& call, std_msgs::Bool& success);
+    void logFailure(const std::string& why);
 
     const executor::RunnerView& runner_;
     const executor::AskSupervisor ask_;

@@ -386,14 +386,26 @@ async def set_breaks(
     runner: RunnerCore, request: control_pb2.SetBreaksRequest, progress: Progress
 ) -> control_pb2.ChangeResult:
     """Set or remove loop breaks."""
+    changed: dict[str, graph_pb2.ComponentSpec] = {}
+
+    async def result_of_change() -> control_pb2.ChangeResult:
+        result = (await runner.ask(wire.Request(set_breaks=request), progress)).change
+        for name in {absolute(port.component) for port in request.ports}:
+            changed[name] = (await parameters.live_component(runner, name)).spec
+        return result
+
+    def commit(_: control_pb2.ChangeResult) -> None:
+        for name, live in changed.items():
+            runner.desired.set_breaks(name, live)
+
     ports = ", ".join(f"{absolute(port.component)}.{port.port}" for port in request.ports)
     text = f"{ports}: loop break {'set' if request.broken else 'removed'}"
     return await runner.make(
         Change(
             name="a change of loop breaks",
-            request=wire.Request(set_breaks=request),
+            request=result_of_change,
             event=lambda _: text,
-            commit=lambda _: runner.desired.set_breaks(request.ports, request.broken),
+            commit=commit,
             component="",
         ),
         progress,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from google.protobuf import json_format
-from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
+from rtcf.v1 import graph_pb2, runner_pb2
 
 from rtcfd.common import names, runner_settings
 from rtcfd.common.names import absolute
@@ -136,16 +136,13 @@ class Desired:
             name: terms for name, terms in self.leased.items() if name in self._components
         }
 
-    def set_breaks(self, ports: Iterable[control_pb2.PortName], broken: bool) -> None:
-        """Note that loop breaks were set or removed."""
-        for port in ports:
-            name = absolute(port.component)
-            spec = self._components.get(name)
-            if spec is None:
-                continue
-            breaks = [each for each in spec.breaks if each != port.port]
-            spec.breaks[:] = [*breaks, port.port] if broken else breaks
-            self._texts.pop(name, None)
+    def set_breaks(self, full_name: str, live: graph_pb2.ComponentSpec) -> None:
+        """Note the loop breaks that a component has in the executor."""
+        spec = self._components.get(full_name)
+        if spec is not None:
+            spec.first, spec.ignore = live.first, live.ignore
+            spec.breaks[:] = live.breaks
+            self._texts.pop(full_name, None)
 
     def set_parameters(self, component: str, changes: Iterable[graph_pb2.ParameterSetting]) -> None:
         """Note changed parameters of a component."""

@@ -190,3 +190,35 @@ def test_a_frequency_that_a_component_cannot_have_is_rejected(client: rtcf.Clien
     wait_until_after(client, iteration(client) + 20)
     for name in ("other", "strict"):
         assert [each.value for each in client.get_component(name).states] == ["0"]
+
+
+def test_a_removed_break_of_a_first_component_stays_removed(client: rtcf.Client) -> None:
+    client.load(rtcf.component("rtcf_examples", "Identity", name="src", remaps=["out:=/x"]))
+    reader = rtcf.component(
+        "rtcf_examples", "Mimo", name="dst", remaps=["in1:=/x", "in2:=/x"], first=True
+    )
+    client.load(reader)
+    before = client.get_component("dst")
+    assert [port.broken for port in before.ports[:4]] == [True] * 4
+    client.set_breaks(_ports("dst.in1"), False)
+    client.restart_runner("rt_runner")
+    after = client.get_component("dst")
+    assert [port.broken for port in after.ports[:4]] == [False, True, True, True]
+    assert (after.spec.first, list(after.spec.breaks)) == (False, ["in2", "in3", "in4"])
+    specs = [client.get_component("src").spec, before.spec]
+    (difference,) = client.apply(specs).differences
+    assert (difference.component, difference.detail) == ("/dst", "other loop breaks")
+    assert client.get_component("dst").spec.first
+
+
+def test_a_removed_break_of_an_ignored_connection_stays_removed(client: rtcf.Client) -> None:
+    client.load(
+        rtcf.component(
+            "rtcf_examples", "Mimo", name="dst", remaps=["in1:=/x", "in2:=/y"], ignore="/x|/y"
+        )
+    )
+    client.set_breaks(_ports("dst.in1"), False)
+    client.restart_runner("rt_runner")
+    after = client.get_component("dst")
+    assert [port.broken for port in after.ports[:4]] == [False, True, False, False]
+    assert (after.spec.ignore, list(after.spec.breaks)) == ("", ["in2"])

@@ -37,7 +37,7 @@ TEST_F(RealtimeSafety, Fig1WithTopicsLogsAndHotSwapsIsSafe) {
     talker.remaps = {{"out", "T_out"}};
     ComponentDefinition recorder = definition("Recorder", "Z");
     recorder.remaps = {{"in", "R3_G2H1"}, {"out", "Z_out"}};
-    recorder.breaks = {"in"};
+    recorder.breaks.ports = {"in"};
     load(definition("Chatter", "C"));
     for (int round = 0; round < 30; ++round) {
         load(talker);
@@ -85,7 +85,7 @@ TEST_F(RealtimeSafety, MappedTypesOfVariableSizeAreSafe) {
     load(definition("Scanner", "S"));
     ComponentDefinition late = definition("Scanner", "L");
     late.remaps = {{"in", "scan"}, {"scan", "late"}, {"seen", "late_seen"}};
-    late.breaks = {"in"};
+    late.breaks.ports = {"in"};
     load(late);
     start();
     for (int round = 0; round < 30; ++round) {

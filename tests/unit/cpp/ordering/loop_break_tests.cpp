@@ -18,7 +18,7 @@ class LoopBreak : public RunnerFixture {
         ComponentDefinition reader = definition("Relay", name);
         reader.remaps = {{"in", topic}, {"out", name + "_out"}, {"status", name + "_status"}};
         reader.parameters = {{"add", 0.0}};
-        if (broken) reader.breaks = {"in"};
+        if (broken) reader.breaks.ports = {"in"};
         load(reader);
     }
 
@@ -88,7 +88,7 @@ TEST_F(LoopBreak, ValueIsNewOnceEvenIfTheWriterPauses) {
 TEST_F(LoopBreak, ComponentThatReadsItselfCounts) {
     ComponentDefinition self = definition("Relay", "S");
     self.remaps = {{"in", "x"}, {"out", "x"}};
-    self.breaks = {"in"};
+    self.breaks.ports = {"in"};
     load(self);
     step(1);
     EXPECT_EQ(value("/S", "status"), kNone);

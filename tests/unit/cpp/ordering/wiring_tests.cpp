@@ -129,6 +129,34 @@ TEST_F(WiringTest, BreakOfOneInputIsALoopBreak) {
     EXPECT_NE(errorOf(graph), "");
 }
 
+TEST_F(WiringTest, RemovedBreakOfAFirstComponentKeepsItsOtherBreaks) {
+    const auto first = mimo("B", {{"in1", "a"}, {"in2", "a2"}, {"out1", "b"}}, true);
+    Graph graph = graphOf({mimo("A", {{"in1", "b"}, {"out1", "a"}, {"out2", "a2"}}), first});
+    EXPECT_EQ(orderOf(graph), (std::vector<std::string>{"/B", "/A"}));
+    graph.setBreak("/B", "in3", false);
+    const LoopBreaks& breaks = graph.get("/B").breaks;
+    EXPECT_EQ(breaks.ports, (std::set<std::string>{"in1", "in2", "in4"}));
+    EXPECT_FALSE(breaks.first);
+    EXPECT_EQ(orderOf(graph), (std::vector<std::string>{"/B", "/A"}));
+    graph.setBreak("/B", "in1", false);
+    EXPECT_NE(errorOf(graph), "");
+    graph.setBreaks("/B", first->definition().breaks);
+    EXPECT_TRUE(graph.get("/B").breaks.first);
+    EXPECT_EQ(orderOf(graph), (std::vector<std::string>{"/B", "/A"}));
+}
+
+TEST_F(WiringTest, RemovedBreakOfAnIgnoredConnectionKeepsTheOtherBreaks) {
+    Graph graph = graphOf({mimo("A", {{"in1", "x"}, {"in2", "y"}, {"in3", "z"}}, false, "/x|/y"),
+                           mimo("B", {{"out1", "x"}, {"out2", "y"}, {"out3", "z"}})});
+    graph.setBreak("/A", "in3", false);  // not a loop break: nothing to do
+    EXPECT_EQ(graph.get("/A").breaks.ignore.text(), "/x|/y");
+    graph.setBreak("/A", "in1", false);
+    EXPECT_EQ(graph.get("/A").breaks.ignore.text(), "");
+    EXPECT_EQ(graph.get("/A").breaks.ports, (std::set<std::string>{"in2"}));
+    EXPECT_TRUE(graph.get("/A").breaks.include("in2", "/y"));
+    EXPECT_FALSE(graph.get("/A").breaks.include("in1", "/x"));
+}
+
 TEST_F(WiringTest, ConnectionOfAComponentToItselfIsALoop) {
     Graph graph = graphOf({mimo("A", {{"in1", "x"}, {"out1", "x"}})});
     EXPECT_NE(errorOf(graph).find("/A.out1 → /A.in1"), std::string::npos);

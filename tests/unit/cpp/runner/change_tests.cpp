@@ -205,7 +205,7 @@ TEST_F(Change, UnbreakThatWouldCloseALoopIsRejected) {
     startWithA();
     ComponentDefinition closing = recorder("B");
     closing.remaps = {{"in", "A_out"}, {"out", "A_in"}};
-    closing.breaks = {"in"};
+    closing.breaks.ports = {"in"};
     load(closing);
     EXPECT_EQ(order(), (std::vector<std::string>{"/B", "/A"}));
     const auto before = generation();
@@ -217,7 +217,7 @@ TEST_F(Change, BreaksChangeTheOrderOfARunningLoop) {
     startWithA();
     ComponentDefinition closing = recorder("B");
     closing.remaps = {{"in", "A_out"}, {"out", "A_in"}};
-    closing.breaks = {"in"};
+    closing.breaks.ports = {"in"};
     load(closing);
     setBreak("/A", "in", true);
     setBreak("/B", "in", false);

@@ -95,7 +95,7 @@ TEST_F(Queues, AComponentGetsMessagesOfItsSkippedCycles) {
 TEST_F(Queues, ALoopBreakIsACycleLateAndLosesNothing) {
     load(definition("Digits", "D"));
     ComponentDefinition early = collector("out");
-    early.breaks = {"in"};
+    early.breaks.ports = {"in"};
     load(early);
     step(5);
     EXPECT_EQ(value("/C", "order"), 123.0) << "the value of cycle 4 arrives in cycle 5";
@@ -104,7 +104,7 @@ TEST_F(Queues, ALoopBreakIsACycleLateAndLosesNothing) {
 TEST_F(Queues, TheEndOfALoopBreakLosesNothing) {
     load(definition("Digits", "D"));
     ComponentDefinition early = collector("out");
-    early.breaks = {"in"};
+    early.breaks.ports = {"in"};
     load(early);
     step(5);
     ASSERT_EQ(value("/C", "order"), 123.0);

@@ -103,7 +103,7 @@ class Reading : public RunnerFixture, public ::testing::WithParamInterface<unsig
                             {"status", std::string("/status_of_") + name}};
             relay.every = reader.every;
             relay.phase = 0;
-            if (early) relay.breaks = {"in"};
+            if (early) relay.breaks.ports = {"in"};
             load(relay);
         }
     }

@@ -129,7 +129,7 @@ TEST_F(Rollback, AnyExceptionUndoesTheWholeChange) {
     apply({writer, reader});
     const auto before = generation();
     writer.definition.parameters = {{"gain", 2.0}};
-    reader.definition.breaks = {"in"};  // requires a copy of the value
+    reader.definition.breaks.ports = {"in"};  // requires a copy of the value
     journal().copies_throw = true;
     const bool thrown = onGraphThread([&] {
         try {
@@ -151,7 +151,7 @@ TEST_F(Rollback, NoMemoryInTheCycleEndsTheLoopInOrder) {
     WantedComponent writer = wanted("Touchy", "A");
     WantedComponent reader = wanted("Touchy", "B");
     reader.definition.remaps = {{"in", "A_out"}, {"out", "B_out"}};
-    reader.definition.breaks = {"in"};
+    reader.definition.breaks.ports = {"in"};
     apply({writer, reader});
     start();
     ASSERT_TRUE(runs());
@@ -210,7 +210,7 @@ TEST_F(Rollback, NoMemoryBeforeTheComponentsRunIsNoCycle) {
     WantedComponent writer = wanted("Touchy", "A");
     WantedComponent reader = wanted("Touchy", "B");
     reader.definition.remaps = {{"in", "A_out"}, {"out", "B_out"}};
-    reader.definition.breaks = {"in"};
+    reader.definition.breaks.ports = {"in"};
     apply({writer, reader});
     EXPECT_EQ(step(3).cycles, 3U);
     journal().copies_throw = true;
@@ -224,7 +224,7 @@ TEST_F(Rollback, NoMemoryInTheLastCycleIsNoFaultOfAStop) {
     WantedComponent writer = wanted("Touchy", "A");
     WantedComponent reader = wanted("Touchy", "B");
     reader.definition.remaps = {{"in", "A_out"}, {"out", "B_out"}};
-    reader.definition.breaks = {"in"};
+    reader.definition.breaks.ports = {"in"};
     apply({writer, reader});
     EXPECT_EQ(step(3).cycles, 3U);
     journal().copies_throw = true;

@@ -138,7 +138,7 @@ TEST_F(Safe, IsCalledOnTheCulprit) {
 TEST_F(Safe, InputOfThePreviousCycleIsCorrectInTheLastOne) {
     load(controller("C"));
     ComponentDefinition early = driver();
-    early.first = true;
+    early.breaks.first = true;
     load(early);
     ASSERT_EQ(order(), (std::vector<std::string>{"/D", "/C"}));
     step(3);
@@ -236,7 +236,7 @@ TEST_F(Safe, OfALeavingDriverReadsTheFirstValueOfANewController) {
     silent.parameters = {{"silent", true}};
     load(silent);
     ComponentDefinition early = driver();
-    early.first = true;
+    early.breaks.first = true;
     load(early);
     ComponentDefinition watching = definition("Watcher", "W");
     watching.remaps = {{"in", "D_applied"}, {"highest", "W_highest"}};
@@ -461,7 +461,7 @@ TEST_P(FirstValues, OfStartReplaceThoseOfConfigure) {
     for (const std::string name : {"R", "Z"}) {
         ComponentDefinition relay = definition("Relay", name);
         relay.remaps = {{"in", "announced"}, {"out", name + "_out"}, {"status", name + "_status"}};
-        if (name == "Z") relay.breaks = {"in"};
+        if (name == "Z") relay.breaks.ports = {"in"};
         load(relay);
     }
     ASSERT_EQ(order(), (std::vector<std::string>{"/H", "/R", "/Z"}));

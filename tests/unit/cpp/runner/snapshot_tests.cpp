@@ -41,13 +41,13 @@ class Snapshots : public RunnerFixture {
     // Four components in a ring with loop breaks of both kinds, some of which skip cycles.
     void loadRing() {
         ComponentDefinition p = chaos("P", "S_x", "R_checked");
-        p.first = true;
+        p.breaks.first = true;
         load(p);
         ComponentDefinition q = chaos("Q", "P_x", "P_checked");
         q.every = 2;
         load(q);
         ComponentDefinition r = chaos("R", "Q_checked", "P_x");
-        r.breaks = {"b", "list"};
+        r.breaks.ports = {"b", "list"};
         r.every = 4;
         load(r);
         load(chaos("S", "R_x", "Q_checked"));
@@ -158,13 +158,13 @@ TEST_F(Snapshots, FitsAnotherRunnerWithTheSameGraph) {
     load(chaos("S", "Q_checked", "Q_checked"));
     ComponentDefinition r = chaos("R", "Q_checked", "P_x");
     r.every = 4;
-    r.breaks = {"b", "list"};
+    r.breaks.ports = {"b", "list"};
     load(r);
     ComponentDefinition q = chaos("Q", "P_x", "P_checked");
     q.every = 2;
     load(q);
     ComponentDefinition p = chaos("P", "S_x", "R_checked");
-    p.first = true;
+    p.breaks.first = true;
     p.parameters = {{"rate", 3.7}};
     load(p);
     step(17);
@@ -215,7 +215,7 @@ TEST_F(Snapshots, KeepsInputValuesOfEarlierWriters) {
 TEST_F(Snapshots, HasTheLastValueFromOutside) {
     configure([](RunnerSettings& settings) { settings.whitelist = "/outside"; });
     ComponentDefinition p = chaos("P", "outside", "P_x");
-    p.first = true;
+    p.breaks.first = true;
     load(p);
     const auto send = [&](double number) {
         std::uint8_t bytes[sizeof number];

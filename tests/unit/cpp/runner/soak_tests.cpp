@@ -38,8 +38,8 @@ class Soak : public RunnerFixture {
         const std::string topic(1, static_cast<char>('A' + chance(kNames + 2)));
         result.remaps = {
             {"in", topic + "_out"}, {"out", name + "_out"}, {"status", name + "_status"}};
-        if (chance(2) == 0) result.breaks = {"in"};
-        result.first = chance(6) == 0;
+        if (chance(2) == 0) result.breaks.ports = {"in"};
+        result.breaks.first = chance(6) == 0;
         result.every = std::array<std::uint32_t, 4>{1, 1, 2, 4}[static_cast<unsigned>(chance(4))];
         if (result.type == "Recorder" && chance(8) == 0)
             result.parameters = {{"refuses", std::string(chance(2) == 0 ? "configure" : "start")}};

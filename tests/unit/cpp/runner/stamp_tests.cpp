@@ -33,7 +33,7 @@ class Stamps : public RunnerFixture {
         result.remaps = {{"in", "/m"}};
         for (const char* port : {"value", "status", "news", "wired", "written"})
             result.remaps.emplace_back(port, "/" + name + "/" + port);
-        if (broken) result.breaks = {"in"};
+        if (broken) result.breaks.ports = {"in"};
         return result;
     }
     void map(bool mapped) {

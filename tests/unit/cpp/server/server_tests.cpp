@@ -606,7 +606,7 @@ TEST_F(ServerTest, CallFromOutsideIsAnsweredByTheLatestDaemon) {
     load.kind = executor::OutsideCall::Kind::Load;
     load.component.type = "Ticker";
     load.component.remaps = {{"out", "there"}};
-    load.component.first = true;
+    load.component.breaks.first = true;
     Asking asking(server_, load);
     const executor::v1::ServiceCall call = nextCall(client);
     EXPECT_EQ(call.load().type(), "Ticker");

@@ -33,8 +33,8 @@ class GraphFixture : public ::testing::Test {
         definition.package = "rtcf_test";
         definition.type = type;
         definition.remaps = std::move(remaps);
-        definition.first = first;
-        definition.ignore = ignore;
+        definition.breaks.first = first;
+        definition.breaks.ignore = executor::NamePattern("ignore of " + name, ignore);
         auto instance = std::make_shared<executor::Instance>(definition, libraries_.open(library),
                                                              "rt_runner", clock_, log_, recorder_);
         instance->configure();
@@ -80,7 +80,7 @@ class GraphFixture : public ::testing::Test {
     static executor::Graph graphOf(
         const std::vector<std::shared_ptr<executor::Instance>>& instances) {
         executor::Graph graph;
-        for (const auto& instance : instances) graph.add({instance, {}});
+        for (const auto& instance : instances) graph.add({instance, instance->definition().breaks});
         return graph;
     }
 

@@ -59,7 +59,7 @@ ChangeOutcome RunnerFixture::loadExample(const std::string& type, const std::str
     ComponentDefinition component = definition(type, name);
     component.package = "rtcf_examples";
     component.remaps = std::move(remaps);
-    component.first = first;
+    component.breaks.first = first;
     return onGraphThread([&] { return runner_->load(component, RTCF_EXAMPLES, kSilent); });
 }
 
