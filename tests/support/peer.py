@@ -4,6 +4,7 @@ peer.py record TOPIC       prints each std_msgs/Float64 it receives, exactly (he
 peer.py latch TOPIC VALUE  publishes one std_msgs/Float64, latched
 peer.py told TOPIC         publishes each number of its input as std_msgs/Float64, latched; the line
                            `drop` closes its connections, like a network that fails
+peer.py released TOPIC     publishes one std_msgs/Bool, false and latched, like the button of a stop
 peer.py text TOPIC SIZE    publishes one std_msgs/String of SIZE characters, latched
 peer.py sizes TOPIC        prints the length in characters of each std_msgs/String it receives
 peer.py numbers TOPIC       prints each std_msgs/Int32 it receives
@@ -31,7 +32,7 @@ import dynamic_reconfigure.client
 import rosgraph.impl.graph
 import rospy
 from rosgraph_msgs.msg import Log
-from std_msgs.msg import Float64, Int32, Int64, String
+from std_msgs.msg import Bool, Float64, Int32, Int64, String
 
 _POLL_S = 0.01
 
@@ -146,6 +147,10 @@ def main() -> None:
     elif action == "told":
         publisher = rospy.Publisher(topic, Float64, latch=True, queue_size=1)
         threading.Thread(target=_do_as_told, args=(publisher,), daemon=True).start()
+        _stay(publisher)
+    elif action == "released":
+        publisher = rospy.Publisher(topic, Bool, latch=True, queue_size=1)
+        publisher.publish(False)
         _stay(publisher)
     elif action == "text":
         publisher = rospy.Publisher(topic, String, latch=True, queue_size=1)

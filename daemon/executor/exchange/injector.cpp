@@ -99,6 +99,7 @@ bool Injector::store(const std::uint8_t* bytes, std::uint32_t size, const Arriva
     if ((before & kFresh) != 0) passOver();
     back_ = before & ~kFresh;
     delivered_.fetch_add(1, std::memory_order_relaxed);
+    fed_ = true;
     return true;
 }
 

@@ -51,6 +51,11 @@ class Injector {
     /// Counts a message that was lost before it reached the injector. Any thread.
     void refuse() { refused_.fetch_add(1, std::memory_order_relaxed); }
 
+    /// Sets whether somebody writes the topic; a delivered message sets it, too. Any thread.
+    void setFed(bool fed) noexcept { fed_ = fed; }
+    /// See InputPort::connectOutside().
+    const Shared<bool>& fed() const noexcept RTCF_NONBLOCKING { return fed_; }
+
     /// Sets whether messages wait for deliverUntil(). Switching it off delivers the waiting ones.
     /// Any thread; not real-time safe.
     void setQueueing(bool queueing);
@@ -158,6 +163,7 @@ class Injector {
     bool queueing_ = false;
     std::deque<Waiting> waiting_;
     std::size_t waiting_bytes_ = 0;
+    Shared<bool> fed_ = false;
     std::atomic<std::uint64_t> delivered_{0};
     std::atomic<std::uint64_t> refused_{0};
     std::atomic<std::uint64_t> too_large_{0};

@@ -33,7 +33,7 @@ struct Rewire {
         input->connectWritten();
         held = &input->slot();
         if (injector != nullptr) {
-            input->connectOutside(injector->front());
+            input->connectOutside(injector->front(), &injector->fed());
         } else if (source != nullptr) {
             input->connect(source, continued);
         } else {

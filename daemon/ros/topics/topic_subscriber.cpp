@@ -83,6 +83,8 @@ bool TopicSubscriber::isDue() const { return !isOpen() && retry_.due(); }
 void TopicSubscriber::close() {
     mute();
     shutDown(mutex_, subscriber_);
+    const std::lock_guard lock(mutex_);
+    if (had_peers_) injector_->setFed(false);
 }
 
 bool TopicSubscriber::isOpen() const {
@@ -92,8 +94,11 @@ bool TopicSubscriber::isOpen() const {
 
 void TopicSubscriber::watchConnections() {
     const std::lock_guard lock(mutex_);
-    if (subscriber_ == nullptr || !latched_->waits()) return;
-    latched_->noteConnections(subscriber_.getNumPublishers());
+    if (subscriber_ == nullptr) return;
+    const std::size_t count = subscriber_.getNumPublishers();
+    if (latched_->waits()) latched_->noteConnections(count);
+    had_peers_ = had_peers_ || count > 0;
+    if (had_peers_) injector_->setFed(count > 0);
 }
 
 bool TopicSubscriber::hasPeers() const {

@@ -71,7 +71,7 @@ class TopicSubscriber {
               std::optional<std::set<std::string>> publishers);
     void close();
 
-    /// Notes which publishers are connected. Thread of the callback queue.
+    /// Notes which publishers are connected, and tells the injector. Thread of the callback queue.
     void watchConnections();
     bool isOpen() const;
     /// True if a peer that publishes the topic is connected. Any thread.
@@ -88,7 +88,8 @@ class TopicSubscriber {
     ros::Subscriber subscriber_;
     std::shared_ptr<LatchedBefore> latched_;
     std::string problem_;
-    Retry retry_;  // watch thread
+    bool had_peers_ = false;  // values without them come from clients
+    Retry retry_;             // watch thread
 };
 
 }  // namespace rtcf::ros1

@@ -256,3 +256,25 @@ def _flows_during_an_unload(
     way.let_go()
     wait_for(lambda: "/goes/out" not in master.topics()[0], "the end of the topic")
     return seen
+
+
+def test_a_stop_whose_node_has_ended_stops(
+    ros_daemon: tuple[Daemon, rtcf.Client], master: Master
+) -> None:
+    _, client = ros_daemon
+    client.set_runner(runner_pb2.RunnerSettings(ros=runner_pb2.RosSettings(whitelist="/es/stop1")))
+    client.load(rtcf.component("rtcf_control", "EStop", name="stop", ns="/es",
+                               parameters=["start_stopped:=false"]))  # fmt: skip
+    button = master.node("released", "/es/stop1")
+    button.wait_until_connected()
+
+    def value(port: str) -> str:
+        return {each.name: each.value for each in client.get_component("/es/stop").ports}[port]
+
+    wait_for(lambda: value("stop1") == "data: 0", "the released button")
+    client.write("/es/stop.in", "1.0")
+    client.start()
+    wait_for(lambda: iteration(client) > 100, "some cycles")
+    assert (value("out"), value("state")) == ("data: 1.0", "data: 0")
+    button.kill()
+    wait_for(lambda: value("state") == "data: 1", "the stop")

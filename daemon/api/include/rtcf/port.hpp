@@ -64,8 +64,10 @@ class InputBase {
     /// Loop time since the newest value was written, ns; -1 if there is none. Real-time safe.
     /// @param owner the component, `this`
     std::int64_t age(const Component* owner) const noexcept RTCF_NONBLOCKING;
-    /// True if there is a writer, an output or a ROS topic, even if it has not written yet: then
-    /// age() grows. Real-time safe.
+    /// True if there is a writer, even if it has not written yet: an output of this runner, or, if
+    /// none writes the input, a ROS node that publishes the topic, or a client that has written.
+    /// False when the node has ended: within 0.2 s, but after minutes if its machine or the network
+    /// has failed, see age(). Real-time safe.
     /// @param owner the component, `this`
     bool connected(const Component* owner) const noexcept RTCF_NONBLOCKING;
 
@@ -110,8 +112,10 @@ class InputPort {
     /// This input as a queue; null if it is none. Real-time safe.
     QueueBase* queue() const noexcept RTCF_NONBLOCKING { return queue_; }
     void setQueue(QueueBase* queue) noexcept { queue_ = queue; }
-    /// True if the input has a writer. Real-time safe.
-    bool connected() const noexcept RTCF_NONBLOCKING { return connected_; }
+    /// True if the input has a writer, see InputBase::connected(). Real-time safe.
+    bool connected() const noexcept RTCF_NONBLOCKING {
+        return connected_ && (fed_ == nullptr || *fed_);
+    }
 
     /// @name Cycle thread; real-time safe
     /// @{
@@ -125,6 +129,7 @@ class InputPort {
     /// @param continued `source` is another slot with values of the same writer
     void connect(const SlotHeader* source, bool continued) noexcept RTCF_NONBLOCKING {
         connected_ = true;
+        fed_ = nullptr;
         if (continued) {
             if (waiting()) {
                 awaited_ = source;
@@ -142,8 +147,11 @@ class InputPort {
     }
     /// Connects the input to values from outside, of which `front` is the newest: an old one. If
     /// the input has a value, it keeps it until inject().
-    void connectOutside(const SlotHeader* front) noexcept RTCF_NONBLOCKING {
+    /// @param fed whether somebody writes them; outlives the connection
+    void connectOutside(const SlotHeader* front, const Shared<bool>* fed) noexcept
+        RTCF_NONBLOCKING {
         connected_ = true;
+        fed_ = fed;
         connectWritten();
         awaited_ = nullptr;
         if (queue_ != nullptr || input_.source_->stamp == 0) injectOld(front);
@@ -153,6 +161,7 @@ class InputPort {
         connectWritten();
         awaited_ = nullptr;
         connected_ = false;
+        fed_ = nullptr;
     }
     /// Sets a new value that arrived from outside the loop, in `source`. The slot of the previous
     /// value is free again.
@@ -192,6 +201,7 @@ class InputPort {
     const TypeInfo& type_;
     QueueBase* queue_ = nullptr;
     bool connected_ = false;
+    const Shared<bool>* fed_ = nullptr;  // null = a writer in this runner, or none
     Shared<const SlotHeader*> awaited_ = nullptr;
 };
 

@@ -120,6 +120,7 @@ class InputOutput : public ::testing::Test {
     Input<double> in{&component, "in"};
     Output<double> first{&component, "first"};
     Output<double> second{&component, "second"};
+    Shared<bool> fed = true;  // somebody writes the input from outside
 };
 
 TEST_F(InputOutput, UnconnectedInputHasNoData) {
@@ -310,7 +311,7 @@ TEST_F(InputOutput, DisconnectedInputKeepsItsValueAsOldData) {
 TEST_F(InputOutput, InjectedValueIsNewAndMayMoveToAnotherSlot) {
     Output<double> front{&component, "front"};
     Output<double> next{&component, "next"};
-    port().connectOutside(portOf(component, front).slot().get());
+    port().connectOutside(portOf(component, front).slot().get(), &fed);
     write(front, 1.0);
     port().inject(portOf(component, front).slot().get());
     EXPECT_EQ(in.read(), DataStatus::New);
@@ -321,13 +322,26 @@ TEST_F(InputOutput, InjectedValueIsNewAndMayMoveToAnotherSlot) {
     EXPECT_EQ(in.read(), DataStatus::Old);
 }
 
+TEST_F(InputOutput, InputFromOutsideIsConnectedWhileSomebodyWritesIt) {
+    Output<double> front{&component, "front"};
+    fed = false;
+    port().connectOutside(portOf(component, front).slot().get(), &fed);
+    EXPECT_FALSE(in.connected(&component));
+    fed = true;
+    EXPECT_TRUE(in.connected(&component));
+    fed = false;
+    EXPECT_FALSE(in.connected(&component)) << "the last publisher has ended";
+    connect(first);
+    EXPECT_TRUE(in.connected(&component)) << "a writer in the loop";
+}
+
 TEST_F(InputOutput, ValueOfAWriterStaysUntilAMessageArrives) {
     Output<double> front{&component, "front"};
     write(front, 9.0);
     connect(first);
     write(first, 1.0);
     in.read();
-    port().connectOutside(portOf(component, front).slot().get());
+    port().connectOutside(portOf(component, front).slot().get(), &fed);
     EXPECT_EQ(read(), DataStatus::Old);
     EXPECT_EQ(in.value(), 1.0);
     port().inject(portOf(component, front).slot().get());
