@@ -70,7 +70,7 @@ std::shared_ptr<executor::Instance> BenchGraph::make(const std::string& type,
     definition.package = "rtcf_examples";
     definition.type = type;
     definition.remaps = std::move(remaps);
-    definition.first = first;
+    definition.breaks.first = first;
     auto instance = std::make_shared<executor::Instance>(std::move(definition), code_, "bench",
                                                          loop_.clock(), log_, recorder_);
     instance->configure();
