@@ -114,9 +114,13 @@ class Parameter(Declarable):
 
 
 class State(Declarable):
-    """A value that the component keeps from one cycle to the next: `self.integral += …`."""
+    """A value that the component keeps from one cycle to the next: `self.integral += …`.
 
-    allowed = ("unit", "doc")
+    With `live=True`, neither `rtcfctl reset` nor `rtcfctl restore` changes it while the loop runs in
+    real time: for a latched stop, or the last command of a drive.
+    """
+
+    allowed = ("unit", "doc", "live")
 
 
 class Derived(Declarable):

@@ -110,6 +110,7 @@ void PythonComponent::declare() {
         declaration.name = state.name;
         declaration.unit = state.unit;
         declaration.doc = state.doc;
+        declaration.live = state.live != 0;
         declaration.value = record + state.offset;
         declaration.initial.resize(declaration.size);
         std::memcpy(declaration.initial.data(), declaration.value, declaration.size);

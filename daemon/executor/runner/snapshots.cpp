@@ -79,7 +79,7 @@ ChangeOutcome Snapshots::restore(const Snapshot& snapshot, const Progress& progr
                                 "rtcfctl runner set {1} --frequency {0:g}",
                                 frequency, runner_, settings_.frequency_hz));
     }
-    SnapshotRestorer restorer(snapshot, *plan_);
+    SnapshotRestorer restorer(snapshot, *plan_, loop_.inRealTime());
     boundary_.requireSmall(restorer.restoration().bytes(), "the snapshot");
     if (loop_.inRealTime()) restorer.requireReserved();
     const bool begins = !loop_.joinable() && control_.state() != RunnerState::Stepping;

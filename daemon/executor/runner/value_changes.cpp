@@ -31,7 +31,14 @@ ChangeOutcome ValueChanges::reset(const std::string& name) {
     }
     Transactions::Change change;
     change.graph = plan_->graph;
-    change.copies = planReset(component);
+    const bool running = loop_.inRealTime();
+    change.copies = planReset(component, running);
+    if (change.copies.empty()) {
+        throw Error(ErrorKind::FailedPrecondition,
+                    fmt::format("all state of {0} is live (rtcf::Live), and the loop of {1} runs: "
+                                "stop it to reset {0}: rtcfctl -r {1} stop",
+                                name, runner_));
+    }
     boundary_.requireSmall(bytesOf(change.copies), "the reset");
     transactions_.adopt(std::move(change), [](const std::string&) {});
     return outcomeWith(*plan_, name);

@@ -21,8 +21,8 @@ std::string orNothing(const std::string& source) { return source.empty() ? "noth
 
 }  // namespace
 
-SnapshotRestorer::SnapshotRestorer(const Snapshot& saved, const Plan& plan)
-    : snapshot_(saved), plan_(plan), sources_(plan) {
+SnapshotRestorer::SnapshotRestorer(const Snapshot& saved, const Plan& plan, bool running)
+    : snapshot_(saved), plan_(plan), running_(running), sources_(plan) {
     for (const GraphNode& node : plan.graph.nodes()) {
         const auto& outputs = accessTo(node.instance->component()).outputs();
         for (std::size_t i = 0; i < outputs.size(); ++i) {
@@ -154,7 +154,8 @@ void SnapshotRestorer::fitStates(const SnapshotComponent& saved, const Instance&
                                     to.type));
                 return;
             }
-            restoration_.states.push_back({to.value, from.bytes.data(), to.size});
+            if (!running_ || !to.live)
+                restoration_.states.push_back({to.value, from.bytes.data(), to.size});
         });
 }
 
@@ -238,6 +239,8 @@ void SnapshotRestorer::fitTopics() {
                                     to.type().name));
                 return;
             }
+            // Newer values must not give way to older ones, e.g. that of a pressed button.
+            if (running_) return;
             restoration_.topics.push_back({&to, slotFrom(to.type(), from.value, from.name),
                                            arrivalOf(from.value), readers_[&to]});
         });

@@ -22,8 +22,10 @@ class SnapshotRestorer {
     /// Assigns all values.
     /// @param saved outlives this object
     /// @param plan the loop's plan; outlives this object
+    /// @param running the loop runs in real time: live state (rtcf::Live) and the values of topics
+    /// stay as they are
     /// @throws Error that lists the differences
-    SnapshotRestorer(const Snapshot& saved, const Plan& plan);
+    SnapshotRestorer(const Snapshot& saved, const Plan& plan, bool running);
     SnapshotRestorer(const SnapshotRestorer&) = delete;
     SnapshotRestorer& operator=(const SnapshotRestorer&) = delete;
 
@@ -66,6 +68,7 @@ class SnapshotRestorer {
 
     const Snapshot& snapshot_;
     const Plan& plan_;
+    const bool running_;
     const Sources sources_;
     Restoration restoration_;
     std::vector<std::string> problems_;

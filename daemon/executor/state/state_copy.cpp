@@ -52,10 +52,12 @@ void planHandOver(const Component& previous, const Component& successor,
     }
 }
 
-std::vector<StateCopy> planReset(const Component& component) {
+std::vector<StateCopy> planReset(const Component& component, bool running) {
     std::vector<StateCopy> copies;
-    for (const StateDeclaration& state : accessTo(component).states())
-        copies.push_back({state.value, state.initial.data(), state.size});
+    for (const StateDeclaration& state : accessTo(component).states()) {
+        if (!running || !state.live)
+            copies.push_back({state.value, state.initial.data(), state.size});
+    }
     return copies;
 }
 

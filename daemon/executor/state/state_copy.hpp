@@ -31,7 +31,8 @@ void planHandOver(const Component& previous, const Component& successor,
                   std::vector<StateCopy>& copies, std::vector<std::string>& notes);
 
 /// Plans the copies that reset a component's state to its initial values.
-std::vector<StateCopy> planReset(const Component& component);
+/// @param running the loop runs in real time: live state stays, see rtcf::Live
+std::vector<StateCopy> planReset(const Component& component, bool running);
 
 /// A copy of a component's state, of one cycle boundary.
 class StateTexts {

@@ -163,6 +163,7 @@ struct StateTable {
     const char* doc;
     const TypeTable* type;
     std::int64_t offset;  ///< in the record
+    std::int64_t live;    ///< 1: see rtcf::Live
 };
 
 /// The meaning of the bytes of an exception. Line 0: raised in a function that the hook called from
@@ -257,6 +258,6 @@ struct LibraryTable {
 };
 
 /// The suffix of the symbol that points to the tables of a library.
-#define RTCF_PYTHON_TABLES 3
+#define RTCF_PYTHON_TABLES 4
 
 }  // namespace rtcf::python

@@ -29,7 +29,7 @@ from rtcf_compile.rewriting.logs import LogCall
 from rtcf_compile.source.mistake import display, source_line
 from rtcf_compile.source.prefix_map import mapped
 
-TABLES = 3
+TABLES = 4
 _WHOLE = ("int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
 SCALARS = {name: i for i, name in enumerate(("bool", *_WHOLE, "float32", "float64"))}
 _LEVELS = {"debug": 1, "info": 2, "warn": 3, "error": 4, "fatal": 5}
@@ -232,7 +232,8 @@ class _Library:
     def _state(self, member: Member, record: np.ndarray) -> Value:  # type: ignore[type-arg]
         texts = [str(member.options.get(each, "")) for each in ("unit", "doc")]
         offset = _offset(record, member.name)
-        return self.data.struct(member.name, *texts, self._type(member.type), offset)
+        live = int(bool(member.options.get("live", False)))
+        return self.data.struct(member.name, *texts, self._type(member.type), offset, live)
 
     def _lines(self, compiled: Compiled) -> list[Value]:
         numbers = {*compiled.lines, *(each.line for each in compiled.raises.values())} - {0}

@@ -7,7 +7,10 @@
 ///     integral += ki * error * dt();
 ///
 /// The executor hands declared state over to a component that replaces this one. `rtcfctl info`
-/// shows it, `rtcfctl reset` sets it back to its initial value, and snapshots contain it.
+/// shows it, `rtcfctl reset` sets it back to its initial value, and snapshots contain it. State
+/// that describes the machine now, such as a latched stop or the last command of a drive, is
+/// declared with rtcf::Live(): while the loop runs in real time, neither a reset nor a snapshot
+/// changes it.
 #pragma once
 
 #include <cstddef>
@@ -27,6 +30,10 @@ namespace rtcf {
 
 class Component;
 
+/// Option of a State: while the loop runs in real time, `rtcfctl reset` and `rtcfctl restore` leave
+/// it as it is, because another value would release a stop, or make a command jump.
+struct Live {};
+
 /// Name, type and memory of a state of any type.
 struct StateDeclaration {
     std::string name;
@@ -37,6 +44,7 @@ struct StateDeclaration {
     std::size_t size = 0;        ///< bytes
     void* value = nullptr;       ///< address of the value, in the component
     std::vector<std::byte> initial;
+    bool live = false;  ///< see Live
     /// Prints the value at `value` on one line. Not real-time safe.
     std::string (*print)(const void* value) = nullptr;
 };
@@ -53,7 +61,7 @@ class State final {
     /// @param owner the component, `this`
     /// @param name  ROS base name, unique among the component's states
     /// @param initial value of a new component, and after a reset
-    /// @param options Unit, Doc
+    /// @param options Unit, Doc, Live
     template <typename... Options>
     // NOLINTNEXTLINE(modernize-pass-by-value): T may be large
     State(Component* owner, std::string name, const T& initial, Options... options)
@@ -133,6 +141,7 @@ class State final {
     static void apply(StateDeclaration& declaration, Doc doc) {
         declaration.doc = std::move(doc.value);
     }
+    static void apply(StateDeclaration& declaration, Live) { declaration.live = true; }
     static void declareIn(Component* owner, StateDeclaration declaration);
 
     T value_;

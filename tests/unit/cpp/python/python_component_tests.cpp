@@ -91,7 +91,7 @@ const OutputTable kOutput{"x",     "m", &kNumber, nullptr, 0, offsetof(Record, i
                           nullptr, 0,   nullptr,  0};
 const ParameterTable kGain{"gain",  "", "", Scalar::Double, offsetof(Record, gain), 1, 0, 0.0, 0.0,
                            nullptr, 0,  0};
-const StateTable kCount{"count", "", "", &kInteger, offsetof(Record, count)};
+const StateTable kCount{"count", "", "", &kInteger, offsetof(Record, count), 0};
 const RaiseTable kRaise{hashOf("limit"), 0, "IndexError: index {} beyond size {}", 1};
 const LineTable kLine{12, "self.x.write(y)"};
 const ComponentTable kTable{"Gain",  "doc",    "gain.py", nullptr, &kFresh, sizeof(Record),

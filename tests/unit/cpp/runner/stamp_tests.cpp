@@ -143,6 +143,7 @@ class StampsModel : public Stamps, public ::testing::WithParamInterface<unsigned
             hearer.live = hearer.fed = false;
         }
         voice_ = next;
+        sent_ = false;
         said_ = {};
         if (!voice_) return;
         if (active() && voice_->starts) say(voice_->number + 0.25);
@@ -198,7 +199,7 @@ class StampsModel : public Stamps, public ::testing::WithParamInterface<unsigned
             if (hearer.status != DataStatus::None) {
                 ASSERT_EQ(value(component, "value"), hearer.value) << name;
             }
-            ASSERT_EQ(value(component, "wired"), voice_ || mapped_ ? 1.0 : 0.0) << name;
+            ASSERT_EQ(value(component, "wired"), voice_ || sent_ ? 1.0 : 0.0) << name;
         }
     }
 
@@ -249,6 +250,7 @@ class StampsModel : public Stamps, public ::testing::WithParamInterface<unsigned
             case 4:
                 mapped_ = !mapped_;
                 map(mapped_);
+                sent_ = false;
                 message_.reset();
                 for (auto& [name, hearer] : hearers_) hearer.fed = false;
                 break;
@@ -256,6 +258,7 @@ class StampsModel : public Stamps, public ::testing::WithParamInterface<unsigned
                 if (!topic()) break;
                 message_ = 1'000'000.0 + chance(1000);
                 send(*message_);
+                sent_ = true;
                 break;
             case 6:
                 startLoop();
@@ -273,6 +276,7 @@ class StampsModel : public Stamps, public ::testing::WithParamInterface<unsigned
     int voices_ = 0;
     int iteration_ = 0;
     bool mapped_ = false;  // /m is a topic
+    bool sent_ = false;    // somebody has written the present topic
     bool running_ = false;
     bool stepping_ = false;
     std::optional<double> message_;  // that no cycle has taken
@@ -489,26 +493,21 @@ TEST_F(Stamps, ChangeInPlaceIsSeenByNoReaderBeforeItIsPublished) {
     }
 }
 
-TEST_F(Stamps, MessageOfASnapshotIsOldInARunningLoop) {
+TEST_F(Stamps, SnapshotDoesNotReplaceTheMessagesOfARunningLoop) {
     map(true);
     load(listener("L"));
     start();
-    const std::int64_t before = executor::monotonicNow();
     send(3.0);
     ASSERT_TRUE(eventually([&] { return value("/L", "news") == 1.0; }));
-    const std::int64_t after = executor::monotonicNow();
-    auto snapshot = onGraphThread([&] { return runner().takeSnapshot().snapshot; });
-    // As if the message had come just before the snapshot, and the snapshot had waited for 5 s.
-    snapshot.components[0].inputs[0].seen = 0;
-    snapshot.taken_ns -= 5'000'000'000;
+    const auto snapshot = onGraphThread([&] { return runner().takeSnapshot().snapshot; });
+    const std::int64_t before = executor::monotonicNow();
     send(4.0);
     ASSERT_TRUE(eventually([&] { return value("/L", "news") == 2.0; }));
     onGraphThread([&] { return runner().restore(snapshot, [](const std::string&) {}); });
     ASSERT_TRUE(runs());
-    EXPECT_EQ(value("/L", "value"), 3.0);
+    EXPECT_EQ(value("/L", "value"), 4.0);
     EXPECT_EQ(value("/L", "news"), 1.0) << "the state of the snapshot";
-    EXPECT_LT(written("L"), after - 4'900'000'000);
-    EXPECT_GT(written("L"), before - 6'000'000'000);
+    EXPECT_GT(written("L"), before);
 }
 
 }  // namespace
