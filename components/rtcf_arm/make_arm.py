@@ -348,7 +348,8 @@ def graph(all_links: Sequence[Link], folder: Path) -> str:
             "/robot", "rtcf_mujoco/Simulation",
             {"model": f"{folder}/arm.xml", "keyframe": "ready", "brake_friction": 300.0,
              "pushed_body": "hand"},
-            {"brake": "/stopped", "joint_states": "/joint_states"},
+            # A reset of the emergency stop must not put the arm elsewhere.
+            {"brake": "/stopped", "joint_states": "/joint_states", "reset": "~reset"},
             first=True,
         ),
         _component(

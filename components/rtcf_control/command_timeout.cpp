@@ -5,6 +5,7 @@
 
 #include <rtcf/component.hpp>
 
+#include "bounded_step.hpp"
 #include "latch.hpp"
 
 namespace rtcf_control {
@@ -45,13 +46,16 @@ class CommandTimeout final : public rtcf::Component {
         this,           "resume_rate",     kInfinity,
         rtcf::Min(0.0), rtcf::Unit("1/s"), rtcf::Doc("rate of change to the command after a stop")};
 
-    rtcf::State<Latch> latch_{this, "latch", {}};
-    rtcf::State<std::int64_t> age_{this, "since_command", 0, rtcf::Unit("ns"),
-                                   rtcf::Doc("time since the last command")};
-    rtcf::State<double> last_{this, "last", 0.0, rtcf::Doc("the last output")};
-    rtcf::State<bool> begun_{this, "begun", false, rtcf::Doc("the first command has come")};
+    rtcf::State<Latch> latch_{this, "latch", {}, rtcf::Live()};
+    rtcf::State<std::int64_t> age_{
+        this,        "since_command", 0, rtcf::Unit("ns"), rtcf::Doc("time since the last command"),
+        rtcf::Live()};
+    rtcf::State<double> last_{this, "last", 0.0, rtcf::Doc("the last output"), rtcf::Live()};
+    rtcf::State<bool> begun_{this, "begun", false, rtcf::Doc("the first command has come"),
+                             rtcf::Live()};
     rtcf::State<bool> resumes_{this, "resumes", false,
-                               rtcf::Doc("the output moves to the command at resume_rate")};
+                               rtcf::Doc("the output moves to the command at resume_rate"),
+                               rtcf::Live()};
 
     bool start() override {
         latch_ = Latch{};
@@ -93,7 +97,7 @@ class CommandTimeout final : public rtcf::Component {
     }
 
     void move(double target, double rate) {
-        const double largest = rate * dt();
+        const double largest = rate * boundedStep(dt(), period());
         last_ = std::clamp(target, last_ - largest, last_ + largest);
     }
 };

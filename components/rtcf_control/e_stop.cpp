@@ -7,10 +7,53 @@
 
 #include <rtcf/component.hpp>
 
+#include "bounded_step.hpp"
 #include "latch.hpp"
 
 namespace rtcf_control {
 namespace {
+
+// Velocity of a command that may come in steps, at a lower rate than the loop's: from its changes,
+// each over the time since the one before. The median of three, so that one jump of the command is
+// no velocity.
+class CommandVelocity {
+   public:
+    /// Notes the command of a cycle. Real-time safe.
+    /// @param elapsed_s time since the last cycle
+    void note(double command, double elapsed_s) noexcept {
+        since_s_ += elapsed_s;
+        if (known_ && command == last_) return;
+        if (known_ && since_s_ > 0.0) {
+            rates_ = {(command - last_) / since_s_, rates_[0], rates_[1]};
+            interval_s_ = since_s_;
+        }
+        known_ = true;
+        last_ = command;
+        since_s_ = 0.0;
+    }
+    /// 1/s. A command that does not change any more slows down. Real-time safe.
+    double value() const noexcept {
+        const double low = std::min(rates_[0], rates_[1]);
+        const double high = std::max(rates_[0], rates_[1]);
+        const double median = std::clamp(rates_[2], low, high);
+        return since_s_ > interval_s_ ? median * interval_s_ / since_s_ : median;
+    }
+    template <typename Visit>
+    void fields(Visit&& visit) {
+        visit("known", known_);
+        visit("last", last_);
+        visit("since_s", since_s_);
+        visit("interval_s", interval_s_);
+        visit("rates", rates_);
+    }
+
+   private:
+    bool known_ = false;
+    double last_ = 0.0;
+    double since_s_ = 0.0;     // since the last change
+    double interval_s_ = 0.0;  // between the last two changes
+    std::array<double, 3> rates_{};
+};
 
 class EStop final : public rtcf::Component {
     static constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -46,7 +89,7 @@ class EStop final : public rtcf::Component {
         rtcf::Choice("safe_value", Mode::SafeValue),
         rtcf::Choice("standstill", Mode::Standstill),
         rtcf::Doc("a stop moves the output to safe_value; or, for a command of position, to a "
-                  "standstill where it is")};
+                  "standstill where it is; a stop under way stays as it is")};
     rtcf::Parameter<double> safe_value{this, "safe_value", 0.0,
                                        rtcf::Doc("output during a stop and in the last cycle")};
     rtcf::Parameter<double> stop_rate{
@@ -72,22 +115,41 @@ class EStop final : public rtcf::Component {
                                         rtcf::Unit("1/s"),
                                         rtcf::Doc("rate of change to the command after a reset")};
 
-    rtcf::State<Latch> latch_{this, "latch", {}};
+    rtcf::State<Latch> latch_{this, "latch", {}, rtcf::Live()};
+    rtcf::State<bool> standstill_{this, "standstill", false,
+                                  rtcf::Doc("the stop is to a standstill"), rtcf::Live()};
     rtcf::State<std::array<bool, 4>> wired_{
-        this, "wired", {}, rtcf::Doc("stop1 to stop4 have had a writer")};
-    rtcf::State<double> last_{this, "last", 0.0, rtcf::Doc("the last output")};
-    rtcf::State<double> speed_{this, "speed", 0.0, rtcf::Unit("1/s"),
-                               rtcf::Doc("rate of change of the last output")};
+        this, "wired", {}, rtcf::Doc("stop1 to stop4 have had a writer"), rtcf::Live()};
+    rtcf::State<double> last_{this, "last", 0.0, rtcf::Doc("the last output"), rtcf::Live()};
+    rtcf::State<CommandVelocity> velocity_{
+        this, "velocity", {}, rtcf::Doc("changes of the command"), rtcf::Live()};
+    rtcf::State<double> speed_{this,
+                               "speed",
+                               0.0,
+                               rtcf::Unit("1/s"),
+                               rtcf::Doc("rate of change of the last output"),
+                               rtcf::Live()};
     rtcf::State<bool> known_{
         this, "known", false,
-        rtcf::Doc("there is a last output; a standstill needs a first command")};
+        rtcf::Doc("there is a last output; a standstill needs a first command"), rtcf::Live()};
     rtcf::State<bool> resumes_{this, "resumes", false,
-                               rtcf::Doc("the output moves to the command at resume_rate")};
+                               rtcf::Doc("the output moves to the command at resume_rate"),
+                               rtcf::Live()};
+
+    bool prepare(const rtcf::Values& proposed) override {
+        if (proposed[mode] == Mode::Standstill && std::isinf(proposed[resume_rate]))
+            return fail(
+                "mode = standstill needs a resume_rate (1/s): after a reset, a position would jump "
+                "to the command");
+        return true;
+    }
 
     bool start() override {
         latch_ = Latch{};
         if (start_stopped) latch_.value().stop();
+        standstill_ = mode == Mode::Standstill;
         wired_ = std::array<bool, 4>{};
+        velocity_ = CommandVelocity{};
         last_ = safe_value.value();
         speed_ = 0.0;
         known_ = false;
@@ -97,7 +159,7 @@ class EStop final : public rtcf::Component {
 
     void safe() noexcept override {
         latch_.value().stop();
-        if (mode == Mode::SafeValue) {
+        if (!standstill_) {
             last_ = safe_value.value();
         } else if (!known_) {
             publishState(false);
@@ -121,10 +183,12 @@ class EStop final : public rtcf::Component {
         }
         const rtcf::DataStatus command = in.read();
         const bool usable = command != rtcf::DataStatus::None && std::isfinite(in.value());
+        if (!latch_.value().stopped()) standstill_ = mode == Mode::Standstill;
+        if (usable) velocity_.value().note(in.value(), dt());
         const bool wanted = reset.read() != rtcf::DataStatus::None && reset.value();
         if (latch_.value().update(condition, usable && command == rtcf::DataStatus::New, wanted))
             resumes_ = true;
-        if (mode == Mode::Standstill && !known_) {
+        if (standstill_ && !known_) {
             // The position at which the first command begins.
             if (!usable) {
                 publishState(false);
@@ -134,7 +198,7 @@ class EStop final : public rtcf::Component {
         }
         known_ = true;
         if (latch_.value().stopped()) {
-            const bool stands = mode == Mode::Standstill ? brake() : move(safe_value, stop_rate);
+            const bool stands = standstill_ ? brake() : move(safe_value, stop_rate);
             publish(stands);
             return;
         }
@@ -145,23 +209,24 @@ class EStop final : public rtcf::Component {
             return;
         }
         if (move(in.value(), resumes_ ? resume_rate.value() : kInfinity)) resumes_ = false;
+        if (!resumes_) speed_ = velocity_.value().value();
         publish(false);
     }
 
     // Returns true if the output is at the target.
     bool move(double target, double rate) {
         const double before = last_;
-        const double largest = rate * dt();
-        last_ = std::clamp(target, before - largest, before + largest);
-        speed_ = dt() > 0.0 ? (last_ - before) / dt() : 0.0;
+        const double step = boundedStep(dt(), period());
+        last_ = std::clamp(target, before - rate * step, before + rate * step);
+        speed_ = step > 0.0 ? (last_ - before) / step : 0.0;
         return last_ == target;
     }
 
     // Slows down; returns true if the output stands.
     bool brake() {
-        const double largest = deceleration * dt();
-        speed_ = std::clamp(0.0, speed_ - largest, speed_ + largest);
-        last_ += speed_ * dt();
+        const double step = boundedStep(dt(), period());
+        speed_ = std::clamp(0.0, speed_ - deceleration * step, speed_ + deceleration * step);
+        last_ += speed_ * step;
         return speed_ == 0.0;
     }
 

@@ -36,11 +36,14 @@ class Heartbeat final : public rtcf::Component {
                                      rtcf::Unit("s"),
                                      rtcf::Doc("time between steps of count; 0 = one each cycle")};
 
-    rtcf::State<Latch> latch_{this, "latch", {}};
-    rtcf::State<std::int64_t> age_{this, "since_beat", 0, rtcf::Unit("ns"),
-                                   rtcf::Doc("time since the last beat")};
-    rtcf::State<std::uint32_t> last_{this, "last", 0, rtcf::Doc("number of the last beat")};
-    rtcf::State<bool> begun_{this, "begun", false, rtcf::Doc("the first beat has come")};
+    rtcf::State<Latch> latch_{this, "latch", {}, rtcf::Live()};
+    rtcf::State<std::int64_t> age_{
+        this,        "since_beat", 0, rtcf::Unit("ns"), rtcf::Doc("time since the last beat"),
+        rtcf::Live()};
+    rtcf::State<std::uint32_t> last_{this, "last", 0, rtcf::Doc("number of the last beat"),
+                                     rtcf::Live()};
+    rtcf::State<bool> begun_{this, "begun", false, rtcf::Doc("the first beat has come"),
+                             rtcf::Live()};
     rtcf::State<std::uint32_t> count_{this, "own_beats", 0, rtcf::Doc("own beats")};
     rtcf::State<std::int64_t> since_{this, "since_own_beat", 0, rtcf::Unit("ns"),
                                      rtcf::Doc("time since the last own beat")};

@@ -5,6 +5,7 @@
 
 #include <rtcf/component.hpp>
 
+#include "bounded_step.hpp"
 #include "measurement_watch.hpp"
 
 namespace rtcf_control {
@@ -83,14 +84,25 @@ class JointLimiter final : public rtcf::Component {
     MeasurementWatch<2> watch_{
         this, {"position", "velocity"}, "a velocity slows down to 0, an effort is 0"};
 
-    rtcf::State<double> last_{this, "last", 0.0, rtcf::Doc("the last output")};
-    rtcf::State<double> pace_{this, "pace", 0.0, rtcf::Unit("rad/s"),
-                              rtcf::Doc("velocity of the last position or velocity command")};
-    rtcf::State<double> wanted_{this, "last_wanted", 0.0, rtcf::Doc("last wanted position")};
-    rtcf::State<double> travel_{this, "travel", 0.0, rtcf::Unit("rad"),
-                                rtcf::Doc("way of the joint since the last position, estimated")};
-    rtcf::State<std::int32_t> kind_{this, "kind", -1, rtcf::Doc("command of the last cycle")};
-    rtcf::State<bool> begun_{this, "begun", false, rtcf::Doc("the last output is valid")};
+    rtcf::State<double> last_{this, "last", 0.0, rtcf::Doc("the last output"), rtcf::Live()};
+    rtcf::State<double> pace_{this,
+                              "pace",
+                              0.0,
+                              rtcf::Unit("rad/s"),
+                              rtcf::Doc("velocity of the last position or velocity command"),
+                              rtcf::Live()};
+    rtcf::State<double> wanted_{this, "last_wanted", 0.0, rtcf::Doc("last wanted position"),
+                                rtcf::Live()};
+    rtcf::State<double> travel_{this,
+                                "travel",
+                                0.0,
+                                rtcf::Unit("rad"),
+                                rtcf::Doc("way of the joint since the last position, estimated"),
+                                rtcf::Live()};
+    rtcf::State<std::int32_t> kind_{this, "kind", -1, rtcf::Doc("command of the last cycle"),
+                                    rtcf::Live()};
+    rtcf::State<bool> begun_{this, "begun", false, rtcf::Doc("the last output is valid"),
+                             rtcf::Live()};
 
     bool prepare(const rtcf::Values& proposed) override {
         if (proposed[lower] > proposed[upper])
@@ -128,11 +140,12 @@ class JointLimiter final : public rtcf::Component {
         const auto kind = static_cast<std::int32_t>(command.value());
         begun_ = begun_ && kind_ == kind;  // the last output is another quantity
         kind_ = kind;
-        const rtcf::DataStatus seen = position.read();
+        const bool moved = position.read() == rtcf::DataStatus::New &&
+                           std::isfinite(position.value()) && position.value() != watch_.last(0);
         const bool has_position =
             note(position, 0, command == Command::Position ? !begun_ : needsPosition());
         const bool has_velocity = note(velocity, 1, command == Command::Effort && needsVelocity());
-        travel(seen == rtcf::DataStatus::New && std::isfinite(position.value()));
+        travel(moved);
         if (in.read() == rtcf::DataStatus::None) return;
         double wanted = in.value();
         if (!std::isfinite(wanted)) {
@@ -190,20 +203,20 @@ class JointLimiter final : public rtcf::Component {
     }
 
     // Begins at the measured position, so that the joint does not jump.
-    // @return false if the position is not finite, or too old
+    // @return false if the position has not come yet, is not finite, or too old
     bool begin(double wanted) {
         wanted_ = last_ = Range{lower, upper}.limit(wanted);
-        if (position.read() == rtcf::DataStatus::None) return true;
+        if (position.read() == rtcf::DataStatus::None) return !position.connected(this);
         if (!std::isfinite(position.value()) || watch_.lost(0)) return false;
         last_ = position.value();
         return true;
     }
 
-    // Estimates the way of the joint since the last position, which may be slower than the loop or
-    // dead.
-    void travel(bool is_new) {
+    // Estimates the way of the joint since the last change of the position, which may be slower
+    // than the loop, or frozen.
+    void travel(bool moved) {
         const double v = command == Command::Effort ? watch_.last(1) : pace_.value();
-        travel_ = is_new || !std::isfinite(v) ? 0.0 : travel_ + v * dt();
+        travel_ = moved || !std::isfinite(v) ? 0.0 : travel_ + v * dt();
     }
     // Where the joint may be.
     Range place() const {
@@ -220,14 +233,14 @@ class JointLimiter final : public rtcf::Component {
 
     // A velocity on the way to 0.
     double slower() const {
-        const double step = deceleration * dt();
-        return Range{-std::max(0.0, -pace_ - step), std::max(0.0, pace_ - step)}.limit(pace_);
+        const double change = deceleration * step();
+        return Range{-std::max(0.0, -pace_ - change), std::max(0.0, pace_ - change)}.limit(pace_);
     }
 
     // Position of this cycle on the way from the last one. `wanted` may move itself: the way slows
     // down before it relative to its velocity.
     double followed(double wanted, double from) {
-        const double h = dt();
+        const double h = step();
         const double target = Range{lower, upper}.limit(wanted);
         const double drift = (target - wanted_) / h;
         const double distance = wanted_ - from;
@@ -248,13 +261,14 @@ class JointLimiter final : public rtcf::Component {
         return reached;
     }
 
-    double periodOf() const { return std::max(1e-9 * static_cast<double>(period()), dt()); }
+    double step() const { return boundedStep(dt(), period()); }
+    double periodOf() const { return std::max(1e-9 * static_cast<double>(period()), step()); }
 
     // Range of the velocity of a command at a place. Where limits disagree, braking before lower
     // and upper comes first, then the acceleration, then soft limits and max_velocity.
     Range velocities(Range x) const {
-        const double step = deceleration * dt();
-        const Range reachable{pace_ - step, pace_ + step};
+        const double change = deceleration * step();
+        const Range reachable{pace_ - change, pace_ + change};
         const Range wanted = softened(x);
         const Range braking = brakingRange(x, pace_);
         return {braking.limit(reachable.limit(wanted.low)),

@@ -127,19 +127,23 @@ class Pid final : public rtcf::Component {
                                         rtcf::Doc("filtered rate of the setpoint")};
     rtcf::State<double> measured_slope_{this, "measured_slope", 0.0, rtcf::Unit("1/s"),
                                         rtcf::Doc("filtered rate of the measured value")};
-    rtcf::State<double> setpoint_{this, "followed", 0.0,
-                                  rtcf::Doc("setpoint after its rate limit")};
+    rtcf::State<double> setpoint_{this, "followed", 0.0, rtcf::Doc("setpoint after its rate limit"),
+                                  rtcf::Live()};
     rtcf::State<double> measured_{this, "last_measured", 0.0, rtcf::Doc("last measured value")};
-    rtcf::State<double> effort_{this, "last_effort", 0.0, rtcf::Doc("effort of the last cycle")};
+    rtcf::State<double> effort_{this, "last_effort", 0.0, rtcf::Doc("effort of the last cycle"),
+                                rtcf::Live()};
     rtcf::State<double> gap_{
         this, "gap", 0.0, rtcf::Unit("s"),
         rtcf::Doc("time without finite inputs, since the last cycle with them")};
     rtcf::State<double> interval_{this, "interval", 0.0, rtcf::Unit("s"),
                                   rtcf::Doc("time between the last two new measured values")};
-    rtcf::State<bool> begun_{this, "begun", false, rtcf::Doc("the followed values are valid")};
+    rtcf::State<bool> begun_{this, "begun", false, rtcf::Doc("the followed values are valid"),
+                             rtcf::Live()};
     rtcf::State<bool> resume_{this, "resume", false,
-                              rtcf::Doc("set the integral to continue from the last effort")};
-    rtcf::State<Gains> gains_{this, "gains", {}, rtcf::Doc("gains of the last cycle")};
+                              rtcf::Doc("set the integral to continue from the last effort"),
+                              rtcf::Live()};
+    rtcf::State<Gains> gains_{
+        this, "gains", {}, rtcf::Doc("gains of the last cycle"), rtcf::Live()};
 
     bool prepare(const rtcf::Values& proposed) override {
         if (proposed[lower] > proposed[upper])

@@ -4,6 +4,8 @@
 
 #include <rtcf/component.hpp>
 
+#include "bounded_step.hpp"
+
 namespace rtcf_control {
 namespace {
 
@@ -21,8 +23,9 @@ class RateLimiter final : public rtcf::Component {
         this,           "falling",         kInfinity,
         rtcf::Min(0.0), rtcf::Unit("1/s"), rtcf::Doc("largest rate downwards; 0 holds")};
 
-    rtcf::State<double> last_{this, "last", 0.0, rtcf::Doc("the last output")};
-    rtcf::State<bool> begun_{this, "begun", false, rtcf::Doc("the first value has passed")};
+    rtcf::State<double> last_{this, "last", 0.0, rtcf::Doc("the last output"), rtcf::Live()};
+    rtcf::State<bool> begun_{this, "begun", false, rtcf::Doc("the first value has passed"),
+                             rtcf::Live()};
 
     bool start() override {
         begun_ = false;
@@ -36,8 +39,9 @@ class RateLimiter final : public rtcf::Component {
             out.write(wanted);  // rejected as not finite: readers keep the last output
             return;
         }
+        const double step = boundedStep(dt(), period());
         const double before = begun_ ? last_.value() : wanted;
-        last_ = std::clamp(wanted, before - falling * dt(), before + rising * dt());
+        last_ = std::clamp(wanted, before - falling * step, before + rising * step);
         begun_ = true;
         out.write(last_);
         limited.write(last_ != wanted);

@@ -27,10 +27,13 @@ class Switch final : public rtcf::Component {
                                  rtcf::Unit("s"),
                                  rtcf::Doc("time of the transition to another input; 0 = at once")};
 
-    rtcf::State<std::int32_t> active_{this, "active", -1, rtcf::Doc("number of the input")};
-    rtcf::State<double> last_{this, "last", 0.0, rtcf::Doc("the last output")};
-    rtcf::State<double> from_{this, "from", 0.0, rtcf::Doc("output before the change")};
-    rtcf::State<double> share_{this, "share", 1.0, rtcf::Doc("share of the active input")};
+    rtcf::State<std::int32_t> active_{this, "active", -1, rtcf::Doc("number of the input"),
+                                      rtcf::Live()};
+    rtcf::State<double> last_{this, "last", 0.0, rtcf::Doc("the last output"), rtcf::Live()};
+    rtcf::State<double> from_{this, "from", 0.0, rtcf::Doc("output before the change"),
+                              rtcf::Live()};
+    rtcf::State<double> share_{this, "share", 1.0, rtcf::Doc("share of the active input"),
+                               rtcf::Live()};
 
     bool start() override {
         active_ = -1;

@@ -29,6 +29,8 @@ class TrajectoryGenerator final : public rtcf::Component {
     static_assert(kMostJoints == SynchronizedMotion::kMostAxes);
     // Of a trajectory from a component of the loop, without allocation.
     static constexpr std::size_t kReservedPoints = 128;
+    // Periods by which a late cycle moves on at most.
+    static constexpr std::int64_t kLongestStep = 10;
     // Rounding errors of positions and velocities that are compared with their limits, relative.
     static constexpr double kLimitTolerance = 1e-9;
 
@@ -194,6 +196,7 @@ class TrajectoryGenerator final : public rtcf::Component {
         std::size_t current = 0;
         TrajectoryPoints points;
         std::uint64_t points_id = 0;
+        std::optional<std::uint64_t> dropped;          // by the queue, up to the last cycle
         std::array<std::size_t, kMostJoints> order{};  // index of each joint in a message
     };
 
@@ -235,27 +238,41 @@ class TrajectoryGenerator final : public rtcf::Component {
         rtcf::Choice("present", SafePosition::Present),
         rtcf::Choice("stop", SafePosition::Stop),
         rtcf::Doc("position in the last cycle: the present one, or the end of the fastest stop")};
+    rtcf::Parameter<double> measurement_timeout{
+        this,           "measurement_timeout", 0.2,
+        rtcf::Min(0.0), rtcf::Unit("s"),       rtcf::Doc("largest age of measured at the start")};
     rtcf::Derived<Setup> setup_{this};
 
-    rtcf::State<bool> begun_{this, "begun", false, rtcf::Doc("the start position is known")};
-    rtcf::State<bool> halted_{this, "halted", false, rtcf::Doc("stopped by halt or idle")};
-    rtcf::State<std::int64_t> time_{this, "time", 0, rtcf::Unit("ns"),
-                                    rtcf::Doc("time since the start")};
-    rtcf::State<Task> task_{this, "task", {}, rtcf::Doc("motion to a target, or stop")};
-    rtcf::State<Numbers> position_{this, "position", {}, rtcf::Doc("commanded position")};
+    rtcf::State<bool> begun_{this, "begun", false, rtcf::Doc("the start position is known"),
+                             rtcf::Live()};
+    rtcf::State<bool> halted_{this, "halted", false, rtcf::Doc("stopped by halt or idle"),
+                              rtcf::Live()};
+    rtcf::State<std::int64_t> time_{
+        this, "time", 0, rtcf::Unit("ns"), rtcf::Doc("time since the start"), rtcf::Live()};
+    rtcf::State<Task> task_{
+        this, "task", {}, rtcf::Doc("motion to a target, or stop"), rtcf::Live()};
+    rtcf::State<Numbers> position_{
+        this, "position", {}, rtcf::Doc("commanded position"), rtcf::Live()};
     rtcf::State<Numbers> velocity_{
-        this, "commanded_velocity", {}, rtcf::Unit("1/s"), rtcf::Doc("commanded velocity")};
+        this,        "commanded_velocity", {}, rtcf::Unit("1/s"), rtcf::Doc("commanded velocity"),
+        rtcf::Live()};
     rtcf::State<Numbers> acceleration_{this,
                                        "commanded_acceleration",
                                        {},
                                        rtcf::Unit("1/s^2"),
-                                       rtcf::Doc("commanded acceleration")};
+                                       rtcf::Doc("commanded acceleration"),
+                                       rtcf::Live()};
     rtcf::State<std::uint64_t> points_id_{this, "trajectory_number", 0,
-                                          rtcf::Doc("number of the trajectory; 0 = none")};
+                                          rtcf::Doc("number of the trajectory; 0 = none"),
+                                          rtcf::Live()};
     rtcf::State<std::uint64_t> last_id_{this, "last_trajectory_number", 0,
-                                        rtcf::Doc("number of the last trajectory")};
-    rtcf::State<std::int64_t> points_begin_{this, "trajectory_begin", 0, rtcf::Unit("ns"),
-                                            rtcf::Doc("time at which the trajectory begins")};
+                                        rtcf::Doc("number of the last trajectory"), rtcf::Live()};
+    rtcf::State<std::int64_t> points_begin_{this,
+                                            "trajectory_begin",
+                                            0,
+                                            rtcf::Unit("ns"),
+                                            rtcf::Doc("time at which the trajectory begins"),
+                                            rtcf::Live()};
     rtcf::State<std::uint32_t> rejected_{this, "rejections", 0,
                                          rtcf::Doc("number of rejected targets and trajectories")};
 
@@ -377,18 +394,22 @@ class TrajectoryGenerator final : public rtcf::Component {
         // Others move the joints: in each cycle, begins again where they are.
         const bool idles = idle.read() != rtcf::DataStatus::None && idle.value();
         if (idles && measured.read() != rtcf::DataStatus::None) begun_ = false;
+        // A lost trajectory may have been a stop, or the newest of several.
+        const std::uint64_t dropped = trajectory.dropped();
+        const bool lost = begun_ && dropped != memory_->dropped.value_or(dropped);
+        memory_->dropped = dropped;
         const bool stop = (halt.read() != rtcf::DataStatus::None && halt.value()) || idles;
-        if (stop) rejectMessages();
+        if (stop || lost) rejectMessages(stop ? "halted" : "another one was lost in a full queue");
         const std::int64_t last = begun_ ? time_.value() : 0;  // of the present motion
         if (begun_) {
-            time_ += elapsed();
+            time_ += std::min(elapsed(), kLongestStep * period());
         } else if (!begin()) {
             rejected.write(rejected_);
             return;
         }
         restore(last);
         adoptLimits(last);
-        if (stop && !halted_) stopFrom(last);
+        if ((stop && !halted_) || lost) stopFrom(last);
         halted_ = stop;
         if (target.read() == rtcf::DataStatus::New) follow(target.value(), last);
         // At most one in each cycle: its number of points bounds the work.
@@ -430,9 +451,9 @@ class TrajectoryGenerator final : public rtcf::Component {
                            why);
     }
     // Leaves no target and no trajectory that would be followed after the stop.
-    void rejectMessages() {
-        if (target.read() == rtcf::DataStatus::New) reject("target", "halted");
-        for (; trajectory.front() != nullptr; trajectory.pop()) reject("trajectory", "halted");
+    void rejectMessages(const char* why) {
+        if (target.read() == rtcf::DataStatus::New) reject("target", why);
+        for (; trajectory.front() != nullptr; trajectory.pop()) reject("trajectory", why);
     }
 
     // Finds the index of each joint in a message. Without names, joints have the order of the
@@ -464,6 +485,10 @@ class TrajectoryGenerator final : public rtcf::Component {
         if (!has_measured) {
             if (!setup_->has_initial) return false;
             for (std::size_t i = 0; i < count(); ++i) standAt(i, setup_->initial[i]);
+        } else if (seconds(measured.age(this)) > measurement_timeout) {
+            RTCF_WARN_THROTTLE(this, 1.0, "measured is older than measurement_timeout");
+            rejectMessages("measured is too old");
+            return false;
         } else {
             const sensor_msgs::JointState& state = measured.value();
             const std::size_t missing = firstMissing(state.name);
@@ -533,31 +558,28 @@ class TrajectoryGenerator final : public rtcf::Component {
 
     // New limits take effect by a new plan from the present motion.
     void adoptLimits(std::int64_t last) {
-        bool same = true;
-        for (std::size_t i = 0; i < count(); ++i) {
-            const MotionLimits& limits = setup_->limits[i];
-            const MotionLimits before = task_->limits(i);
-            same = same && limits.velocity == before.velocity &&
-                   limits.acceleration == before.acceleration && limits.jerk == before.jerk;
-            const double wanted = task_->target_position[i];
-            same = same && (task_->kind != Kind::Target ||
-                            wanted == std::clamp(wanted, setup_->lower[i], setup_->upper[i]));
-        }
-        if (same) return;
+        Task task = task_;
+        for (std::size_t i = 0; i < count(); ++i) task.setLimits(i, *setup_);
+        if (!(task != task_.value())) return;
         if (followsTrajectory(last)) {
-            // The task only shows the limits, which the next cycles check.
-            Task task = task_;
-            for (std::size_t i = 0; i < count(); ++i) task.setLimits(i, *setup_);
+            // The task only shows the limits.
             task.kind = Kind::Stop;
             task_ = task;
             makePlan();
+            for (std::size_t i = 0; i < count(); ++i) {
+                if (!staysAllowed(i, last)) {
+                    reject("rest of the trajectory", i, "it exceeds the new limits");
+                    stopFrom(last);
+                    return;
+                }
+            }
             return;
         }
         if (!points().empty()) reject("waiting trajectory", "the limits have changed");
         const Task before = task_;
         stopFrom(last);
         if (before.kind != Kind::Target) return;
-        Task task = task_;
+        task = task_;
         task.kind = Kind::Target;
         for (std::size_t i = 0; i < count(); ++i) {
             const double limit = setup_->limits[i].velocity;
@@ -565,6 +587,21 @@ class TrajectoryGenerator final : public rtcf::Component {
                       std::clamp(before.target_velocity[i], -limit, limit));
         }
         adopt(task, "target");
+    }
+
+    // True if the trajectory under way is within the limits from a time on.
+    bool staysAllowed(std::size_t i, std::int64_t time) const {
+        const TrajectoryPoints& points = memory_->points;
+        const double limit = setup_->limits[i].velocity * (1.0 + kLimitTolerance);
+        if (std::abs(velocity_.value()[i]) > limit) return false;
+        for (std::size_t k = std::max<std::size_t>(1, points.countBefore(time)); k < points.size();
+             ++k) {
+            const double duration = seconds(points.time(k) - points.time(k - 1));
+            if (violation(i, points.motions(k - 1)[i], points.motions(k)[i], points.kind(k),
+                          duration) != nullptr)
+                return false;
+        }
+        return true;
     }
 
     // A target beyond the limits of position becomes one at the limit, at rest.

@@ -53,7 +53,7 @@ class RateLimiter(_Block):
     falling: Parameter[float] = Parameter(
         math.inf, min=0.0, unit="1/s", doc="largest rate downwards; 0 holds"
     )
-    last: State[float | None]
+    last: State[float | None] = State(live=True)
 
     def start(self):
         self.last = None
@@ -66,7 +66,8 @@ class RateLimiter(_Block):
             self.y.write(value)  # rejected as not finite: readers keep the last output
             return
         before = value if self.last is None else self.last
-        self.last = np.clip(value, before - self.falling * self.dt, before + self.rising * self.dt)
+        step = min(self.dt, 1e-8 * self.period)  # of a late cycle: ten periods at most
+        self.last = np.clip(value, before - self.falling * step, before + self.rising * step)
         self.y.write(self.last)
         self.limited.write(self.last != value)
 

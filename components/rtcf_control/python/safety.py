@@ -46,13 +46,19 @@ class CommandTimeout(Component):
         math.inf, min=0.0, unit="1/s", doc="rate of change to the command after a stop"
     )
 
-    latched: State[bool] = State(False, doc="the command is stopped")
-    fresh: State[bool] = State(False, doc="a command has come after the reason to stop has ended")
-    pressed: State[bool] = State(True, doc="last value of reset: at first as if it was stuck")
-    silence: State[int] = State(0, unit="ns", doc="time since the last command")
-    last: State[float] = State(0.0, doc="the last output")
-    begun: State[bool] = State(False, doc="the first command has come")
-    resumes: State[bool] = State(False, doc="the output moves to the command at resume_rate")
+    latched: State[bool] = State(False, doc="the command is stopped", live=True)
+    fresh: State[bool] = State(
+        False, doc="a command has come after the reason to stop has ended", live=True
+    )
+    pressed: State[bool] = State(
+        True, doc="last value of reset: at first as if it was stuck", live=True
+    )
+    silence: State[int] = State(0, unit="ns", doc="time since the last command", live=True)
+    last: State[float] = State(0.0, doc="the last output", live=True)
+    begun: State[bool] = State(False, doc="the first command has come", live=True)
+    resumes: State[bool] = State(
+        False, doc="the output moves to the command at resume_rate", live=True
+    )
 
     def start(self):
         self.latched = False
@@ -81,7 +87,7 @@ class CommandTimeout(Component):
 
     def move(self, target, rate):
         """Move the output towards a value."""
-        step = rate * self.dt
+        step = rate * min(self.dt, 1e-8 * self.period)  # of a late cycle: ten periods at most
         self.last = np.clip(target, self.last - step, self.last + step)
 
     def update(self):
@@ -183,15 +189,15 @@ class JointLimiter(Component):
     frozen_timeout: Parameter[float] = Parameter(
         math.inf, min=0.0, unit="s", doc="the same for a measured value that does not change"
     )
-    last: State[float | None] = State(doc="the last output")
+    last: State[float | None] = State(doc="the last output", live=True)
     pace: State[float] = State(
-        0.0, unit="rad/s", doc="velocity of the last position or velocity command"
+        0.0, unit="rad/s", doc="velocity of the last position or velocity command", live=True
     )
-    last_wanted: State[float] = State(0.0, doc="last wanted position")
+    last_wanted: State[float] = State(0.0, doc="last wanted position", live=True)
     travel: State[float] = State(
-        0.0, unit="rad", doc="way of the joint since the last position, estimated"
+        0.0, unit="rad", doc="way of the joint since the last position, estimated", live=True
     )
-    kind: State[int] = State(-1, doc="command of the last cycle")
+    kind: State[int] = State(-1, doc="command of the last cycle", live=True)
     silence: State[np.int64, 2] = State(
         unit="ns", doc="age of the last finite value of each measured input"
     )
@@ -244,9 +250,14 @@ class JointLimiter(Component):
         return self.needs_position or math.isfinite(self.max_velocity)
 
     @property
+    def step(self):
+        """Return the time by which a command moves on, in s: ten periods at most."""
+        return min(self.dt, 1e-8 * self.period)
+
+    @property
     def longest_period(self):
         """Return the period in s, or the time of a longer cycle."""
-        return max(1e-9 * self.period, self.dt)
+        return max(1e-9 * self.period, self.step)
 
     def note(self, i, value, age):
         """Note a measured value that is needed."""
@@ -301,9 +312,9 @@ class JointLimiter(Component):
         disagree, braking before lower and upper comes first, then the acceleration, then soft
         limits and max_velocity.
         """
-        step = self.deceleration * self.dt
-        slowest = self.pace - step
-        fastest = self.pace + step
+        change = self.deceleration * self.step
+        slowest = self.pace - change
+        fastest = self.pace + change
         low = np.clip(self.softened(self.soft_lower, below), slowest, fastest)
         high = np.clip(self.softened(self.soft_upper, above), slowest, fastest)
         down = -self.towards(below - self.lower, -self.pace)
@@ -328,7 +339,7 @@ class JointLimiter(Component):
         """Return the position of this cycle on the way from another one. `wanted` may move itself:
         the way slows down before it relative to its velocity.
         """
-        h = self.dt
+        h = self.step
         target = np.clip(wanted, self.lower, self.upper)
         drift = (target - self.last_wanted) / h
         distance = self.last_wanted - start
@@ -352,8 +363,8 @@ class JointLimiter(Component):
 
     def slower(self):
         """Return a velocity on the way to 0."""
-        step = self.deceleration * self.dt
-        return np.clip(self.pace, -max(0.0, -self.pace - step), max(0.0, self.pace - step))
+        change = self.deceleration * self.step
+        return np.clip(self.pace, -max(0.0, -self.pace - change), max(0.0, self.pace - change))
 
     def send(self, wanted, value):
         """Write the limited value of a command."""
@@ -367,6 +378,8 @@ class JointLimiter(Component):
         """
         self.last_wanted = np.clip(wanted, self.lower, self.upper)
         if not self.position.valid:
+            if self.position.connected:
+                return False  # it has not come yet
             self.last = self.last_wanted
             return True
         x = self.position.value
@@ -381,13 +394,14 @@ class JointLimiter(Component):
         if self.kind != self.command:
             self.last = None  # another quantity
         self.kind = self.command
+        moved = self.position.new and math.isfinite(x) and x != self.last_finite[0]
         needed = self.last is None if self.command is Command.position else self.needs_position
         if needed and self.position.valid:
             self.note(0, x, self.position.age)
         if self.command is Command.effort and self.needs_velocity and self.velocity.valid:
             self.note(1, v, self.velocity.age)
         pace = self.last_finite[1] if self.command is Command.effort else self.pace
-        if (self.position.new and math.isfinite(x)) or not math.isfinite(pace):
+        if moved or not math.isfinite(pace):
             self.travel = 0.0
         else:
             self.travel += pace * self.dt

@@ -45,6 +45,17 @@ class TrajectoryPoints {
     Motion* append(std::int64_t time, PointKind kind) noexcept RTCF_NONBLOCKING;
     /// The kind of the segment that contains a time.
     [[nodiscard]] PointKind kindAt(std::int64_t time) const noexcept RTCF_NONBLOCKING;
+    /// Time of a point, ns, the kind of the segment that ends there, and the motions of all joints.
+    /// @param index below size()
+    [[nodiscard]] std::int64_t time(std::size_t index) const noexcept RTCF_NONBLOCKING {
+        return heads_[slot(index)].time;
+    }
+    [[nodiscard]] PointKind kind(std::size_t index) const noexcept RTCF_NONBLOCKING {
+        return heads_[slot(index)].kind;
+    }
+    [[nodiscard]] const Motion* motions(std::size_t index) const noexcept RTCF_NONBLOCKING {
+        return &motions_[slot(index) * joints_];
+    }
     /// The motion of a joint from begin() to end(). The list is not empty.
     [[nodiscard]] Motion at(std::size_t joint, std::int64_t time) const noexcept RTCF_NONBLOCKING;
     /// The motion of a joint at the last point. The list is not empty.
@@ -61,12 +72,6 @@ class TrajectoryPoints {
     // Points are kept in a ring.
     [[nodiscard]] std::size_t slot(std::size_t index) const noexcept {
         return (first_ + index) % kCapacity;
-    }
-    [[nodiscard]] std::int64_t time(std::size_t index) const noexcept {
-        return heads_[slot(index)].time;
-    }
-    [[nodiscard]] const Motion* motions(std::size_t index) const noexcept {
-        return &motions_[slot(index) * joints_];
     }
     // The index of the point at which the segment that contains a time ends.
     [[nodiscard]] std::size_t segmentEnd(std::int64_t time) const noexcept;

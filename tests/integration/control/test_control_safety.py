@@ -6,6 +6,7 @@ their references by less than ROUNDING.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 import rtcf
 from block_bench import Blocks, Stepped, rejection
+from daemon_process import wait_for
 from hypothesis import given, seed, settings
 from hypothesis import strategies as st
 from rtcf.testing import Bench
@@ -171,14 +173,83 @@ def test_a_stop_of_a_position_comes_to_a_standstill(blocks: Blocks) -> None:
     assert not off[1500:].any()
     assert np.diff(out[1499:]).max() == pytest.approx(0.004, abs=ROUNDING)
     assert out[-1] == wanted[-1]
-    at_once = blocks.out("EStop", inputs, start_stopped=False, mode="standstill")
+    at_once = blocks.out("EStop", inputs, start_stopped=False, mode="standstill", resume_rate=4.0)
     assert (at_once[500:1500] == at_once[499]).all()
+
+
+@pytest.mark.parametrize("held", [False, True], ids=["sent at 50 Hz", "held between steps"])
+def test_a_stop_of_a_slow_command_brakes_from_its_velocity(blocks: Blocks, held: bool) -> None:
+    cycle = np.arange(1000)
+    steps = 0.02 * (cycle // 20)  # 1 per second
+    wanted = steps if held else MASKED.array(steps, mask=cycle % 20 != 0)
+    for late in range(20):
+        inputs = {"in": wanted, "stop1": levels(1000, (300 + late, 1000))}
+        out = blocks.out("EStop", inputs, start_stopped=False, mode="standstill",
+                         deceleration=4.0, resume_rate=4.0)  # fmt: skip
+        way = out[-1] - out[299 + late]
+        assert 0.0 < way <= 1.0 / 8.0 + 0.001, late
+        assert (out[600:] == out[600]).all()
+
+
+def test_a_jump_of_a_command_is_no_velocity(blocks: Blocks) -> None:
+    wanted = np.where(np.arange(1000) < 300, 0.0, 0.5)
+    inputs = {"in": wanted, "stop1": levels(1000, (301, 1000))}
+    out = blocks.out("EStop", inputs, start_stopped=False, mode="standstill",
+                     deceleration=4.0, resume_rate=4.0)  # fmt: skip
+    assert (out[300:] == 0.5).all()
+
+
+def test_a_standstill_needs_a_resume_rate(stepped: Bench) -> None:
+    with pytest.raises(rtcf.RefusedError, match="mode = standstill needs a resume_rate"):
+        Stepped(stepped, "EStop", mode="standstill")
+
+
+def test_a_running_loop_keeps_its_stops(stepped: Bench) -> None:
+    client = stepped.client
+    block = Stepped(stepped, "EStop", start_stopped=False)
+    try:
+        block.step(**{"in": 1.0, "stop1": False, "reset": False})
+        taken = client.take_snapshot().snapshot
+        client.start()
+        client.write("/stepped/block.stop1", True)
+        wait_for(lambda: block.state["latch"]["stopped"], "the stop")
+        client.restore_snapshot(taken)
+        client.write("/stepped/block.stop1", False)
+        with pytest.raises(rtcf.RefusedError, match=r"all state of /stepped/block is live"):
+            client.reset_state("/stepped/block")
+        time.sleep(0.05)
+        assert block.state["latch"]["stopped"]
+        client.stop()
+        client.reset_state("/stepped/block")
+        assert not block.state["latch"]["stopped"]
+    finally:
+        client.stop()
+        block.unload()
+
+
+def test_a_required_stop_input_needs_its_writer(stepped: Bench) -> None:
+    client = stepped.client
+    block = Stepped(stepped, "EStop", start_stopped=False)
+    client.load(rtcf.component("rtcf_examples", "Mimo", name="writer", ns="/button",
+                               remaps=["out1:=/value", "out2:=/other"]))  # fmt: skip
+    client.load(rtcf.component("rtcf_control", "Comparator", name="button", ns="/button",
+                               remaps=["in:=/value", "out:=/stepped/stop1"],
+                               parameters=["threshold:=1e9"]))  # fmt: skip
+    try:
+        for _ in range(3):
+            state = block.step(**{"in": 1.0})
+        assert not state["latch"]["stopped"]
+        client.unload(["/button/button"])
+        assert block.step()["latch"]["stopped"], "its writer has gone"
+    finally:
+        client.unload(["/button/writer"])
+        block.unload()
 
 
 def test_a_standstill_begins_with_the_first_command(blocks: Blocks) -> None:
     wanted = MASKED.array(np.linspace(0.8, 1.8, 100), mask=np.arange(100) < 20)
     values = blocks.run("EStop", {"in": wanted, "stop1": False, "reset": levels(100, (60, 61))},
-                        mode="standstill")  # fmt: skip
+                        mode="standstill", resume_rate=1e9)  # fmt: skip
     assert np.isnan(values["out"][:20]).all()
     assert (values["out"][20:60] == wanted[20]).all()
     assert values["out"][60:].tolist() == wanted[60:].tolist()
@@ -187,7 +258,8 @@ def test_a_standstill_begins_with_the_first_command(blocks: Blocks) -> None:
 @pytest.mark.parametrize("stopped", [False, True], ids=["in motion", "on the way to a standstill"])
 def test_the_last_cycle_holds_a_position_where_it_is(stepped: Bench, stopped: bool) -> None:
     client = stepped.client
-    block = Stepped(stepped, "EStop", start_stopped=False, mode="standstill", deceleration=5.0)
+    block = Stepped(stepped, "EStop", start_stopped=False, mode="standstill", deceleration=5.0,
+                    resume_rate=1.0)  # fmt: skip
     client.load(rtcf.component("rtcf_examples", "Identity", name="reader", ns="/reader",
                                remaps=["in:=/stepped/out"]))  # fmt: skip
     try:

@@ -226,6 +226,80 @@ def test_new_limits_and_a_replacement_do_not_jump(stepped: Bench) -> None:
         block.unload()
 
 
+def linear(position: float, seconds: int) -> str:
+    """Return a trajectory of one joint with one linear segment."""
+    return (
+        f"{{joint_names: [a], points: [{{positions: [{position}], "
+        f"time_from_start: {{secs: {seconds}, nsecs: 0}}}}]}}"
+    )
+
+
+@pytest.mark.parametrize("change", [{"velocity": '"0.05"'}, {"upper": '"0.3"'}, {"lower": '"0.2"'}])
+def test_the_rest_of_a_trajectory_keeps_new_limits(stepped: Bench, change: dict[str, str]) -> None:
+    block = Stepped(stepped, "TrajectoryGenerator", joints="a", initial='"0"', **QUOTED)
+    try:
+        block.step()
+        goal = -1.0 if "lower" in change else 1.0
+        before = block.step(300, trajectory=linear(goal, 2))
+        assert abs(before["commanded_velocity"][0]) == pytest.approx(0.5)
+        block.set(**change)
+        after = block.step(1000)
+        assert after["rejections"] == 1
+        assert after["commanded_velocity"][0] == 0.0
+        assert abs(after["position"][0]) < 0.35
+    finally:
+        block.unload()
+
+
+def test_a_stop_under_way_keeps_a_new_limit_of_position(stepped: Bench) -> None:
+    block = Stepped(stepped, "TrajectoryGenerator", joints="a", initial='"0"', **QUOTED)
+    try:
+        block.step()
+        state = block.step(800, target="{position: [9.0]}")
+        assert state["commanded_velocity"][0] == pytest.approx(VELOCITY)
+        block.step(halt=True)
+        brakes_in = VELOCITY**2 / (2.0 * ACCELERATION)
+        limit = state["position"][0] + brakes_in + 0.02  # without a jerk limit, it stands before
+        block.set(upper=f'"{limit}"')
+        farthest = max(block.step(10)["position"][0] for _ in range(200))
+        assert farthest <= limit + ROUNDING
+        assert block.state["commanded_velocity"][0] == 0.0
+    finally:
+        block.unload()
+
+
+def test_a_lost_trajectory_stops_the_joints(stepped: Bench) -> None:
+    block = Stepped(stepped, "TrajectoryGenerator", joints="a", initial='"0"', **QUOTED)
+    try:
+        block.step()
+        assert block.step(300, trajectory=linear(1.0, 2))["rejections"] == 0
+        for number in range(12):
+            block.write(trajectory=linear(1.0 + number, 20))
+        block.write(trajectory="{points: []}")
+        after = block.step(1000)
+        assert after["commanded_velocity"][0] == 0.0
+        assert after["position"][0] < 0.4
+        assert after["rejections"] == 8
+        block.step(100, trajectory=linear(1.0, 2))
+        assert block.state["commanded_velocity"][0] > 0.0, "the next one is followed"
+    finally:
+        block.unload()
+
+
+def test_an_old_measured_position_begins_no_motion(stepped: Bench) -> None:
+    block = Stepped(stepped, "TrajectoryGenerator", joints="a", **QUOTED)
+    try:
+        block.step(300, measured="{name: [a], position: [0.5]}", idle=True)
+        after = block.step(300, idle=False, target="{position: [1.0]}")
+        assert after["rejections"] >= 1
+        assert not after["begun"]
+        after = block.step(measured="{name: [a], position: [0.3]}")
+        assert after["position"][0] == 0.3
+        assert block.step(300)["position"][0] == 0.3, "no target from before"
+    finally:
+        block.unload()
+
+
 def test_a_snapshot_continues_a_motion_to_a_target_bit_by_bit(stepped: Bench) -> None:
     block = Stepped(stepped, "TrajectoryGenerator", joints="a b", initial="0 1", **QUOTED)
     try:

@@ -561,6 +561,16 @@ TEST(TrajectoryGenerator, StopsIfATrajectoryExceedsNewLimits) {
     }
 }
 
+TEST(TrajectoryGenerator, LateCycleMovesOnByTenPeriodsAtMost) {
+    Generator generator({0.0});
+    generator.target({10.0});
+    generator.bench.cycle(1500);
+    const double before = generator.now().position[0];
+    ASSERT_EQ(generator.now().velocity[0], kVelocity);
+    generator.bench.clock().elapsed_ns = 600'000'000;
+    EXPECT_NEAR(generator.next().position[0] - before, 10 * kStep * kVelocity, kRounding);
+}
+
 TEST(TrajectoryGenerator, StopsOnAnEmptyTrajectory) {
     Generator generator({0.0});
     generator.target({10.0});
