@@ -275,6 +275,6 @@ def test_a_stop_whose_node_has_ended_stops(
     client.write("/es/stop.in", "1.0")
     client.start()
     wait_for(lambda: iteration(client) > 100, "some cycles")
-    assert (value("out"), value("state")) == ("data: 1.0", "data: 0")
+    assert (value("out"), value("state")) == ("data: 1", "data: 0")
     button.kill()
     wait_for(lambda: value("state") == "data: 1", "the stop")
