@@ -15,7 +15,7 @@ from typing import NoReturn
 import grpc
 from rtcf.v1 import control_pb2, control_pb2_grpc, errors_pb2
 
-from rtcfd import VERSION, journal
+from rtcfd import VERSION, check_config, journal
 from rtcfd.access.admission import Admission
 from rtcfd.access.clients import Clients, GrpcSockets
 from rtcfd.access.endpoint import Endpoint
@@ -38,7 +38,6 @@ from rtcfd.runners.runner_leases import await_holder
 from rtcfd.runners.runners import Runners
 from rtcfd.service.control import Control
 from rtcfd.state import handover
-from rtcfd.state.boot_graphs import BootGraphs
 from rtcfd.state.desired import Desired
 from rtcfd.state.saver import Disk
 from rtcfd.state.store import Store
@@ -351,9 +350,7 @@ def _reload(wanted: options.Reload) -> int:
 
 def _check(arguments: Sequence[str] | None, build_tree: Path | None) -> int:
     """Check settings and graphs, and print the errors."""
-    log.addHandler(logging.NullHandler())  # the errors are printed, not logged
-    given = options.parse(arguments, build_tree)
-    _, problems = BootGraphs(given.graphs_dir, {}, given.settings_error).read()
+    problems = check_config.check(arguments, build_tree)
     for problem in problems:
         print(f"rtcfd: {problem}", file=sys.stderr)
     if not problems:
@@ -381,11 +378,11 @@ def main(arguments: Sequence[str] | None = None, build_tree: Path | None = None)
             return _reload(wanted)
         if options.check_wanted(arguments):
             return _check(arguments, build_tree)
-        given = options.parse(arguments, build_tree, last_good=True)
+        given = options.parse(arguments, build_tree, last_good=True, writable=True)
         journal.set_up(given.verbose)
         if given.settings.problem:
             log.error("%s", given.settings.problem)
-        asyncio.run(_run(given, lambda: options.parse(arguments, build_tree)))
+        asyncio.run(_run(given, lambda: options.parse(arguments, build_tree, writable=True)))
     except RequestError as error:
         print(f"rtcfd: {error}", file=sys.stderr)
         return REFUSED

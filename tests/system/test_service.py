@@ -85,6 +85,29 @@ def test_a_reload_of_bad_settings_is_rejected_with_the_line(service: Service) ->
     assert service.status()["state"] == "running"
 
 
+def test_the_check_finds_what_the_service_cannot_read_or_write(service: Service) -> None:
+    machine = service.machine
+    assert machine.run("rtcfd", "--check-config").stdout == "settings and graphs are valid\n"
+    machine.path(SETTINGS).write_text('[daemon]\nstate_dir = "/var/lib/rtcf2"\n')
+    graph = machine.path("/etc/rtcfd/graphs.d/a.yaml")
+    graph.write_text("components: []\n")
+    graph.chmod(0o600)
+    done = machine.run("rtcfd", "--check-config", check=False)
+    assert done.returncode == 1
+    assert "cannot read /etc/rtcfd/graphs.d/a.yaml: Permission denied" in done.stderr
+    assert "daemon.state_dir: /var/lib/rtcf2 is read-only in the sandbox" in done.stderr
+    assert "`systemctl edit rtcfd` with StateDirectory=rtcfd rtcf2 under" in done.stderr
+    # The service finds the same, and keeps its settings.
+    before = service.pid
+    assert service.systemctl("reload", "rtcfd.service", check=False).returncode != 0
+    assert "daemon.state_dir: /var/lib is read-only" in service.ctl("status").stdout
+    service.systemctl("restart", "rtcfd.service")
+    assert service.pid != before
+    assert "the last good settings are used instead" in service.ctl("status").stdout
+    graph.unlink()
+    service.configure("")
+
+
 def test_a_service_with_bad_settings_uses_the_last_good_ones(service: Service) -> None:
     executor = service.load_and_start()["pid"]
     service.configure("[runner]\nfrequency_hz = 0\n")

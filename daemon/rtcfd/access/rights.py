@@ -128,6 +128,15 @@ class Access:
             user=peer.user,
         )
 
+    def unknown(self) -> list[str]:
+        """Return the users and @groups of the rules that do not exist.
+
+        May block: asks the user database.
+        """
+        names = {*self.users, *(f"@{group}" for group in self.groups)}
+        names.update(name for rule in self.parameters for name in rule.who)
+        return sorted(name for name in names if not _exists(name))
+
     def for_executors(self, control_socket: Path) -> wire.AccessRules:
         """Return the rules with uids and gids, and the permissions of the control socket.
 
@@ -152,6 +161,14 @@ class Access:
             found.door_group = there.st_gid
         found.door_open = bool(there.st_mode & stat.S_IWOTH)
         return found
+
+
+def _exists(name: str) -> bool:
+    try:
+        grp.getgrnam(name[1:]) if name.startswith("@") else pwd.getpwnam(name)
+    except KeyError:
+        return False
+    return True
 
 
 def rules(

@@ -35,17 +35,19 @@ class Settings:
         folder: Path | None,
         last_good: bool,
         settings_error: settings_file.SettingsError = lambda _: "",
+        *,
+        writable: bool = False,
     ) -> "Settings":
         """Read `file`, unless it is None; the copy is in `folder`.
 
-        `settings_error` is for settings_file.read.  Raises RequestError for a bad file; with
-        `last_good`, only if there is no good copy either.
+        `settings_error` and `writable` are for settings_file.read.  Raises RequestError for a bad
+        file; with `last_good`, only if there is no good copy either.
         """
         copy = folder / _NAME if folder else None
         if file is None:
             return Settings()
         try:
-            return Settings(settings_file.read(file, settings_error), _copy=copy)
+            return Settings(settings_file.read(file, settings_error, writable=writable), _copy=copy)
         except RequestError as error:
             if not last_good or copy is None or not _is_there(copy):
                 raise

@@ -59,11 +59,16 @@ class Options:
 
 
 def parse(
-    arguments: Sequence[str] | None, build_tree: Path | None, *, last_good: bool = False
+    arguments: Sequence[str] | None,
+    build_tree: Path | None,
+    *,
+    last_good: bool = False,
+    writable: bool = False,
 ) -> Options:
     """Return the options; raises RequestError for a bad file, exits with 2 on bad usage.
 
-    With `last_good`, the service uses the last good settings instead of bad ones.
+    With `last_good`, the service uses the last good settings instead of bad ones.  With `writable`,
+    settings are bad if this process cannot write to their folders.
     """
     args = _parser(build_tree).parse_args(arguments)
 
@@ -75,6 +80,7 @@ def parse(
         _kept_folder(args),
         last_good,
         lambda file: settings_error(executor(file), file.runner),
+        writable=writable,
     )
     file = settings.found
     socket = _socket(args, file)
@@ -221,7 +227,9 @@ def _parser(build_tree: Path | None) -> argparse.ArgumentParser:
     parser.add_argument(
         "--check-config",
         action="store_true",
-        help="check settings and graphs, and exit with status 0 (valid) or 1",
+        help="check settings and graphs, their components and users, and exit with status 0 "
+        "(valid) or 1; as root, without --config, also what the user of the service may read and "
+        "write",
     )
     parser.add_argument("--verbose", action="store_true", help="log debugging messages too")
     return parser
@@ -280,6 +288,12 @@ def _socket(args: argparse.Namespace, file: settings_file.Config) -> Path:
 def check_wanted(arguments: Sequence[str] | None) -> bool:
     """Return whether the command line has --check-config."""
     return bool(_parser(None).parse_args(arguments).check_config)
+
+
+def checks_service(arguments: Sequence[str] | None) -> bool:
+    """Return whether the checked settings are those of the installed service."""
+    args = _parser(None).parse_args(arguments)
+    return args.config is None and not args.foreground
 
 
 def _folders(named: Sequence[Path], build_tree: Path | None) -> list[Folder]:

@@ -12,6 +12,7 @@ error with its name and line.
 """
 
 import math
+import os
 import re
 import tomllib
 from collections import Counter
@@ -74,10 +75,13 @@ class _InvalidKey(InvalidArgument):
         self.key = key
 
 
-def read(file: Path, settings_error: SettingsError = lambda _: "") -> Config:
+def read(
+    file: Path, settings_error: SettingsError = lambda _: "", *, writable: bool = False
+) -> Config:
     """Read a configuration file; raises RequestError with the file, the line and the error.
 
-    `settings_error` asks an executor whether it accepts the settings of runners.
+    `settings_error` asks an executor whether it accepts the settings of runners.  With `writable`,
+    this process must be able to write to the named folders.
     """
     text, document = _document(file)
     config = Config(text=text)
@@ -85,6 +89,8 @@ def read(file: Path, settings_error: SettingsError = lambda _: "") -> Config:
         _check_numbers(document, "")
         _check_keys("", document, ("daemon", "access", "limits", "runner"))
         _read_daemon(_table(document, "daemon"), config)
+        if writable:
+            _require_writable(config)
         _read_access(_table(document, "access"), config)
         _read_limits(_table(document, "limits"), config)
         _read_message(_table(document, "runner"), "runner", config.runner)
@@ -182,6 +188,30 @@ def _read_daemon(table: dict[str, Any], config: Config) -> None:
     if "realtime" in table:
         _enumerator("daemon.realtime", runner_pb2.Realtime.DESCRIPTOR, table["realtime"])
         config.realtime = table["realtime"]
+
+
+def _require_writable(config: Config) -> None:
+    for name in ("state_dir", "runtime_dir"):
+        folder: Path | None = getattr(config, name)
+        if folder is not None and (why := unwritable(folder)):
+            raise _InvalidKey(f"daemon.{name}", f"daemon.{name}: {why}")
+
+
+def unwritable(folder: Path) -> str:
+    """Return why this process cannot write to a folder, which may not exist yet; empty = it can."""
+    there = folder
+    while not os.path.exists(there):
+        there = there.parent
+    if not there.is_dir():
+        return f"{there} is not a folder"
+    if os.access(there, os.W_OK | os.X_OK):
+        return ""
+    if os.statvfs(there).f_flag & os.ST_RDONLY:
+        return (
+            f"{there} is read-only: in the sandbox of the service, `systemctl edit rtcfd` with "
+            f"ReadWritePaths={folder} under [Service] permits it"
+        )
+    return f"user {os.geteuid()} may not write to {there}: change its owner"
 
 
 def _read_access(table: dict[str, Any], config: Config) -> None:

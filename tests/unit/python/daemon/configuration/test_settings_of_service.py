@@ -14,6 +14,7 @@ import pytest
 import rtcf
 from daemon_process import BUILD_TREE
 from daemon_under_test import DaemonUnderTest
+from rtcfd.check_config import unit_of
 from rtcfd.common.errors import RequestError
 from rtcfd.configuration import options
 from rtcfd.configuration.last_good import Settings
@@ -376,15 +377,112 @@ def test_a_reload_restores_folder_permissions_changed_by_systemd(
     assert {n: f.stat().st_mode & 0o777 for n, f in folders.items()} == modes
 
 
+def check_of(daemon: DaemonUnderTest) -> tuple[str, ...]:
+    """Return the arguments that check the settings and graphs of a daemon."""
+    return (
+        *("--check-config", "--config", str(daemon.settings)),
+        *("--graphs-dir", str(daemon.graphs), "--executor", str(daemon.executor)),
+        *("--path", str(daemon.packages)),
+    )
+
+
+@pytest.mark.parametrize(
+    ("component", "said"),
+    [
+        ("package: gone, type: Fine", '/a: no package "gone" with component libraries in '),
+        ("package: demo, type: Fien", '/a: no type "Fien" in package "demo"; did you mean "Fine"?'),
+        ("package: demo, type: Fine, parameters: {kp: -1}", "/a: parameter kp = -1 is below its"),
+        ("package: demo, type: Fine, parameters: {ki: 1}", "/a has no parameter ki"),
+    ],
+    ids=["package", "type", "range", "parameter"],
+)
+def test_the_components_of_graphs_are_checked(
+    stopped_daemon: DaemonUnderTest, component: str, said: str
+) -> None:
+    daemon = stopped_daemon
+    daemon.settings.touch()
+    daemon.graphs.mkdir()
+    graph = daemon.graphs / "a.yaml"
+    graph.write_text(f"components:\n  - {{{component}, name: a}}\n")
+    done = rtcfd(daemon, *check_of(daemon))
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith(f"rtcfd: {graph}: {said}")
+    assert done.stderr.count("\n") == 1
+
+
+def test_unknown_users_of_access_rules_are_errors_of_the_check(
+    stopped_daemon: DaemonUnderTest,
+) -> None:
+    daemon = stopped_daemon
+    daemon.settings.write_text(
+        '[access]\noperate = ["root", "alcie"]\ntune = ["@root", "@opreators"]\n'
+        '[[access.parameters]]\nwho = ["bbo"]\n'
+    )
+    done = rtcfd(daemon, *check_of(daemon))
+    assert done.returncode == 1
+    assert done.stderr == (
+        "rtcfd: [access] names the unknown group opreators: correct the name, or add it\n"
+        "rtcfd: [access] names the unknown user alcie: correct the name, or add it\n"
+        "rtcfd: [access] names the unknown user bbo: correct the name, or add it\n"
+    )
+
+
+def test_a_state_folder_that_cannot_be_written_is_neither_loaded_nor_kept(
+    stopped_daemon: DaemonUnderTest,
+) -> None:
+    daemon = stopped_daemon
+    daemon.settings.write_text(GOOD)
+    daemon.start_service()
+    daemon.settings.write_text(f'[daemon]\nstate_dir = "{daemon.settings}/state"\n')
+    said = f"{daemon.settings}:2: daemon.state_dir: {daemon.settings} is not a folder"
+    done = rtcfd(daemon, "--reload")
+    assert (done.returncode, done.stdout) == (1, "")
+    assert said in done.stderr
+    daemon.end()
+    daemon.start_service()
+    with daemon.client() as client:
+        status = client.get_status()
+    assert status.runners[0].settings.frequency_hz == 250.0
+    assert status.notes[0].startswith(said)
+
+
+SHOWN = """\
+LoadState=loaded
+User=rtcf
+ProtectSystem=strict
+StateDirectory=rtcfd
+RuntimeDirectory=rtcfd/executors rtcfd/stop
+ReadWritePaths=-/srv/state
+"""
+
+
+@pytest.mark.parametrize(
+    ("folder", "said"),
+    [
+        ("/var/lib/rtcfd", ""),
+        ("/run/rtcfd/executors", ""),
+        ("/srv/state/rtcfd", ""),
+        ("/var/lib/rtcf2", "with StateDirectory=rtcfd rtcf2 under [Service] permits it"),
+        ("/opt/state", "with ReadWritePaths=/opt/state under [Service] permits it"),
+    ],
+)
+def test_the_check_knows_the_folders_that_the_sandbox_lets_the_service_write(
+    folder: str, said: str
+) -> None:
+    unit = unit_of(SHOWN)
+    assert unit is not None
+    assert unit.user == "rtcf"
+    error = unit.error("state_dir", Path(folder))
+    assert error.endswith(said) if said else not error
+    assert unit_of("LoadState=not-found\n") is None
+
+
 def test_settings_and_graphs_are_checked_without_a_daemon(stopped_daemon: DaemonUnderTest) -> None:
     daemon = stopped_daemon
     daemon.graphs.mkdir()
     daemon.settings.write_text(GOOD)
     (daemon.graphs / "a.yaml").write_text(GRAPH)
-    arguments = (
-        *("--check-config", "--config", str(daemon.settings)),
-        *("--graphs-dir", str(daemon.graphs)),
-    )
+    arguments = check_of(daemon)
     done = rtcfd(daemon, *arguments)
     assert (done.returncode, done.stdout) == (0, "settings and graphs are valid\n")
     (daemon.graphs / "a.yaml").write_text("components: 5\n")
@@ -452,10 +550,7 @@ def test_settings_of_a_graph_are_checked_together_with_the_defaults(
     daemon.settings.write_text("[runner]\nfrequency_hz = 100.0\n")
     daemon.graphs.mkdir()
     graph = daemon.graphs / "a.yaml"
-    check = (
-        *("--check-config", "--config", str(daemon.settings)),
-        *("--graphs-dir", str(daemon.graphs), "--executor", str(daemon.executor)),
-    )
+    check = check_of(daemon)
     # At most half a period: of 10 ms, not of the default 1 ms.
     graph.write_text("settings: {spin_us: 5000}\n" + GRAPH)
     assert rtcfd(daemon, *check).returncode == 0
