@@ -92,8 +92,15 @@ class Reloads:
                 if self._left and given.changed:
                     self._late.append(given)
                 continue
-            become(found.setdefault(given.runner, Desired(given.runner)), given.graph)
+            state = found.setdefault(given.runner, Desired(given.runner))
+            lines = become(state, given.graph)
             log.info("runner %s set up from %s", given.runner, given.file)
+            if lines:
+                state.replaced = (
+                    f"{given.file} replaced changes by hand: {', '.join(lines)}: to keep such "
+                    f"changes, write them to the file: `rtcfctl -r {given.runner} save FILE`"
+                )
+                log.warning("runner %s: %s", given.runner, state.replaced)
         return list(found.values())
 
     async def catch_up(self) -> None:

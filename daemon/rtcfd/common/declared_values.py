@@ -13,6 +13,7 @@ from rtcf_shared.naming import closest, listing, suggestion
 
 from rtcfd.common.errors import InvalidArgument, NotFound
 
+_LONGEST_WORD = 60  # characters of a value in a message
 _KINDS = {
     "bool_value": "a bool",
     "int_value": "an int",
@@ -49,6 +50,17 @@ def check(
             component=component,
             parameter=setting.name,
         )
+
+
+def plain(value: graph_pb2.ParameterValue) -> object:
+    """Return a value as a Python object; None if there is none."""
+    kind = value.WhichOneof("kind")
+    return None if kind is None else getattr(value, kind)
+
+
+def word(value: graph_pb2.ParameterValue) -> str:
+    """Return a value as text for a message."""
+    return f"{plain(value)}"[:_LONGEST_WORD]
 
 
 def set_vector_sizes(

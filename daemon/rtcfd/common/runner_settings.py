@@ -133,6 +133,18 @@ def differences(base: Settings, other: Settings, prefix: str = "") -> list[str]:
     return lines
 
 
+def replaced(before: Settings, after: Settings) -> list[str]:
+    """Return a line for each setting that both set, differently."""
+    both = type(after)()
+    for field, value in after.ListFields():
+        if field.message_type is None and before.HasField(field.name):
+            setattr(both, field.name, value)
+    lines = differences(before, both)
+    if isinstance(before, runner_pb2.RunnerSettings) and isinstance(after, type(before)):
+        lines += [f"ros.{line}" for line in replaced(before.ros, after.ros)]
+    return lines
+
+
 def _same(one: Any, other: Any) -> bool:
     # An executor counts in ns, so its values may be rounded.
     if isinstance(one, float):

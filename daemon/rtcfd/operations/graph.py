@@ -15,7 +15,7 @@ from rtcf_shared.naming import closest, listing, suggestion
 from rtcfd.access import caller
 from rtcfd.access.caller import Caller
 from rtcfd.catalog.catalog import loads, whole_graph
-from rtcfd.common import runner_settings
+from rtcfd.common import declared_values, runner_settings
 from rtcfd.common.errors import InvalidArgument, NoMaster, NotFound, RequestError
 from rtcfd.common.names import absolute, check_graph, full_name
 from rtcfd.executor.link import Progress
@@ -344,7 +344,9 @@ async def _ask_to_apply(
     for name, each in kept.items():
         result.notes.extend(each.notes)
         if each.kept:
-            words = ", ".join(f"{one.name} = {parameters.word(one.value)}" for one in each.kept)
+            words = ", ".join(
+                f"{one.name} = {declared_values.word(one.value)}" for one in each.kept
+            )
             result.notes.append(f"{name} keeps {words}, set since")
     stale = sorted({full_name(each) for each in request.components} & rebuilt.keys())
     if stale and not request.rebuilt:

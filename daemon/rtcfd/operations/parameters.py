@@ -17,13 +17,13 @@ from rtcfd.access import caller
 from rtcfd.access.caller import Caller
 from rtcfd.access.rights import require_pace
 from rtcfd.common import declared_values, ros_value
+from rtcfd.common.declared_values import plain, word
 from rtcfd.common.errors import FailedPrecondition, InvalidArgument, NotFound, RequestError
 from rtcfd.common.names import absolute
 from rtcfd.executor.link import Progress
 from rtcfd.operations.runner_core import Change, PendingParameters, RunnerCore
 from rtcfd.state.history import UNANSWERED, ParameterChange
 
-_LONGEST_WORD = 60  # characters of a value in a message
 _MOST_CHANGES = 500  # in one response
 _MOST_BYTES = 2 * 1024 * 1024  # in one response; other gRPC clients accept 4 MiB
 
@@ -307,7 +307,7 @@ def _is_adopted(found: graph_pb2.ParameterValue, given: graph_pb2.ParameterValue
     """Return whether a component has a value that was given to it, perhaps in single precision."""
     if same_value(found, given):
         return True
-    number = _plain(given)
+    number = plain(given)
     if not isinstance(number, int | float) or isinstance(number, bool):
         return False
     return same_value(found, graph_pb2.ParameterValue(double_value=c_float(number).value))
@@ -330,7 +330,7 @@ def _require_tuning(
         rule = acting.tuning.rule(runner.name, name)
         if each.name in values:  # else the component rejects it
             last = runner.tuned.get(name)
-            require_pace(rule, name, _plain(values[each.name]), _plain(each.value), last, now)
+            require_pace(rule, name, plain(values[each.name]), plain(each.value), last, now)
             tuned[name] = now
     there = runner.desired.components
     runner.tuned = {
@@ -396,13 +396,3 @@ def _who(acting: Caller | None, how: str) -> str:
     if how == "dynamic_reconfigure":
         return "a ROS peer"
     return "rtcfd" if acting is None else acting.peer.user
-
-
-def _plain(value: graph_pb2.ParameterValue) -> object:
-    kind = value.WhichOneof("kind")
-    return None if kind is None else getattr(value, kind)
-
-
-def word(value: graph_pb2.ParameterValue) -> str:
-    """Return a value as text for a message."""
-    return f"{_plain(value)}"[:_LONGEST_WORD]

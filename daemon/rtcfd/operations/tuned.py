@@ -134,9 +134,11 @@ async def _keep(
             wanted[name] = setting.value
             result.kept.append(setting)
             continue
-        line = f"{full_name(spec)}: {name} = {parameters.word(setting.value)} does not fit: {why}"
+        line = (
+            f"{full_name(spec)}: {name} = {declared_values.word(setting.value)} does not fit: {why}"
+        )
         if (now := wanted.get(name, defaults.get(name))) is not None:
-            line += f"; it is {parameters.word(now)} now"
+            line += f"; it is {declared_values.word(now)} now"
         result.notes.append(line)
     del spec.parameters[:]
     spec.parameters.extend(

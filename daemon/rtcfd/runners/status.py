@@ -106,6 +106,6 @@ async def status_of(runner: RunnerCore) -> runner_pb2.RunnerStatus:
             status.state = runner_pb2.RUNNER_STATE_FAULTED
     lines.append(runner.operations.busy(longer_than_s=_WORTH_SAYING_S))
     lines += [f"{name} is left out: {reason}" for name, reason in desired.left_out.items()]
-    lines.append(runner.saver.problem)
+    lines += [desired.replaced, runner.saver.problem]
     status.status = "; ".join(line for line in lines if line)
     return status

@@ -13,10 +13,12 @@ from pathlib import Path
 from rtcf.v1 import errors_pb2, runner_pb2
 from rtcf_shared.errors import RtcfError
 from rtcf_shared.graph_reader import Graph, read_graphs
+from rtcf_shared.graph_writer import same_value
 
 from rtcfd.common import regular_files, runner_settings
+from rtcfd.common.declared_values import word
 from rtcfd.common.errors import InvalidArgument, RequestError
-from rtcfd.common.names import DEFAULT_RUNNER, check_base_name, check_graph
+from rtcfd.common.names import DEFAULT_RUNNER, check_base_name, check_graph, full_name
 from rtcfd.state.desired import Desired
 
 log = logging.getLogger(__name__)
@@ -121,10 +123,33 @@ class BootGraphs:
         )
 
 
-def become(desired: Desired, graph: Graph) -> None:
-    """Replace the graph and the settings of a desired state; quarantines and loop state stay."""
+def become(desired: Desired, graph: Graph) -> list[str]:
+    """Replace the graph and the settings of a desired state; quarantines and loop state stay.
+
+    Returns a line for each earlier change by hand that this replaces.
+    """
+    lines = list(_replaced(desired, graph))
     quarantined = dict(desired.quarantined)
     desired.become(graph.components)
     desired.choose(graph.settings)
     for name, reason in quarantined.items():
         desired.quarantine(name, reason)
+    return lines
+
+
+def _replaced(desired: Desired, graph: Graph) -> Iterator[str]:
+    yield from runner_settings.replaced(desired.chosen, graph.settings)
+    specs = {full_name(spec): spec for spec in graph.components}
+    for name, known in desired.components.items():
+        spec = specs.get(name)
+        if spec is None:
+            if name not in desired.leased:
+                yield f"{name} is removed"
+            continue
+        given = {each.name: each.value for each in spec.parameters}
+        for each in known.parameters:
+            if each.name not in given:
+                if not spec.lists:  # else it may be the size of a vector
+                    yield f"{name}.{each.name} {word(each.value)} -> its default"
+            elif not same_value(each.value, given[each.name]):
+                yield f"{name}.{each.name} {word(each.value)} -> {word(given[each.name])}"

@@ -53,6 +53,7 @@ class Desired:
         self.left_out: dict[str, str] = {}  # components that are not loaded, with the reason
         self.leased: dict[str, ComponentLeaseTerms] = {}  # leased components, which are not saved
         self.hold: RunnerLeaseTerms | None = None
+        self.replaced = ""  # changes by hand that its graph file replaced at this start
         self.history = History()  # of its parameters
         self._components: dict[str, graph_pb2.ComponentSpec] = {}
         # The saved text of each component, cached: a change of one component among a thousand

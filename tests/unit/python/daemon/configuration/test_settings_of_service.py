@@ -446,6 +446,28 @@ def test_a_state_folder_that_cannot_be_written_is_neither_loaded_nor_kept(
     assert status.notes[0].startswith(said)
 
 
+def test_a_start_names_the_values_that_its_graph_file_replaces(
+    stopped_daemon: DaemonUnderTest,
+) -> None:
+    daemon = stopped_daemon
+    daemon.graphs.mkdir()
+    file = daemon.graphs / "a.yaml"
+    file.write_text("components:\n  - {package: demo, type: Fine, name: a, parameters: {kp: 2}}\n")
+    daemon.start_service()
+    with daemon.client() as client:
+        assert "replaced" not in client.get_status().runners[0].status
+        client.set_parameters("a", [rtcf.parse_parameter("kp:=3.5")])
+    daemon.end()
+    daemon.start_service()
+    said = (
+        f"{file} replaced changes by hand: /a.kp 3.5 -> 2: to keep such changes, write them to the "
+        "file: `rtcfctl -r rt_runner save FILE`"
+    )
+    with daemon.client() as client:
+        assert said in client.get_status().runners[0].status
+    assert f"runner rt_runner: {said}" in daemon.log()
+
+
 SHOWN = """\
 LoadState=loaded
 User=rtcf

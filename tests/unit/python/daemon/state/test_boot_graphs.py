@@ -5,7 +5,11 @@ from pathlib import Path
 
 import odd_files
 import pytest
-from rtcfd.state.boot_graphs import BootGraphs
+import rtcf
+from rtcf.v1 import runner_pb2
+from rtcf_shared.graph_reader import read_graphs
+from rtcfd.state.boot_graphs import BootGraphs, become
+from rtcfd.state.desired import Desired
 
 
 def test_a_graph_applies_once_the_conflicting_file_is_removed(tmp_path: Path) -> None:
@@ -45,3 +49,28 @@ def test_a_link_to_a_missing_folder_is_an_error(tmp_path: Path) -> None:
     odd_files.dangling(link)
     problem = f"cannot read {link}: it is a symbolic link that leads nowhere"
     assert BootGraphs(link, {}).read() == ([], [problem])
+
+
+def test_the_changes_by_hand_that_a_file_replaces_are_listed() -> None:
+    (graph,) = read_graphs(
+        "runner: arm\nsettings: {priority: 60, ros: {queue: 4}}\ncomponents:\n"
+        "  - {package: demo, type: Fine, name: a, parameters: {kp: 2.0}}\n",
+        "arm.yaml",
+    )
+    desired = Desired("arm")
+    assert become(desired, graph) == []
+    assert become(desired, graph) == [], "nothing was changed by hand"
+    desired.set_parameters("a", [rtcf.parse_parameter(each) for each in ("kp:=3.5", "ki:=0.5")])
+    desired.put("/b", rtcf.component("demo", "Fine", name="b"))
+    desired.choose(
+        runner_pb2.RunnerSettings(
+            priority=70, frequency_hz=500.0, ros=runner_pb2.RosSettings(queue=9)
+        )
+    )
+    assert become(desired, graph) == [
+        "priority 70 -> 60",
+        "ros.queue 9 -> 4",
+        "/a.kp 3.5 -> 2.0",
+        "/a.ki 0.5 -> its default",
+        "/b is removed",
+    ]
