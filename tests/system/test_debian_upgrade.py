@@ -164,7 +164,7 @@ def test_loops_are_restored_except_for_components_to_rebuild(
 
     assert _status(service, "arm") == ("faulted", 1)
     said = service.ctl("-r", "arm", "status").stdout
-    assert "not resumed: runner arm: left out of its loop: /offset (" in said
+    assert "not resumed: left out of its loop: /offset; " in said
     why = [line for line in said.splitlines() if "is left out: " in line]
     assert len(why) == 1
     assert "offset is left out: " in why[0]

@@ -166,7 +166,9 @@ async def _start_at_boot(runner: RunnerCore, asked: int, agreed: set[str]) -> No
             runner.log.info("loop %s", word)
             return
         except RequestError as error:
-            runner.loop.held = f"not {word}: {error}"
+            missing = missing_parts(runner, agreed)
+            why = f"left out of its loop: {listing(missing)}" if missing else str(error)
+            runner.loop.held = f"not {word}: {why}"
             runner.log.error("%s", runner.loop.held)
     if runner.loop.wanted:
         runner.loop.want(False)
@@ -198,6 +200,23 @@ def missing_parts(runner: RunnerCore, agreed: Container[str]) -> list[str]:
         for name in sorted(runner.desired.left_out)
         if name in components and not components[name].optional and name not in agreed
     ]
+
+
+def advice(runner: RunnerCore) -> str:
+    """Return the commands that complete or start a loop after a fault; empty = it needs none."""
+    left_out = sorted(runner.desired.left_out)
+    if not (left_out or runner.loop.held):
+        return ""
+    ctl = f"rtcfctl -r {runner.name}"
+    lines = [
+        f"`{ctl} release {name}` loads {name} again, `{ctl} unload {name}` removes it"
+        for name in left_out[:1]
+    ]
+    if not runner.loop.running:
+        words = "".join(f" --without {name}" for name in missing_parts(runner, ()))
+        without = ["", " without it", " without them"][min(len(left_out), 2)]
+        lines.append(f"`{ctl} start{words}` starts the loop{without}")
+    return "; ".join(lines)
 
 
 async def _settle(runner: RunnerCore) -> None:

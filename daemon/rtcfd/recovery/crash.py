@@ -79,15 +79,8 @@ def _give_up(runner: RunnerCore, cause: str) -> None:
 
 
 def _held(runner: RunnerCore, verdict: Verdict, cause: str) -> str:
-    """Return the text of the status after a recovery."""
-    name, culprit = runner.name, verdict.culprit
-    if culprit not in runner.desired.quarantined:
-        loop = "its loop goes on" if runner.loop.running else f"held: `rtcfctl -r {name} start`"
-        return f"{cause}; {loop} with all its components"
-    again = f"`rtcfctl -r {name} release {culprit}` loads again"
-    if runner.loop.running:
-        return f"{cause}; its loop goes on without {culprit}, which {again}"
-    spec = runner.desired.components.get(culprit)
-    agreed = "" if spec is None or spec.optional else f" --without {culprit}"
-    start = f"`rtcfctl -r {name} start{agreed}`"
-    return f"{cause}; held: {start} runs it without {culprit}, which {again}"
+    """Return the text of the status after a recovery, without the present remedies."""
+    loop = "its loop goes on" if runner.loop.running else "held"
+    if verdict.culprit in runner.desired.quarantined:
+        return f"{cause}; {loop}"
+    return f"{cause}; {loop} with all its components"

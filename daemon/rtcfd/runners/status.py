@@ -12,6 +12,7 @@ from rtcfd.common import runner_settings
 from rtcfd.common.background import log_failure
 from rtcfd.common.errors import RequestError
 from rtcfd.operations.runner_core import RunnerCore
+from rtcfd.recovery.bring_up import advice
 
 _TIMEOUT_S = 2.0
 _WORTH_SAYING_S = 2.0  # the status shows a change that takes longer
@@ -106,6 +107,8 @@ async def status_of(runner: RunnerCore) -> runner_pb2.RunnerStatus:
             status.state = runner_pb2.RUNNER_STATE_FAULTED
     lines.append(runner.operations.busy(longer_than_s=_WORTH_SAYING_S))
     lines += [f"{name} is left out: {reason}" for name, reason in desired.left_out.items()]
+    if status.state not in (runner_pb2.RUNNER_STATE_DOWN, runner_pb2.RUNNER_STATE_STUCK):
+        lines.append(advice(runner))
     lines += [desired.replaced, runner.saver.problem]
     status.status = "; ".join(line for line in lines if line)
     return status

@@ -50,8 +50,8 @@ def test_a_crash_in_an_update_is_named_and_its_component_quarantined(
     assert "was killed by SIGSEGV" in status.status
     assert "at address 0x10 while /bad.update was running in cycle" in status.status
     assert (
-        "held: `rtcfctl -r rt_runner start --without /bad` runs it without /bad, which "
-        "`rtcfctl -r rt_runner release /bad` loads again"
+        "`rtcfctl -r rt_runner release /bad` loads /bad again, `rtcfctl -r rt_runner unload /bad` "
+        "removes it; `rtcfctl -r rt_runner start --without /bad` starts the loop without it"
     ) in status.status
     left_out = running.get_component("bad")
     assert left_out.state == graph_pb2.COMPONENT_STATE_LEFT_OUT
@@ -67,6 +67,31 @@ def test_a_crash_in_an_update_is_named_and_its_component_quarantined(
     assert running.get_order() == ["/bad", "/extra", "/good"]
     assert daemon.saved()["quarantined"] == {}
     assert state(running).status == ""
+
+
+def test_the_advice_follows_the_graph(daemon: DaemonUnderTest, running: rtcf.Client) -> None:
+    die(running, "/bad", "SIGSEGV")
+    recovered(daemon)
+    running.unload(["bad"])
+    status = state(running).status
+    assert "--without" not in status
+    assert "release" not in status
+    assert status.endswith("`rtcfctl -r rt_runner start` starts the loop")
+    running.start()
+    assert state(running).status == ""
+
+
+def test_a_component_that_is_left_out_is_named_with_remedies_after_a_reboot(
+    daemon: DaemonUnderTest, running: rtcf.Client
+) -> None:
+    die(running, "/bad", "SIGSEGV")
+    recovered(daemon)
+    restart_both(daemon)
+    with daemon.client() as again:
+        status = state(again).status
+    assert status.startswith("/bad is left out: was killed by SIGSEGV")
+    for words in ("release /bad", "unload /bad", "start --without /bad"):
+        assert f"`rtcfctl -r rt_runner {words}`" in status
 
 
 def test_a_quarantine_outlives_rtcfd(daemon: DaemonUnderTest, running: rtcf.Client) -> None:
@@ -141,7 +166,8 @@ def test_a_loop_continues_without_an_optional_culprit(
     assert running.get_order() == ["/bad", "/good"]
     status = state(running)
     assert status.state == runner_pb2.RUNNER_STATE_RUNNING
-    assert "its loop goes on without /extra" in status.status
+    assert "; its loop goes on; /extra is left out: was killed by SIGSEGV" in status.status
+    assert status.status.endswith("`rtcfctl -r rt_runner unload /extra` removes it")
     assert daemon.saved()["running"] is True
 
 
@@ -234,8 +260,8 @@ def test_an_incomplete_loop_starts_at_boot_only_if_it_ran_incomplete(
     with daemon.client() as again:
         status = state(again)
         assert status.state == runner_pb2.RUNNER_STATE_FAULTED
-        assert "not resumed: runner rt_runner: left out of its loop: /Gone (" in status.status
-        assert "`rtcfctl -r rt_runner start --without /Gone` goes on without" in status.status
+        assert "not resumed: left out of its loop: /Gone; /Gone is left out: " in status.status
+        assert "`rtcfctl -r rt_runner start --without /Gone` starts the loop" in status.status
         again.start(without=["Gone"])
     restart_both(daemon)
     with daemon.client() as again:
