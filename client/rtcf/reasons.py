@@ -204,7 +204,11 @@ class ExecutorSilentError(RefusedError):
 
 
 class LoopStuckError(RefusedError):
-    """The loop reaches no cycle boundary, or a hook does not return."""
+    """The loop reaches no cycle boundary."""
+
+
+class HookStuckError(RefusedError):
+    """A hook of a component has not returned within hook_timeout_s."""
 
 
 class BusyError(RefusedError):
@@ -311,6 +315,7 @@ BY_REASON: dict[str, type[RefusedError]] = {
     "EXECUTOR_DOWN": ExecutorDownError,
     "EXECUTOR_SILENT": ExecutorSilentError,
     "LOOP_STUCK": LoopStuckError,
+    "HOOK_STUCK": HookStuckError,
     "BUSY": BusyError,
     "RUNNER_ENDING": RunnerEndingError,
     "DAEMON_ENDING": DaemonEndingError,

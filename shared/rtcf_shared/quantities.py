@@ -37,6 +37,7 @@ RUNNER = {
     "max_overruns": Quantity(0, _COUNT, 0),
     "warmup_cycles": Quantity(0, _COUNT, 10),
     "stall_timeout_ms": Quantity(0, 3_600_000, 2000, "ms"),
+    "hook_timeout_s": Quantity(0.1, 3600.0, 10.0, "s"),
     "orphan_timeout_s": Quantity(0.0, 86400.0, 60.0, "s"),
     "max_clock_jump_s": Quantity(0.0, 86400.0, 10.0, "s"),
     "log_limit": Quantity(0, 1_000_000, 100),  # records per source line and second; 0 = unlimited

@@ -65,6 +65,8 @@ private parameters:
   lock_memory, safe_heap_size_kB, safe_stack_size_kB
                            memory that is locked, and allocated at the start
   stall_timeout            end the executor if a cycle takes longer, in s; 0: never (default: 2)
+  hook_timeout             fail a change if a hook outside the cycle takes longer, in s
+                           (default: 10)
   warmup_cycles            first cycles that the statistics exclude (default: 10)
   ros_latch                regular expression: topics whose last message late subscribers get
   ros_decimation, ros_decimate

@@ -33,7 +33,8 @@ _NAMES = (
     *("frequency", "graph", "mode", "num_components_expected", "ros_mapping_whitelist"),
     *("ros_mapping_blacklist", "ros_queue", "wait_policy", "overrun", "max_overruns"),
     *("lock_memory", "safe_heap_size_kB", "safe_stack_size_kB", "cpu_affinity_mask", "cpu"),
-    *("priority", "spin", "realtime", "stall_timeout", "warmup_cycles", "on_crash"),
+    *("priority", "spin", "realtime", "stall_timeout", "hook_timeout"),
+    *("warmup_cycles", "on_crash"),
     *("daemon", "on_fault", "ros_latch", "ros_decimation", "ros_decimate"),
     *("ros_stamped", "ros_largest_message_kB", "ros_peers", "sim_time", "max_clock_jump"),
 )
@@ -72,6 +73,7 @@ def read(values: dict[str, Any]) -> tuple[RunnerParameters, list[str]]:
     put("warmup_cycles", given.integer("warmup_cycles", *_whole("warmup_cycles")))
     stall_s = given.number("stall_timeout", *(ms / 1000 for ms in _range("stall_timeout_ms")))
     put("stall_timeout_ms", None if stall_s is None else round(stall_s * 1000))
+    put("hook_timeout_s", given.number("hook_timeout", *_range("hook_timeout_s")))
     put("realtime", _value(_REALTIME, given.word("realtime", _REALTIME)))
     put("on_crash", _value(_ON_CRASH, given.word("on_crash", _ON_CRASH)))
     put("overrun", _overrun(given))

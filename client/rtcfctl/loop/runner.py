@@ -24,8 +24,9 @@ _CHOICES = {
 _RIGHTS = choices(runner_pb2.Right.DESCRIPTOR)
 # Other fields of RunnerSettings and RosSettings; each has an option.
 _FIELDS = ("frequency_hz", "cpu", "priority", "spin_us", "spin_auto", "max_overruns",
-           "warmup_cycles", "stall_timeout_ms", "orphan_timeout_s", "lock_memory", "heap_kb",
-           "stack_kb", "max_clock_jump_s", "log_limit", "frame_kb")  # fmt: skip
+           "warmup_cycles", "stall_timeout_ms", "hook_timeout_s", "orphan_timeout_s",
+           "lock_memory", "heap_kb", "stack_kb", "max_clock_jump_s", "log_limit",
+           "frame_kb")  # fmt: skip
 _ROS_FIELDS = ("enabled", "master_uri", "hostname", "ns", "whitelist", "blacklist", "queue",
                "latch", "decimation", "decimate", "stamped", "largest_message_kb",
                "refuse_out_of_range")  # fmt: skip
@@ -159,6 +160,12 @@ def _settings_options(to: argparse.ArgumentParser) -> None:
         "--stall-timeout",
         "stall_timeout_ms",
         "end the executor if a cycle makes no progress for this time, e.g. 2s; 0: never",
+    )
+    add_quantity(
+        to,
+        "--hook-timeout",
+        "hook_timeout_s",
+        "fail a change if a hook outside the cycle, as configure(), takes longer, e.g. 30s",
     )
     add_quantity(
         to,

@@ -43,7 +43,8 @@ enum class ErrorKind {
     ReplayRuns,
     NoReplay,
 
-    Unavailable,  ///< the loop reaches no boundary, or a hook does not return
+    Unavailable,  ///< the loop reaches no boundary
+    HookStuck,    ///< a hook does not return
 
     ResourceExhausted,
     StateTooLarge

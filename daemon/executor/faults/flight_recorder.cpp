@@ -11,6 +11,7 @@
 #include <cstring>
 #include <new>
 #include <system_error>
+#include <utility>
 
 #include "common/error.hpp"
 #include "realtime/cycle_counter.hpp"
@@ -45,10 +46,16 @@ const char* hookName(Hook hook) noexcept {
             return "takeOver";
         case Hook::Wait:
             return "wait";
+        case Hook::Destructor:
+            return "destructor";
         case Hook::None:
             break;
     }
     return "";
+}
+
+std::string RunningHook::name() const {
+    return component.empty() ? std::string() : fmt::format("{}.{}", component, hookName(hook));
 }
 
 FlightRecorder::FlightRecorder() : fd_(::memfd_create("rtcf-flight-recorder", MFD_CLOEXEC)) {
@@ -97,27 +104,27 @@ void FlightRecorder::removeSlot(std::uint32_t slot) noexcept {
 }
 
 void FlightRecorder::enterHook(std::uint32_t slot, Hook hook) {
-    noteGraph(slot, hook,
-              fmt::format("{}.{}", static_cast<const char*>(page_->names[slot]), hookName(hook)));
+    noteGraph({static_cast<const char*>(page_->names[slot]), hook, slot});
 }
 
 void FlightRecorder::enterLibrary(const std::string& component) {
-    noteGraph(0, Hook::None, fmt::format("{}.{}", component, hookName(Hook::Constructor)));
+    noteGraph({component, Hook::Constructor, 0});
 }
 
-void FlightRecorder::leaveHook() noexcept { noteGraph(0, Hook::None, {}); }
+void FlightRecorder::leaveHook() noexcept { noteGraph({}); }
 
-void FlightRecorder::noteGraph(std::uint32_t slot, Hook hook, std::string activity) noexcept {
-    page_->graph_slot.store(slot, std::memory_order_relaxed);
-    page_->graph_hook.store(static_cast<std::uint32_t>(hook), std::memory_order_relaxed);
+void FlightRecorder::noteGraph(RunningHook hook) noexcept {
+    page_->graph_slot.store(hook.slot, std::memory_order_relaxed);
+    page_->graph_hook.store(static_cast<std::uint32_t>(hook.slot == 0 ? Hook::None : hook.hook),
+                            std::memory_order_relaxed);
+    hook.since_ns = monotonicNow();
     const std::lock_guard<std::mutex> lock(mutex_);
-    graph_activity_ = std::move(activity);
-    graph_since_ns_ = monotonicNow();
+    running_hook_ = std::move(hook);
 }
 
-std::pair<std::string, std::int64_t> FlightRecorder::graphActivity() const {
+RunningHook FlightRecorder::runningHook() const {
     const std::lock_guard<std::mutex> lock(mutex_);
-    return {graph_activity_, graph_since_ns_};
+    return running_hook_;
 }
 
 std::string FlightRecorder::realtimeActivity() const {

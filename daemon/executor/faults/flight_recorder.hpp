@@ -8,7 +8,6 @@
 #include <cstdint>
 #include <mutex>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "rtcf/realtime.hpp"
@@ -30,10 +29,23 @@ enum class Hook : std::uint32_t {
     // Real-time thread only; None means update() there.
     Safe = 7,
     TakeOver = 8,
-    Wait = 9
+    Wait = 9,
+    // Graph thread.
+    Destructor = 10
 };
 
 const char* hookName(Hook hook) noexcept;
+
+/// A hook that the graph thread runs.
+struct RunningHook {
+    std::string component;  ///< full name; empty = no hook runs
+    Hook hook = Hook::None;
+    std::uint32_t slot = 0;     ///< of the component; 0 = its library is being opened
+    std::int64_t since_ns = 0;  ///< CLOCK_MONOTONIC
+
+    /// E.g. "/H1.prepare"; empty = no hook runs.
+    std::string name() const;
+};
 
 /// Reason for the end of the process, as stored in the recorder.
 enum class CrashReason : std::uint32_t { Signal = 0, Stall = 1 };
@@ -65,9 +77,8 @@ class FlightRecorder {
     /// Notes that the library of a component is opened, which runs its static initializers.
     void enterLibrary(const std::string& component);
     void leaveHook() noexcept;
-    /// Component and hook, e.g. "/H1.prepare", or an empty string; and since when
-    /// (CLOCK_MONOTONIC, ns). Any thread.
-    std::pair<std::string, std::int64_t> graphActivity() const;
+    /// The hook that the graph thread runs. Any thread.
+    RunningHook runningHook() const;
     /// @}
 
     /// @name Notes; real-time safe, each is one store
@@ -117,15 +128,14 @@ class FlightRecorder {
     static_assert(offsetof(Page, crash_address) == 40 && offsetof(Page, names) == 64,
                   "the layout is in executor.proto");
 
-    void noteGraph(std::uint32_t slot, Hook hook, std::string activity) noexcept;
+    void noteGraph(RunningHook hook) noexcept;
 
     int fd_ = -1;
     Page* page_ = nullptr;
     std::vector<std::uint32_t> free_;
     std::uint32_t next_ = 1;
     mutable std::mutex mutex_;  // of the members below
-    std::string graph_activity_;
-    std::int64_t graph_since_ns_ = 0;
+    RunningHook running_hook_;
 };
 
 /// Notes of the real-time thread. Copy the object into a local variable, so that a note is one

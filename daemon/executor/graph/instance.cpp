@@ -107,6 +107,8 @@ Instance::Instance(ComponentDefinition definition, std::shared_ptr<const Library
 Instance::~Instance() {
     stop();
     cleanup();
+    const HookNote note(recorder_, slot(), Hook::Destructor, nullptr, context_.full_name);
+    component_.reset();
 }
 
 void Instance::setFirstParameters() {

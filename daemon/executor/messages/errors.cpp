@@ -70,6 +70,8 @@ std::pair<v1::Error::Code, pb::Reason> codeAndReason(ErrorKind kind) {
             return {v1::Error::CODE_FAILED_PRECONDITION, pb::REASON_NO_REPLAY};
         case ErrorKind::Unavailable:
             return {v1::Error::CODE_UNAVAILABLE, pb::REASON_LOOP_STUCK};
+        case ErrorKind::HookStuck:
+            return {v1::Error::CODE_UNAVAILABLE, pb::REASON_HOOK_STUCK};
         case ErrorKind::ResourceExhausted:
             return {v1::Error::CODE_RESOURCE_EXHAUSTED, pb::REASON_LIMIT_REACHED};
         case ErrorKind::StateTooLarge:

@@ -106,6 +106,8 @@ RunnerSettings settingsFrom(const pb::RunnerSettings& message, RunnerSettings ba
     if (message.has_warmup_cycles()) base.loop.warmup_cycles = message.warmup_cycles();
     if (message.has_stall_timeout_ms())
         base.stall_timeout_ns = std::int64_t{message.stall_timeout_ms()} * 1'000'000;
+    if (message.has_hook_timeout_s())
+        base.hook_timeout_ns = static_cast<std::int64_t>(message.hook_timeout_s() * 1e9);
     if (message.has_orphan_timeout_s()) {
         base.orphan_timeout_ns = static_cast<std::int64_t>(message.orphan_timeout_s() * 1e9);
     }
@@ -156,6 +158,7 @@ pb::RunnerSettings settingsTo(const RunnerSettings& settings) {
     message.set_stack_kb(static_cast<std::uint32_t>(settings.loop.realtime.stack_bytes / kKilo));
     message.set_warmup_cycles(static_cast<std::uint32_t>(settings.loop.warmup_cycles));
     message.set_stall_timeout_ms(static_cast<std::uint32_t>(settings.stall_timeout_ns / 1'000'000));
+    message.set_hook_timeout_s(static_cast<double>(settings.hook_timeout_ns) / 1e9);
     message.set_orphan_timeout_s(static_cast<double>(settings.orphan_timeout_ns) / 1e9);
     message.set_spin_auto(settings.spin_auto);
     message.set_on_boot(static_cast<pb::OnBoot>(settings.on_boot));

@@ -103,6 +103,7 @@ void Runner::threadMain() {
         lock.unlock();
         control_.beginJob(job.stops);
         if (job.work) logErrors(log_, "a change", job.work);
+        cleanUpLeft();
         recorder_.leaveHook();
         logErrors(log_, "supervising the loop", [this] { tick(); });
         lock.lock();

@@ -89,7 +89,8 @@ class Runner final : private RunnerView {
     ReplayOutcome replay(const ReplayChunk& chunk, const Progress& progress) {
         return offline_.replay(chunk, progress);
     }
-    /// See Transactions.
+    /// See Transactions. Each job that changes the graph ends with cleanUpLeft().
+    void cleanUpLeft() noexcept { transactions_.cleanUpLeft(); }
     ChangeOutcome load(ComponentDefinition definition, const std::string& library,
                        const Progress& progress) {
         return transactions_.load(std::move(definition), library, progress);

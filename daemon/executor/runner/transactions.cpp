@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <utility>
+
 #include "common/error.hpp"
 #include "logging/log_errors.hpp"
 #include "names/name_pattern.hpp"
@@ -86,8 +88,7 @@ std::vector<std::string> Transactions::adopt(Change change, const Progress& prog
                                 change.restoration->taken_out->full_name));
     }
     plan->noteHeld(adoption, *plan_);
-    // Destroyed last: leaving components use it until they are cleaned up.
-    const std::unique_ptr<Plan> previous = plan_.replace(std::move(plan));
+    left_.push_back({plan_.replace(std::move(plan)), std::move(change.leaving)});
     frames_.publish(std::move(frames));
     // From here on, an error does not undo the change.
     logErrors(log_, "publishing last values", [&] {
@@ -97,12 +98,7 @@ std::vector<std::string> Transactions::adopt(Change change, const Progress& prog
         }
     });
     logErrors(log_, "publishing a change", [&] { adopted(change); });
-    // The leaving components are out of the loop, so their hooks may take long.
-    for (const auto& instance : change.leaving) {
-        control_.reportFaults(*instance);
-        instance->stop();
-        instance->cleanup();
-    }
+    for (const auto& instance : left_.back().components) control_.reportFaults(*instance);
     logErrors(log_, "supervising the loop", [this] { control_.noticeEnd(); });
     for (const HandOver& hand_over : adoption.hand_overs) {
         if (!hand_over.skipped) continue;
@@ -111,6 +107,15 @@ std::vector<std::string> Transactions::adopt(Change change, const Progress& prog
             hand_over.successor->fullName()));
     }
     return std::move(change.notes);
+}
+
+void Transactions::cleanUpLeft() noexcept {
+    for (Left& left : std::exchange(left_, {})) {
+        for (const auto& instance : left.components) {
+            instance->stop();
+            instance->cleanup();
+        }
+    }
 }
 
 void Transactions::handOver(Change& change, const Instance& previous,

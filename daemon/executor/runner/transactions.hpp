@@ -1,9 +1,9 @@
 /// @file
 /// Changes of a runner's graph. Every change is a transaction: new components are constructed and
 /// configured beside the running loop; the new graph is wired and ordered; new components are
-/// started; the loop adopts the change at one cycle boundary; then leaving components are stopped
-/// and cleaned up. A failure before the adoption leaves everything as it was. Owned by the runner;
-/// graph thread.
+/// started; the loop adopts the change at one cycle boundary; then cleanUpLeft() stops and cleans
+/// up leaving components. A failure before the adoption leaves everything as it was. Owned by the
+/// runner; graph thread.
 #pragma once
 
 #include <cstddef>
@@ -87,11 +87,15 @@ class Transactions {
     /// Gives an input without a writer an injector, for values from outside.
     /// @param topic mapped name of the input
     void makeWritable(const std::string& topic);
-    /// Wires, starts and adopts a change; then stops and cleans up leaving components.
+    /// Wires, starts and adopts a change.
     /// @return notes on the hand-over of state
     /// @throws Error and others; nothing has changed then
     std::vector<std::string> adopt(Change change, const Progress& progress);
     /// @}
+
+    /// Stops, cleans up and destroys the components that have left the graph. Separate from their
+    /// change, whose outcome no longer depends on these hooks: they may take long, or forever.
+    void cleanUpLeft() noexcept;
 
     /// @name Changes of frames
     /// @{
@@ -139,6 +143,13 @@ class Transactions {
     std::set<std::string> written_;  // mapped names of inputs of makeWritable()
     std::size_t most_taps_ = SIZE_MAX;
     bool replaying_ = false;
+
+    // Components that have left the graph, and the plan that they use until they are cleaned up.
+    struct Left {
+        std::unique_ptr<Plan> plan;
+        std::vector<std::shared_ptr<Instance>> components;
+    };
+    std::vector<Left> left_;
 };
 
 }  // namespace rtcf::executor

@@ -77,8 +77,14 @@ v1::Response lostRecords(std::uint64_t count) {
 // Protocol version. The newer side of rtcfd and executor uses only requests that the older one
 // knows, see link.py of rtcfd. Hello, stop and exit never change.
 constexpr std::uint32_t kProtocol = 4;
-constexpr std::int64_t kHookTimeout = 10 * kSecond;
 constexpr std::int64_t kProbeDeadline = kSecond / 2;
+
+// The answer to a change that the loop has adopted: valid even if hooks of components that have
+// left do not return.
+struct AdoptedChange {
+    std::atomic<bool> known{false};  // after it, the answer does not change
+    v1::Response answer;
+};
 
 }  // namespace
 
@@ -213,6 +219,7 @@ void Server::serve(Runner& runner, Log& log, Access& access, const DirectStop& d
         deliver();
         servePorts();
         expire();
+        reportStuck();
         listener_.renew(monotonicNow());
         if (orphaned()) exiting_ = true;
     }
@@ -341,16 +348,18 @@ void Server::deliver() {
 
 void Server::expire() {
     const std::int64_t now = monotonicNow();
+    const RunningHook hook = stuck();
     for (auto it = waiting_.begin(); it != waiting_.end();) {
         // A slow change may continue; it is given up only if a hook hangs.
         const bool change = it->second.given_up != nullptr;
-        if (now < it->second.until_ns || (change && stuck().empty())) {
+        const bool stopped = it->second.stop && !runner_->loop().running();
+        if ((now < it->second.until_ns && !stopped) || (change && hook.component.empty())) {
             ++it;
             continue;
         }
         if (change) it->second.given_up->store(true);
         const std::uint64_t connection = it->first.first;
-        v1::Response response = it->second.otherwise();
+        v1::Response response = it->second.otherwise(hook);
         it = waiting_.erase(it);
         respond(connection, response);
         if (connections_.count(connection) == 0) return;  // drop() has changed waiting_
@@ -370,17 +379,33 @@ void Server::servePorts() {
     if (!done.empty()) runner_->post([done = std::move(done)]() mutable { done.clear(); });
 }
 
-std::string Server::stuck() const {
-    const auto [activity, since_ns] = runner_->recorder().graphActivity();
-    return !activity.empty() && monotonicNow() - since_ns > kHookTimeout ? activity : std::string();
+// The hook that has taken too long.
+RunningHook Server::stuck() const {
+    RunningHook hook = runner_->recorder().runningHook();
+    if (hook.component.empty()) return {};
+    const std::int64_t limit_ns = runner_->status().settings.hook_timeout_ns;
+    return monotonicNow() - hook.since_ns > limit_ns ? hook : RunningHook{};
+}
+
+// Reports each hook once, as nobody may ask.
+void Server::reportStuck() {
+    const RunningHook hook = stuck();
+    if (hook.component.empty() || hook.since_ns == reported_stuck_ns_) return;
+    reported_stuck_ns_ = hook.since_ns;
+    log_->write(LogLevel::Error, hook.component, stuckText(hook));
+}
+
+std::string Server::stuckText(const RunningHook& hook) const {
+    return fmt::format(
+        "stuck in {1}() for {2} s: `rtcfctl runner restart {0}` ends this hook and the loop, and "
+        "loads the saved graph again; `rtcfctl -r {0} unload --force {3}` also removes {3} from it",
+        runner_->name(), hook.name(), (monotonicNow() - hook.since_ns) / kSecond, hook.component);
 }
 
 void Server::requireNotStuck() const {
-    const std::string where = stuck();
-    if (where.empty()) return;
-    throw Error(ErrorKind::Unavailable,
-                fmt::format("runner {} is stuck in {}(): only stop and restart are possible",
-                            runner_->name(), where));
+    if (const RunningHook hook = stuck(); !hook.component.empty())
+        throw Error(ErrorKind::HookStuck,
+                    fmt::format("runner {} is {}", runner_->name(), stuckText(hook)));
 }
 
 void Server::handle(Connection& connection, const v1::Request& request) {
@@ -503,13 +528,34 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
     const bool endless =
         request.kind_case() == v1::Request::kStep || request.kind_case() == v1::Request::kReplay;
     const auto given_up = std::make_shared<std::atomic<bool>>(false);
-    const auto otherwise = [this, id] {
-        return errorResponse(id, ErrorKind::Unavailable,
-                             fmt::format("runner {} is stuck in {}()", runner_->name(), stuck()));
+    const bool stop = request.kind_case() == v1::Request::kStop;
+    const auto adopted = std::make_shared<AdoptedChange>();
+    const auto otherwise = [this, id, stop, adopted](const RunningHook& hook) {
+        const std::string why = fmt::format("runner {} is {}", runner_->name(), stuckText(hook));
+        if (adopted->known.load()) {
+            v1::Response response = adopted->answer;
+            response.mutable_change()->add_notes(why);
+            return response;
+        }
+        if (stop && runner_->loop().running()) {
+            return errorResponse(id, ErrorKind::Unavailable,
+                                 "the loop does not reach the end of its cycle, and " + why);
+        }
+        return errorResponse(id, ErrorKind::HookStuck,
+                             stop ? "the loop has ended, but " + why : why);
     };
-    waiting_[{connection, id}] = {endless ? INT64_MAX : monotonicNow() + kHookTimeout, otherwise,
-                                  given_up};
-    runner_->post([this, connection, id, request, given_up, endless] {
+    const std::int64_t limit_ns = runner_->status().settings.hook_timeout_ns;
+    waiting_[{connection, id}] = {endless ? INT64_MAX : monotonicNow() + limit_ns, otherwise,
+                                  given_up, stop};
+    if (const RunningHook hook = runner_->recorder().runningHook();
+        stop && !hook.component.empty()) {
+        v1::Response step;
+        step.set_id(id);
+        step.set_progress(
+            fmt::format("the loop ends; the stop() of its components waits for {}()", hook.name()));
+        respond(connection, step);
+    }
+    runner_->post([this, connection, id, request, given_up, endless, adopted] {
         v1::Response response;
         response.set_id(id);
         // If the request was given up, the caller has already received an error. A stop is carried
@@ -549,6 +595,10 @@ void Server::submitChange(std::uint64_t connection, const v1::Request& request) 
             } else {
                 *response.mutable_change() =
                     outcomeTo(change(*runner_, request, progress, *given_up));
+                adopted->answer = response;
+                setState(adopted->answer, runner_->numberedState());
+                adopted->known = true;
+                runner_->cleanUpLeft();
             }
         } catch (const Error& error) {
             response = errorResponse(id, error.kind(), error.what());
@@ -594,8 +644,8 @@ void Server::submitProbe(std::uint64_t connection, const v1::Request& request) {
     response.set_id(id);
     *response.mutable_component() =
         componentTo(*graph, static_cast<std::size_t>(found - graph->components.begin()), state);
-    waiting_[{connection, id}] = {monotonicNow() + kProbeDeadline, [response] { return response; },
-                                  nullptr};
+    waiting_[{connection, id}] = {monotonicNow() + kProbeDeadline,
+                                  [response](const RunningHook&) { return response; }, nullptr};
     runner_->post([this, connection, name, response]() mutable {
         try {
             addValues(*response.mutable_component(), runner_->probe(name));
@@ -621,7 +671,7 @@ void Server::beginWatch(std::uint64_t connection, const v1::Request& request) {
     const auto& patterns = asked.selection();
     const Watch wanted{PortSelection({patterns.begin(), patterns.end()}), asked.component_times()};
     ports_.begin({connection, id}, watch, wanted, asked.every(), asked.min_max());
-    const auto nothing = [id] {
+    const auto nothing = [id](const RunningHook&) {
         return errorResponse(id, ErrorKind::Unavailable, "the stream has ended");
     };
     waiting_[{connection, id}] = {INT64_MAX, nothing, nullptr};
@@ -651,9 +701,15 @@ pb::RunnerStatus Server::status() const {
     status.set_state(stateTo(present.state));
     status.set_status(present.loop_fault);
     status.set_simulated(present.simulated);
-    if (const std::string where = stuck(); !where.empty()) {
+    if (const RunningHook hook = stuck(); !hook.component.empty()) {
         status.set_state(pb::RUNNER_STATE_STUCK);
-        status.set_status(fmt::format("stuck in {}()", where));
+        status.set_status(stuckText(hook));
+        pb::HookStuck& stuck = *status.mutable_stuck();
+        stuck.set_component(hook.component);
+        stuck.set_hook(hookName(hook.hook));
+        stuck.set_duration_s(static_cast<double>(monotonicNow() - hook.since_ns) / 1e9);
+        stuck.set_in_graph(std::any_of(graph->components.begin(), graph->components.end(),
+                                       [&](const auto& each) { return each->slot == hook.slot; }));
     }
     *status.mutable_settings() = settingsTo(present.settings);
     status.set_pid(::getpid());

@@ -79,8 +79,10 @@ class Server {
     void expire();
     bool orphaned();
     ::rtcf::v1::RunnerStatus status() const;
-    std::string stuck() const;
+    RunningHook stuck() const;
+    std::string stuckText(const RunningHook& hook) const;
     void requireNotStuck() const;
+    void reportStuck();
 
     Listener listener_;
     int signals_ = -1;
@@ -88,6 +90,7 @@ class Server {
     bool exiting_ = false;
     bool had_daemon_ = false;
     std::int64_t alone_since_ns_ = 0;
+    std::int64_t reported_stuck_ns_ = 0;   // the begin of the last stuck hook that was reported
     std::atomic<bool> configured_{false};  // by rtcfd; set by the graph thread
     Runner* runner_ = nullptr;
     Log* log_ = nullptr;
@@ -100,8 +103,9 @@ class Server {
     // Requests queued for the graph thread, by connection and id, with their timeouts.
     struct Waiting {
         std::int64_t until_ns;
-        std::function<v1::Response()> otherwise;
+        std::function<v1::Response(const RunningHook& stuck)> otherwise;
         std::shared_ptr<std::atomic<bool>> given_up;  // set to cancel a change
+        bool stop = false;  // given up when the loop has ended, if a hook hangs
         // True for steps and replays, which end when they are given up.
         bool endless() const { return until_ns == INT64_MAX && given_up != nullptr; }
     };

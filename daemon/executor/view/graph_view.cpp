@@ -14,6 +14,7 @@ std::shared_ptr<const ComponentView> viewOf(const GraphNode& node) {
     const Instance& instance = *node.instance;
     auto result = std::make_shared<ComponentView>();
     result->instance = &instance;
+    result->slot = instance.slot();
     result->statistics = instance.statistics();
     result->definition = instance.sharedDefinition();
     result->breaks = node.breaks;

@@ -28,6 +28,7 @@ struct StateView {
 /// One component. It may outlive the component, and shares its definition, ports and statistics.
 struct ComponentView : ParameterSet {
     const Instance* instance;  ///< for comparison only
+    std::uint32_t slot;        ///< in the flight recorder
     std::shared_ptr<const ComponentStatistics> statistics;
     std::shared_ptr<const ComponentDefinition> definition;  ///< with the first loop breaks
     LoopBreaks breaks;                                      ///< the present ones

@@ -53,6 +53,8 @@ void validate(RunnerSettings& settings) {
                  "KiB");
     requireRange("stall timeout", settings.stall_timeout_ns / 1'000'000, std::int64_t{0},
                  std::int64_t{3'600'000}, "ms");
+    requireRange("hook timeout", static_cast<double>(settings.hook_timeout_ns) / 1e9, 0.1, 3600.0,
+                 "s");
     requireRange("orphan timeout", static_cast<double>(settings.orphan_timeout_ns) / 1e9, 0.0, 1e6,
                  "s");
     requireRange("max clock jump", static_cast<double>(settings.max_clock_jump_ns) / 1e9, 0.0, 1e6,

@@ -22,6 +22,7 @@ struct RunnerSettings {
     bool realtime_required = false;
     bool spin_auto = false;  ///< loop.spin_ns follows the observed wake-up latency
     std::int64_t stall_timeout_ns = 2'000'000'000;  ///< limit of a hook in the cycle; 0 = none
+    std::int64_t hook_timeout_ns = 10'000'000'000;  ///< limit of a hook outside the cycle
     /// The loop stops after this time without rtcfd; 0 = at once.
     std::int64_t orphan_timeout_ns = 60'000'000'000;
     int on_boot = 0;   ///< stored for rtcfd

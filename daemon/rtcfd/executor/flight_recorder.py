@@ -20,7 +20,7 @@ _NAMES = 64
 _NAME_BYTES = 128
 _HOOKS = (
     "", "constructor", "configure", "start", "stop", "cleanup", "prepare",
-    "safe", "takeOver", "wait",
+    "safe", "takeOver", "wait", "destructor",
 )  # fmt: skip
 
 

@@ -66,6 +66,10 @@ class Recorder : public rtcf::Component {
 
 // The hook named by its parameter waits until the test opens the journal's gate.
 class Blocker final : public Recorder {
+   public:
+    ~Blocker() override { pass("destructor"); }
+
+   private:
     rtcf::Parameter<std::string> blocks{this, "blocks", "configure"};
 
     bool prepare(const rtcf::Values& proposed) override {
@@ -76,6 +80,10 @@ class Blocker final : public Recorder {
     void stop() override {
         Recorder::stop();
         pass("stop");
+    }
+    void cleanup() override {
+        Recorder::cleanup();
+        pass("cleanup");
     }
 
     bool pass(const char* name) {

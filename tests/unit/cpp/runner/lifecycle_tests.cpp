@@ -129,7 +129,7 @@ TEST_F(Lifecycle, QueriesAreAnsweredWhileAHookBlocks) {
     ASSERT_TRUE(eventually([this] { return journal().count("/B configure") == 1; }));
     EXPECT_EQ(order(), std::vector<std::string>{"/A"});
     EXPECT_EQ(state(), RunnerState::Stopped);
-    EXPECT_EQ(runner().recorder().graphActivity().first, "/B.configure");
+    EXPECT_EQ(runner().recorder().runningHook().name(), "/B.configure");
     journal().gate_open = true;
     loading.get();
     EXPECT_EQ(order(), (std::vector<std::string>{"/A", "/B"}));

@@ -133,7 +133,7 @@ class Soak : public RunnerFixture {
                     (void)component->statistics->duration.snapshot();
                 (void)durations().duration().snapshot();
                 (void)runner().status();
-                (void)runner().recorder().graphActivity();
+                (void)runner().recorder().runningHook();
                 std::this_thread::yield();
             }
         });

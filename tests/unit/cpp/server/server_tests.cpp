@@ -45,6 +45,21 @@ Request unload(const std::string& name) {
     return request;
 }
 
+Request blocker(const std::string& hook) {
+    Request loading = load("Blocker", "B");
+    rtcf::v1::ParameterSetting& blocks =
+        *loading.mutable_load()->mutable_component()->add_parameters();
+    blocks.set_name("blocks");
+    blocks.mutable_value()->set_string_value(hook);
+    return loading;
+}
+
+Request hookTimeout(double seconds) {
+    Request request;
+    request.mutable_configure()->set_hook_timeout_s(seconds);
+    return request;
+}
+
 Request start() {
     Request request;
     request.mutable_start();
@@ -337,7 +352,7 @@ TEST_F(ServerTest, StopEndsTheLoopWhileAHookBlocks) {
 TEST_F(ServerTest, EachHookOfTheGraphThreadIsNamed) {
     ExecutorClient client(socket_);
     client.hello();
-    const auto activity = [this] { return runner_.recorder().graphActivity().first; };
+    const auto activity = [this] { return runner_.recorder().runningHook().name(); };
     Request set;
     set.mutable_set_parameters()->set_component("B");
     rtcf::v1::ParameterSetting& gain = *set.mutable_set_parameters()->add_parameters();
@@ -345,17 +360,14 @@ TEST_F(ServerTest, EachHookOfTheGraphThreadIsNamed) {
     gain.mutable_value()->set_double_value(2);
     Request stop;
     stop.mutable_stop();
-    for (const std::string hook : {"configure", "start", "prepare", "stop"}) {
-        Request loading = load("Blocker", "B");
-        rtcf::v1::ParameterSetting& blocks =
-            *loading.mutable_load()->mutable_component()->add_parameters();
-        blocks.set_name("blocks");
-        blocks.mutable_value()->set_string_value(hook);
-        const std::vector<std::pair<std::string, Request>> requests = {{"configure", loading},
-                                                                       {"start", start()},
-                                                                       {"prepare", set},
-                                                                       {"stop", stop},
-                                                                       {"cleanup", unload("B")}};
+    for (const std::string hook :
+         {"configure", "start", "prepare", "stop", "cleanup", "destructor"}) {
+        const std::vector<std::pair<std::string, Request>> requests = {
+            {"configure", blocker(hook)},
+            {"start", start()},
+            {"prepare", set},
+            {"stop", stop},
+            {hook == "destructor" ? hook : "cleanup", unload("B")}};
         for (const auto& [name, request] : requests) {
             journal().gate_open = name != hook;
             const std::uint64_t sent = client.send(request);
@@ -369,20 +381,27 @@ TEST_F(ServerTest, EachHookOfTheGraphThreadIsNamed) {
     }
 }
 
-// Takes ten seconds, the time limit of a hook.
 TEST_F(ServerTest, AbandonedChangeIsNotMadeLater) {
     ExecutorClient client(socket_);
     client.hello();
+    ASSERT_TRUE(client.ask(hookTimeout(0.2)).has_status());
     journal().gate_open = false;
     const std::uint64_t hanging = client.send(load("Blocker", "B"));
     const std::uint64_t queued = client.send(load("Recorder", "C"));
     const Response first = client.answerTo(hanging);
     EXPECT_EQ(first.error().code(), executor::v1::Error::CODE_UNAVAILABLE);
-    EXPECT_EQ(first.error().message(), "runner rt_runner is stuck in /B.configure()");
+    EXPECT_EQ(first.error().reason(), rtcf::v1::REASON_HOOK_STUCK);
+    EXPECT_EQ(first.error().message(),
+              "runner rt_runner is stuck in /B.configure() for 0 s: `rtcfctl runner restart "
+              "rt_runner` ends this hook and the loop, and loads the saved graph again; `rtcfctl "
+              "-r rt_runner unload --force /B` also removes /B from it");
     EXPECT_TRUE(client.answerTo(queued).has_error());
-    EXPECT_EQ(client.ask(getStatus()).status().state(), rtcf::v1::RUNNER_STATE_STUCK);
-    EXPECT_TRUE(client.ask(load("Recorder", "D")).has_error())
-        << "only stop and restart are accepted now";
+    const rtcf::v1::RunnerStatus status = client.ask(getStatus()).status();
+    EXPECT_EQ(status.state(), rtcf::v1::RUNNER_STATE_STUCK);
+    EXPECT_EQ(status.stuck().component(), "/B");
+    EXPECT_EQ(status.stuck().hook(), "configure");
+    EXPECT_FALSE(status.stuck().in_graph());
+    EXPECT_TRUE(client.ask(load("Recorder", "D")).has_error()) << "only a stop is accepted now";
     journal().gate_open = true;
     ASSERT_TRUE(eventually([] { return journal().count("/B cleanup") == 1; }));
     ASSERT_TRUE(eventually([&] { return client.ask(load("Recorder", "E")).has_change(); }))
@@ -393,6 +412,40 @@ TEST_F(ServerTest, AbandonedChangeIsNotMadeLater) {
     ASSERT_EQ(response.components().components_size(), 1);
     EXPECT_EQ(response.components().components(0).full_name(), "/E");
     EXPECT_EQ(journal().count("/C configure"), 0U);
+}
+
+TEST_F(ServerTest, UnloadSucceedsAlthoughTheCleanupDoesNotReturn) {
+    ExecutorClient client(socket_);
+    client.hello();
+    ASSERT_TRUE(client.ask(hookTimeout(0.2)).has_status());
+    ASSERT_TRUE(client.ask(blocker("cleanup")).has_change());
+    journal().gate_open = false;
+    const Response unloaded = client.ask(unload("B"));
+    ASSERT_TRUE(unloaded.has_change()) << unloaded.error().message();
+    EXPECT_EQ(unloaded.change().component(), "/B");
+    ASSERT_EQ(unloaded.change().notes_size(), 1);
+    EXPECT_NE(unloaded.change().notes(0).find("stuck in /B.cleanup()"), std::string::npos);
+    EXPECT_FALSE(client.ask(getStatus()).status().stuck().in_graph());
+    EXPECT_TRUE(client.ask(load("Recorder", "C")).has_error());
+}
+
+TEST_F(ServerTest, StopOfALoopIsAnsweredAtOnceIfAHookIsStuck) {
+    ExecutorClient client(socket_);
+    client.hello();
+    ASSERT_TRUE(client.ask(hookTimeout(0.2)).has_status());
+    ASSERT_TRUE(client.ask(load("Ticker", "T")).has_change());
+    ASSERT_TRUE(client.ask(start()).has_change());
+    journal().gate_open = false;
+    ASSERT_TRUE(client.ask(load("Blocker", "B")).has_error());
+    // Until the test ends, no hook can be called, and no timeout passes.
+    ASSERT_TRUE(client.ask(getStatus()).status().has_stuck());
+    Request stop;
+    stop.mutable_stop();
+    const Response stopped = client.ask(stop);
+    EXPECT_EQ(stopped.error().reason(), rtcf::v1::REASON_HOOK_STUCK);
+    EXPECT_EQ(stopped.error().message().find("the loop has ended, but runner rt_runner is stuck"),
+              0U);
+    EXPECT_FALSE(runner_.loop().running());
 }
 
 TEST_F(ServerTest, EventGoesToAllDaemons) {

@@ -29,6 +29,7 @@ def given(*words: str) -> runner_pb2.RunnerSettings:
         ("--spin 0.03ms", "spin_us", 30),
         ("--spin 30", "spin_us", 30),
         ("--stall-timeout 2s", "stall_timeout_ms", 2000),
+        ("--hook-timeout 500ms", "hook_timeout_s", 0.5),
         ("--orphan-timeout 1min", "orphan_timeout_s", 60.0),
         ("--max-clock-jump 500ms", "max_clock_jump_s", 0.5),
         ("--frequency 2kHz", "frequency_hz", 2000.0),
