@@ -199,10 +199,16 @@ class Client(Closing):
         components: Iterable[str],
         runner: str = "",
         on_progress: OnProgress | None = None,
+        *,
+        force: bool = False,
     ) -> control_pb2.ChangeResult:
-        """Unload components, all at one cycle boundary."""
+        """Unload components, all at one cycle boundary.
+
+        `force`: if a hook of a component does not return, end the executor, and its loop, and load
+        the rest of the graph into a new one.
+        """
         request = control_pb2.UnloadRequest(
-            runner=runner, components=several("components", components)
+            runner=runner, components=several("components", components), force=force
         )
         return self._connection.changed(self._stub.Unload, request, on_progress)
 

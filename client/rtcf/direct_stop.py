@@ -133,6 +133,9 @@ def _after_a_death(asked: "Future[control_pb2.ChangeResult]") -> control_pb2.Cha
 def _concerns_rtcfd_only(error: RtcfError) -> bool:
     """Return whether an error concerns rtcfd only, so that a direct stop is worth trying."""
     if isinstance(error, RefusedError):
+        # Of a stuck hook the executor has told rtcfd, and has ended the loop.
+        if error.reason == "HOOK_STUCK":
+            return False
         return error.code in ("RESOURCE_EXHAUSTED", "UNAVAILABLE")
     return True
 

@@ -18,6 +18,7 @@ _POLLS_PER_CHECK = 5  # comparisons of a watched source per check that its compo
 _STYLES = {
     graph_pb2.COMPONENT_STATE_FAULTED: "bold red",
     graph_pb2.COMPONENT_STATE_LEFT_OUT: "bold red",
+    graph_pb2.COMPONENT_STATE_STUCK: "bold red",
 }
 
 
@@ -35,6 +36,12 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
 
     unloading = verbs.add_parser("unload", parents=[common], help="unload components")
     unloading.add_argument("names", metavar="NAME", nargs="+")
+    unloading.add_argument(
+        "--force",
+        action="store_true",
+        help="if a hook does not return, end the loop and its executor; load the rest of the graph "
+        "into a new one",
+    )
     unloading.set_defaults(run=unload)
 
     replacing = verbs.add_parser(
@@ -129,7 +136,7 @@ def _require(client: rtcf.Client, runner: str, name: str) -> None:
 
 def unload(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Unload components."""
-    result = client.unload(args.names, args.runner, output.progress)
+    result = client.unload(args.names, args.runner, output.progress, force=args.force)
     output.changed(f"unloaded {', '.join(args.names)}", result)
 
 
@@ -166,9 +173,9 @@ def show_all(client: rtcf.Client, args: argparse.Namespace, output: Output) -> N
         ("#", "component", "type", "state", "notes"),
         (
             (
-                "-" if left_out(each) else each.position,
+                "-" if _not_loaded(each) else each.position,
                 each.full_name,
-                f"{each.spec.package}/{each.spec.type}",
+                f"{each.spec.package}/{each.spec.type}" if each.spec.package else "-",
                 (enumerator(each, "state").replace("_", " "), _STYLES.get(each.state, "")),
                 ", ".join(
                     filter(None, (_notes(each.spec, each.holder), _changed(each), _fault(each)))
@@ -191,11 +198,13 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     if not output.for_people:
         output.data(found)
         return
-    output.line(f"{found.full_name}: {found.spec.package}/{found.spec.type}", "bold")
+    code = f": {found.spec.package}/{found.spec.type}" if found.spec.package else ""
+    output.line(f"{found.full_name}{code}", "bold")
     if found.doc:
         output.line(f"  {found.doc}")
-    if left_out(found):
-        output.line(f"  left out of the loop: {found.fault}", "bold red")
+    if _not_loaded(found):
+        how = "left out of the loop" if left_out(found) else enumerator(found, "state")
+        output.line(f"  {how}: {found.fault}", "bold red")
         return
     output.line(f"  {enumerator(found, 'state')}, position {found.position} in the order")
     output.line(f"  from {found.library}")
@@ -316,6 +325,12 @@ def print_states(
 def left_out(found: graph_pb2.ComponentInfo) -> bool:
     """Return whether a component of the graph is not loaded."""
     return bool(found.state == graph_pb2.COMPONENT_STATE_LEFT_OUT)
+
+
+def _not_loaded(found: graph_pb2.ComponentInfo) -> bool:
+    """Return whether a component has no place in the loop."""
+    stuck = found.state == graph_pb2.COMPONENT_STATE_STUCK
+    return left_out(found) or (stuck and not found.library)
 
 
 def _component_options(to: argparse.ArgumentParser, needed: bool = True) -> None:

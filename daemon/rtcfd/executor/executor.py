@@ -43,7 +43,8 @@ log = logging.getLogger(__name__)
 
 CONNECT_TIMEOUT_S = 10.0
 QUERY_TIMEOUT_S = 5.0
-STOP_TIMEOUT_S = 10.0  # for the loop to end and the stop hooks to return
+STOP_TIMEOUT_S = 10.0  # for the loop to end and the stop hooks to return, at least
+_STUCK_S = 1.0  # from the timeout of a hook to the answer
 EXIT_TIMEOUT_S = 5.0  # from the exit message, and then from SIGTERM, to the end
 FROZEN_S = 1.0  # for a frozen executor to continue
 _FROZEN_LOOK_S = 0.05
@@ -258,20 +259,30 @@ class Executor:
         self._close_memory()
         self._process.release()
 
-    async def shut_down(self) -> None:
+    async def shut_down(self, hook_timeout_s: float = 0.0) -> None:
         """Stop the loop in order, then end the process, by signals if necessary."""
         self.expected = True
         try:
             if frozen := self.frozen:
                 raise Unavailable(frozen, errors_pb2.REASON_EXECUTOR_SILENT)
-            await self.request(wire.Request(stop=wire.Stop()), STOP_TIMEOUT_S)
+            patience_s = max(STOP_TIMEOUT_S, hook_timeout_s + _STUCK_S)
+            await self.request(wire.Request(stop=wire.Stop()), patience_s)
             await self.request(wire.Request(exit=wire.Exit()), EXIT_TIMEOUT_S)
         except RequestError as error:
             log.warning("%s: cannot end it in order: %s", self._peer, error)
-            _terminate(self._process)
-        await _end(self._process, self._peer)
+            if error.reason == errors_pb2.REASON_HOOK_STUCK:
+                # Its loop has ended, and an orderly end would wait for the hook.
+                self._process.signal(signal.SIGKILL)
+            else:
+                _terminate(self._process)
+        await _end(self._process, self._peer, self._hook)
         if self._watching is not None:
             await self._watching
+
+    def _hook(self) -> str:
+        """Return the hook that its graph thread runs; empty if there is none."""
+        note = self.note()
+        return f"{note.hooking}.{note.hook}" if note is not None and note.hooking else ""
 
     async def _attach(self) -> None:
         """Connect and exchange hello messages, within CONNECT_TIMEOUT_S."""
@@ -478,14 +489,18 @@ def _silent(runner: str, problem: str, search: str, pid: int) -> Silent:
     )
 
 
-async def _end(process: Process, peer: str) -> None:
-    """Wait for a process that was asked to end; send SIGTERM, then SIGKILL, if it does not."""
+async def _end(process: Process, peer: str, hook: Callable[[], str] = str) -> None:
+    """Wait for a process that was asked to end; send SIGTERM, then SIGKILL, if it does not.
+
+    `hook` returns the hook that it runs.
+    """
     for harder in (signal.SIGTERM, signal.SIGKILL):
         try:
             await asyncio.wait_for(process.wait(), EXIT_TIMEOUT_S)
             return
         except TimeoutError:
-            log.warning("%s does not end: sending %s", peer, harder.name)
+            waits = f", as {running}() does not return" if (running := hook()) else ""
+            log.warning("%s does not end%s: sending %s", peer, waits, harder.name)
             process.signal(harder)
     await process.wait()
 

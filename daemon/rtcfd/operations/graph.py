@@ -107,7 +107,7 @@ async def unload(
         live = [name for name in names if name not in runner.desired.left_out]
         if runner.up and live:
             return wire.Request(unload=control_pb2.UnloadRequest(components=live))
-        _check_known(runner, names)
+        require_known(runner, names)
         return control_pb2.ChangeResult(notes=["removed from the saved graph only"])
 
     return await runner.make(
@@ -210,7 +210,7 @@ async def release(
     listed = ", ".join(names)
 
     async def release_request() -> wire.Request:
-        _check_known(runner, names)
+        require_known(runner, names)
         for name in names:
             await parameters.settle_lists(runner, name)
         marked = [name for name in names if name not in runner.desired.left_out]
@@ -384,6 +384,22 @@ def left_out(runner: RunnerCore) -> list[graph_pb2.ComponentInfo]:
     ]
 
 
+async def mark_stuck(runner: RunnerCore, found: list[graph_pb2.ComponentInfo]) -> None:
+    """Mark the component of a hook that does not return; add it if the graph does not have it."""
+    stuck = await runner.stuck()
+    if stuck is None:
+        return
+    if all(each.full_name != stuck.component for each in found):
+        found.append(graph_pb2.ComponentInfo(full_name=stuck.component))
+    for each in found:
+        if each.full_name == stuck.component:
+            each.state = graph_pb2.COMPONENT_STATE_STUCK
+            each.fault = (
+                f"its {stuck.hook}() has not returned for {stuck.duration_s:.0f} s: see `rtcfctl "
+                "status`"
+            )
+
+
 async def set_breaks(
     runner: RunnerCore, request: control_pb2.SetBreaksRequest, progress: Progress
 ) -> control_pb2.ChangeResult:
@@ -478,7 +494,8 @@ def _single(names: list[str]) -> str:
     return names[0] if len(names) == 1 else ""
 
 
-def _check_known(runner: RunnerCore, full_names: list[str]) -> None:
+def require_known(runner: RunnerCore, full_names: Iterable[str]) -> None:
+    """Raise NotFound if a component is not in the saved graph."""
     known = runner.desired.components
     for name in full_names:
         if name not in known:

@@ -111,8 +111,8 @@ async def _stop_at(
     """
     try:
         # A frozen executor handles the request when it continues.
-        patience_s = _FROZEN_S if executor.frozen else STOP_TIMEOUT_S
-        return await _ask_to_stop(runner, progress, patience_s)
+        hooks_s = max(STOP_TIMEOUT_S, 2 * runner.settings().hook_timeout_s)
+        return await _ask_to_stop(runner, progress, _FROZEN_S if executor.frozen else hooks_s)
     except Unavailable as error:
         if frozen := executor.frozen:
             raise Unavailable(frozen, errors_pb2.REASON_EXECUTOR_SILENT) from None
@@ -151,7 +151,12 @@ async def _ask_to_stop(
     runner: RunnerCore, progress: Progress | None, timeout_s: float = STOP_TIMEOUT_S
 ) -> control_pb2.ChangeResult:
     request = wire.Request(stop=wire.Stop())
-    response = await runner.ask(
-        request, progress, lambda _: runner.loop.note_report(False), timeout_s
-    )
+    try:
+        response = await runner.ask(
+            request, progress, lambda _: runner.loop.note_report(False), timeout_s
+        )
+    except Unavailable as error:
+        if error.reason == errors_pb2.REASON_HOOK_STUCK:
+            runner.loop.note_report(False)  # only hooks of its components have not ended
+        raise
     return response.change

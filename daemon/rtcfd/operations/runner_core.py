@@ -265,7 +265,7 @@ class RunnerCore(ABC):
         if executor is not None:
             self.down_reason = executor.verdict = reason
             async with self._changing_executor:
-                await executor.shut_down()
+                await executor.shut_down(self.settings().hook_timeout_s)
         elif not self.leaving and not spare_silent:
             async with self._changing_executor:  # after an attempt to adopt it
                 if self._executor is None:
@@ -293,8 +293,9 @@ class RunnerCore(ABC):
     async def limit(self) -> None:
         """Send the limits and the access rules to the executor."""
         if self._executor is not None:
-            await self._executor.limit(self.shared.limits)
             await self._executor.grant(self.shared.rules)
+            # Last: fails while a hook is stuck.
+            await self._executor.limit(self.shared.limits)
 
     async def query(self, request: wire.Request) -> wire.Response:
         """Send a query, which does not change the graph, to the executor."""
@@ -341,6 +342,30 @@ class RunnerCore(ABC):
             raise Unavailable(
                 f"runner {self.name}: {executor.verdict}", errors_pb2.REASON_EXECUTOR_DOWN
             ) from None
+
+    async def stuck(self) -> runner_pb2.HookStuck | None:
+        """Return the hook that does not return; None if there is none, or no executor answers."""
+        if self._executor is None:
+            return None
+        request = wire.Request(get_status=wire.GetStatus())
+        try:
+            status = (await self._executor.request(request)).status
+        except RequestError:
+            return None
+        return status.stuck if status.HasField("stuck") else None
+
+    def leave_out(self, stuck: runner_pb2.HookStuck) -> None:
+        """Keep the component of a hook that did not return out of the loop until its release."""
+        reason = f"its {stuck.hook}() did not return within {stuck.duration_s:.0f} s"
+        if not self.desired.quarantine(str(stuck.component), reason):
+            return
+        self.log.logger.error(
+            "%s is left out of the loop: %s", stuck.component, reason,
+            extra={"runner": self.name, "component": stuck.component},
+        )  # fmt: skip
+        self.happened(
+            control_pb2.Event.KIND_COMPONENT_FAULT, f"left out: {reason}", str(stuck.component)
+        )
 
     async def begin_counting(self, reset: bool) -> None:
         """Count from now on (`reset`), or from the begin of the executor's statistics."""

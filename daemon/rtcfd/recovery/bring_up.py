@@ -47,7 +47,12 @@ async def bring_up(runner: RunnerCore, only_left_over: bool = False, boot: bool 
         # Its real state cannot be known.
         runner.loop.note_report(runner.loop.wanted or runner.loop.stop_owed)
         return True
-    await runner.limit()
+    try:
+        await runner.limit()
+    except RequestError as error:
+        if not adopted:
+            raise
+        runner.log.warning("%s", error)  # it keeps its earlier limits
     if adopted:
         # A direct stop that it reports on adoption is older than the state of its loop then.
         stopped = runner.loop.stopped_at_ns != stopped_at_ns
@@ -82,7 +87,8 @@ async def _follow(runner: RunnerCore, asked: int) -> None:
     )  # fmt: skip
     lines = follow_settings(runner.desired, runner.shared.defaults, status.settings)
     leases_ended = _follow_leased(runner, listed.components.components)
-    fresh = status.state == runner_pb2.RUNNER_STATE_STOPPED and not status.iteration
+    loop_stands = (runner_pb2.RUNNER_STATE_STOPPED, runner_pb2.RUNNER_STATE_STUCK)
+    fresh = status.state in loop_stands and not status.iteration
     more, runner.desired.left_out = follow_components(
         runner.desired, listed.components.components, restored=not fresh
     )
@@ -90,10 +96,14 @@ async def _follow(runner: RunnerCore, asked: int) -> None:
         runner.log.warning("%s: the executor's is kept", line)
     if not runner.loop.running and was_running and not fresh:
         runner.loop.want(False)
-    if status.state == runner_pb2.RUNNER_STATE_STOPPED:
-        desired = runner.desired
-        missing = [name for name in desired.left_out if name not in desired.quarantined]
-        await _load_each(runner, missing)
+    missing = [name for name in runner.desired.left_out if name not in runner.desired.quarantined]
+    whole = True
+    if fresh and status.stuck.component in missing:
+        whole = not await _leave_out_stuck(runner)
+    elif status.state == runner_pb2.RUNNER_STATE_STOPPED:
+        whole = await _load_each(runner, missing)
+    if not whole:
+        await _restore(runner)
     if lines or more or leases_ended or runner.loop.wanted != was_running:
         await runner.save()
     runner.adopted()
@@ -122,11 +132,26 @@ def _follow_leased(runner: RunnerCore, found: Iterable[graph_pb2.ComponentInfo])
 
 async def _restore(runner: RunnerCore) -> None:
     """Load the desired components into a new executor; those that fail are left out and logged."""
+    while not await _load_all(runner):
+        pass  # the next executor lacks a component whose hook does not return
+    desired = runner.desired
+    if runner.up and desired.components:
+        count = len(desired.components) - len(desired.left_out)
+        runner.log.info("%d of its components restored, held", count)
+    if desired.left_out:
+        await runner.save()
+
+
+async def _load_all(runner: RunnerCore) -> bool:
+    """Load all desired components that are not quarantined.
+
+    Returns False if a hook did not return: the executor is a new one then.
+    """
     desired = runner.desired
     desired.left_out = dict(desired.quarantined)
     wanted = [name for name in desired.components if name not in desired.left_out]
     if not wanted:
-        return
+        return True
     runner.down_reason = restoring = f"its components are being restored: {len(wanted)}"
     try:
         # All at once, for speed; one by one if that fails.
@@ -136,16 +161,45 @@ async def _restore(runner: RunnerCore) -> None:
         for name, load in zip(wanted, apply.components, strict=True):
             desired.settle(name, load.component)
     except RequestError:
+        if await _leave_out_stuck(runner):
+            return False
         if runner.up:
-            await _load_each(runner, wanted)
+            return await _load_each(runner, wanted)
     finally:
         if runner.down_reason == restoring:  # else the executor has died meanwhile
             runner.down_reason = ""
-    if runner.up:
-        count = len(desired.components) - len(desired.left_out)
-        runner.log.info("%d of its components restored, held", count)
-    if desired.left_out:
-        await runner.save()
+    return True
+
+
+async def _leave_out_stuck(runner: RunnerCore) -> bool:
+    """If a hook does not return, leave its component out and start a new executor, without graph.
+
+    Returns whether it did.  Only while the loop does not run.
+    """
+    stuck = await runner.stuck()
+    if stuck is None or stuck.component not in runner.desired.components:
+        return False
+    runner.leave_out(stuck)
+    await runner.end_executor(f"{stuck.component}.{stuck.hook}() does not return")
+    await runner.take_executor()
+    await runner.limit()
+    return True
+
+
+async def start_or_leave_out(runner: RunnerCore, asked: int, agreed: Container[str]) -> None:
+    """Start the loop, if need be without optional components whose start() does not return.
+
+    Raises RequestError; the component is left out then.
+    """
+    while True:
+        try:
+            require_whole(runner, agreed)
+            await start_in_turn(runner, asked)
+            return
+        except RequestError:
+            if not await _leave_out_stuck(runner):
+                raise
+        await _restore(runner)
 
 
 async def _start_at_boot(runner: RunnerCore, asked: int, agreed: set[str]) -> None:
@@ -161,8 +215,7 @@ async def _start_at_boot(runner: RunnerCore, asked: int, agreed: set[str]) -> No
     ):
         word = "resumed" if runner.loop.wanted else "started"
         try:
-            require_whole(runner, agreed)
-            await start_in_turn(runner, asked)
+            await start_or_leave_out(runner, asked, agreed)
             runner.log.info("loop %s", word)
             return
         except RequestError as error:
@@ -233,8 +286,11 @@ async def _settle(runner: RunnerCore) -> None:
         runner.log.warning("%s", error)
 
 
-async def _load_each(runner: RunnerCore, names: Iterable[str]) -> None:
-    """Load components one by one; those that fail are left out and logged."""
+async def _load_each(runner: RunnerCore, names: Iterable[str]) -> bool:
+    """Load components one by one; those that fail are left out and logged.
+
+    Returns False if a hook did not return: the executor is a new one then, without graph.
+    """
     for name in names:
         try:
             (load,) = await loads(runner.shared.catalog, [runner.desired.components[name]])
@@ -243,8 +299,11 @@ async def _load_each(runner: RunnerCore, names: Iterable[str]) -> None:
             runner.desired.settle(name, load.component)
         except RequestError as error:
             if not runner.up:
-                return  # the executor died, and its recovery loads the rest
+                return True  # the executor died, and its recovery loads the rest
+            if await _leave_out_stuck(runner):
+                return False
             runner.desired.left_out[name] = str(error)
             runner.log.error("%s is left out of the loop: %s", name, error)
     if runner.desired.left_out:
         runner.log.warning("left out of its loop: %s", listing(runner.desired.left_out))
+    return True

@@ -10,9 +10,8 @@ from rtcf.v1 import runner_pb2
 from rtcf_shared.naming import listing
 
 from rtcfd.common.errors import RequestError
-from rtcfd.operations.loop import start_in_turn
 from rtcfd.operations.runner_core import RunnerCore
-from rtcfd.recovery.bring_up import bring_up, missing_parts
+from rtcfd.recovery.bring_up import bring_up, missing_parts, start_or_leave_out
 from rtcfd.recovery.verdict import MOST_ATTEMPTS, MOST_CRASHES, WINDOW_S, Crashes, Verdict
 
 
@@ -55,7 +54,7 @@ async def recover(runner: RunnerCore, verdict: Verdict, crashes: Crashes, cause:
             await runner.save()
         elif runner.loop.wanted:
             try:
-                await start_in_turn(runner, asked)
+                await start_or_leave_out(runner, asked, agreed)
             except RequestError as error:
                 not_resumed = f"; not resumed: {error}"
         held = _held(runner, verdict, cause) + not_resumed

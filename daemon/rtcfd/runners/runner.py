@@ -12,12 +12,15 @@ from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, errors_pb2, runner_pb2
 
 from rtcfd.common import runner_settings
-from rtcfd.common.errors import InvalidArgument, RequestError
+from rtcfd.common.errors import InvalidArgument, RequestError, Unavailable
 from rtcfd.common.event_log import NumberedLog
+from rtcfd.common.names import absolute
 from rtcfd.executor.command import settings_error
 from rtcfd.executor.executor import Executor
+from rtcfd.executor.link import Progress
 from rtcfd.executor.notifications import Notifications
 from rtcfd.executor.watched_process import End
+from rtcfd.operations import graph
 from rtcfd.operations.keep_incident import keep
 from rtcfd.operations.parameters import follow_ros, note_unanswered
 from rtcfd.operations.runner_core import RunnerCore, SharedContext
@@ -118,6 +121,10 @@ class Runner(RunnerCore):
 
         async def work() -> None:
             # Not in a turn: a hanging change only ends with its executor.
+            stuck = await self.stuck()
+            if stuck is not None and stuck.in_graph:
+                self.leave_out(stuck)
+                self.saver.begin()
             await self.end_executor("its executor is being restarted")
             self.loop.held = self.loop.fault = ""
             await self.change("the restart of its executor", fresh, patient=True)
@@ -130,6 +137,36 @@ class Runner(RunnerCore):
         await self.end_executor("its executor is being restarted")
         self.loop.held = self.loop.fault = ""
         await bring_up(self)
+
+    async def unload(
+        self, request: control_pb2.UnloadRequest, progress: Progress
+    ) -> control_pb2.ChangeResult:
+        """Unload components; with `force`, even if a hook does not return."""
+        if not request.force:
+            return await graph.unload(self, request, progress)
+        stuck = await self.stuck()
+        if stuck is None:
+            try:
+                result = await graph.unload(self, request, progress)
+            except Unavailable:
+                if (stuck := await self.stuck()) is None:
+                    raise
+            else:
+                if (stuck := await self.stuck()) is None:
+                    return result
+        names = [absolute(name) for name in request.components]
+        hung = f"{stuck.component}.{stuck.hook}()"
+        known = [*self.desired.components, stuck.component]
+        graph.require_known(self, [name for name in names if name not in known])
+        self.desired.drop(names)
+        self.happened(control_pb2.Event.KIND_GRAPH, f"{', '.join(names)} unloaded by force")
+        progress(f"ending the executor of {self.name}: {hung} does not return")
+        await self.restart()
+        note = (
+            f"the executor has ended, and its loop, as {hung} did not return; the rest of the "
+            f"graph is loaded again: `rtcfctl -r {self.name} start` starts it"
+        )
+        return control_pb2.ChangeResult(notes=[note])
 
     def end_leases(self, why: "control_pb2.LeaseEnded.Why", message: str) -> None:
         """Tell the holders of this runner and of its components that their leases have ended."""

@@ -24,7 +24,7 @@ from rtcf_shared.naming import listing
 
 from rtcfd import VERSION
 from rtcfd.catalog.catalog import Catalog
-from rtcfd.common.errors import InvalidArgument
+from rtcfd.common.errors import InvalidArgument, NotFound
 from rtcfd.common.event_log import EventLog
 from rtcfd.common.names import DEFAULT_RUNNER, absolute
 from rtcfd.common.status_codes import abort
@@ -84,7 +84,7 @@ class Control(control_pb2_grpc.ControlServicer):
     Start = _changing(cycles.start)
     Step = _changing(cycles.step)
     Load = _changing(graph.load)
-    Unload = _changing(graph.unload)
+    Unload = _changing(Runner.unload)
     Replace = _changing(graph.replace)
     Release = _changing(graph.release)
     SetBreaks = _changing(graph.set_breaks)
@@ -156,6 +156,7 @@ class Control(control_pb2_grpc.ControlServicer):
         components = await self._components(request.runner)
         runner = self.runners.get(request.runner)
         found = components + graph.left_out(runner)
+        await graph.mark_stuck(runner, found)
         rebuilt = await runner.code.changed()
         for info in found:
             info.library_changed = info.full_name in rebuilt
@@ -172,10 +173,18 @@ class Control(control_pb2_grpc.ControlServicer):
         for info in graph.left_out(runner):
             if info.full_name == name:
                 return control_pb2.GetComponentResponse(component=_add_holder(runner, info))
-        found = await runner.query(wire.Request(get_component=query))
-        rebuilt = await runner.code.changed()
-        found.component.library_changed = name in rebuilt
-        return control_pb2.GetComponentResponse(component=_add_holder(runner, found.component))
+        found: list[graph_pb2.ComponentInfo] = []
+        missing: NotFound | None = None
+        try:
+            found.append((await runner.query(wire.Request(get_component=query))).component)
+        except NotFound as error:
+            missing = error
+        await graph.mark_stuck(runner, found)
+        for info in found:
+            if info.full_name == name:
+                info.library_changed = name in await runner.code.changed()
+                return control_pb2.GetComponentResponse(component=_add_holder(runner, info))
+        raise missing or NotFound(name, errors_pb2.REASON_COMPONENT_NOT_FOUND)
 
     @unary
     async def GetOrder(self, request: control_pb2.GetOrderRequest) -> Any:

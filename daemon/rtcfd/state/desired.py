@@ -119,10 +119,15 @@ class Desired:
             self.chosen = self.hold.parked
             self.hold = None
 
-    def quarantine(self, full_name: str, reason: str) -> None:
-        """Note that a component must not be loaded until it is released."""
-        if full_name in self._components:
-            self.quarantined[full_name] = reason
+    def quarantine(self, full_name: str, reason: str) -> bool:
+        """Note that a component must not be loaded until it is released.
+
+        Returns whether there is one of this name.
+        """
+        if full_name not in self._components:
+            return False
+        self.quarantined[full_name] = reason
+        return True
 
     def become(self, specs: Iterable[graph_pb2.ComponentSpec]) -> None:
         """Replace all components by those of a graph."""
