@@ -118,6 +118,7 @@ class RunnerCore(ABC):
         self.code = LoadedCode(shared.folders)
         self.counters = LoopCounters()
         self.incident = ""  # the name of the newest incident
+        self.replacing = ""  # component for which the executor is making a new one
         self._code_file = shared.command.folder / f"{self.name}.libraries"
         self._executor: Executor | None = None
         # Why the executor of an earlier rtcfd could not be adopted yet; its loop may run.
@@ -426,7 +427,11 @@ class RunnerCore(ABC):
             request = change.request
             result = request if isinstance(request, wire.Request) else await request()
             if isinstance(result, wire.Request):
-                result = (await self.ask(result, progress)).change
+                self.replacing = result.replace.component
+                try:
+                    result = (await self.ask(result, progress)).change
+                finally:
+                    self.replacing = ""
             line = change.event(result)
             if change.kind is not None:
                 component = result.component if change.component is None else change.component

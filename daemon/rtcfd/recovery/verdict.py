@@ -24,6 +24,7 @@ _OWN_SIGNALS = {
     for number in (signal.SIGSEGV, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGABRT,
                    signal.SIGSYS, signal.SIGTRAP)
 }  # fmt: skip
+_FIRST_HOOKS = ("constructor", "prepare", "configure", "start")
 _ADDRESSED = {int(signal.SIGSEGV), int(signal.SIGBUS), int(signal.SIGFPE), int(signal.SIGILL)}
 
 
@@ -35,6 +36,7 @@ class Verdict:
     running: str  # "while /H1.update was running in cycle 7"
     culprit: str = ""  # full name of the component to quarantine; empty = none
     orderly: bool = False  # the executor ended in order on request, e.g. by SIGTERM
+    first: bool = False  # it died in a hook of the graph thread before the first update
     safe: bool = True  # False: it died in safe(), or in a hook of the graph thread, as stop()
 
     def __str__(self) -> str:
@@ -46,7 +48,8 @@ def judge(end: End, note: Note | None) -> Verdict:
     if note is None:
         return Verdict(str(end), "(there is no flight recorder)")
     safe = not (note.updating and note.cycle_hook == "safe") and not (note.hooking and note.hook)
-    return replace(_judge(end, note), safe=safe)
+    first = bool(note.hooking) and note.hook in _FIRST_HOOKS
+    return replace(_judge(end, note), safe=safe, first=first)
 
 
 def _judge(end: End, note: Note) -> Verdict:

@@ -216,7 +216,9 @@ class Runner(RunnerCore):
             self.loop_ended("", self.down_reason)
         elif ours:
             self._crashes.add()
-            self.desired.quarantine(verdict.culprit, str(verdict))
+            # A new component that crashes does not make the old one of its name guilty.
+            if not (verdict.first and verdict.culprit == self.replacing):
+                self.desired.quarantine(verdict.culprit, str(verdict))
             # Decided now, so that a `stop` from here on overrides it.
             self.loop.want(was_running and resumes(self, verdict, self._crashes))
             if not self.loop.wanted:

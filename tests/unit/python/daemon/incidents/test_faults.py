@@ -133,6 +133,17 @@ def test_other_causes_of_death_by_a_component(
     assert running.get_order() == ["/extra", "/good"]
 
 
+def test_a_crash_of_a_new_component_does_not_take_the_old_one_out(
+    daemon: DaemonUnderTest, running: rtcf.Client
+) -> None:
+    with pytest.raises(rtcf.RefusedError, match="while /bad.configure was running"):
+        running.replace("bad", rtcf.component("demo", "Crashes"))
+    recovered(daemon)
+    assert running.get_order() == ["/bad", "/extra", "/good"]
+    assert running.get_component("bad").spec.type == "Fine"
+    assert daemon.saved()["quarantined"] == {}
+
+
 def test_a_kill_from_outside_takes_no_component_out(
     daemon: DaemonUnderTest, running: rtcf.Client
 ) -> None:
