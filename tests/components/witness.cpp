@@ -3,6 +3,7 @@
 #include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <stdexcept>
 #include <string>
 #include <thread>
 
@@ -12,6 +13,7 @@ namespace {
 
 class Witness final : public rtcf::Component {
     rtcf::Parameter<std::string> file{this, "file", "", rtcf::Doc("gets a line for each hook")};
+    rtcf::Parameter<bool> throws{this, "throws", false, rtcf::Doc("update() throws")};
     bool updated_ = false;
     bool safe_ = false;
 
@@ -32,6 +34,7 @@ class Witness final : public rtcf::Component {
     void update() override {
         RTCF_INFO_ONCE(this, "hook {}", "update");
         updated_ = true;
+        if (throws.value()) throw std::runtime_error("as requested");
     }
     void safe() noexcept override {
         RTCF_INFO(this, "hook {}", "safe");

@@ -212,7 +212,7 @@ class ComponentLeases:
     def take_log(self, record: control_pb2.LogRecord) -> bool:
         """Send a record to the holder of its component; return whether the holder shows it."""
         outbox = self._outboxes.get(record.component)
-        if outbox is None:
+        if outbox is None or outbox.ended:
             return False
         outbox.log(record)
         warns = record.level >= control_pb2.LogRecord.LEVEL_WARN

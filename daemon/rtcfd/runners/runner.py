@@ -171,7 +171,8 @@ class Runner(RunnerCore):
     def end_leases(self, why: "control_pb2.LeaseEnded.Why", message: str) -> None:
         """Tell the holders of this runner and of its components that their leases have ended."""
         self.leases.end_all(why, message)
-        if self.hold_outbox is not None:
+        # If the holder itself ends its lease, release() waits for this, and its call answers.
+        if self.hold_outbox is not None and not self.releasing:
             self.hold_outbox.end(why, message)
             self.hold_outbox = None
 

@@ -65,7 +65,7 @@ class RunnerLease:
         """Give the runner back after the death of its holder."""
         self._outbox.gone = True
         runner = self._runner
-        if runner is None or runner.closing:
+        if runner is None or runner.closing or runner.releasing:
             return
         if runner.hold_outbox is self._outbox and runner.desired.hold:
             runner.log.error("%s has died: stopping the loop", runner.desired.hold.holder)
@@ -152,12 +152,14 @@ async def release(runners: Runners, runner: Runner, outbox: Outbox | None) -> No
     hold = runner.desired.hold
     if hold is None or runner.hold_outbox is not outbox or runner.releasing or runner.closing:
         return
-    runner.hold_outbox = None
     runner.releasing = True
     try:
+        # Its holder still receives the log records of the hooks `stop` and `cleanup`.
         await _release(runners, runner, hold)
     finally:
         runner.releasing = False
+        if runner.hold_outbox is outbox:
+            runner.hold_outbox = None
 
 
 async def _release(runners: Runners, runner: Runner, hold: RunnerLeaseTerms) -> None:
@@ -174,6 +176,8 @@ async def _release(runners: Runners, runner: Runner, hold: RunnerLeaseTerms) -> 
         # A loop that was started meanwhile belongs to the launch that ends now.
         runner.loop.stop()
         runner.desired.let_go()
+        await runner.end_executor("its launch has ended")
+        runner.hold_outbox = None  # the records of the next executor are not for this holder
         await runner.restart_in_turn()
         await runner.save()
 

@@ -25,6 +25,20 @@ def names(client: rtcf.Client) -> list[str]:
     return [info.full_name for info in client.list_components()]
 
 
+def witness(name: str, *parameters: str) -> graph_pb2.ComponentSpec:
+    return rtcf.component("rtcf_test", "Witness", name=name, parameters=parameters)
+
+
+def records(holder: Holder, component: str) -> list[str]:
+    """Return the log records of a component that a holder has received."""
+    return [
+        record.message
+        for batch in holder.of("logs")
+        for record in batch.records
+        if record.component == component
+    ]
+
+
 def report_of_a_run(holder: Holder) -> Any:
     """Return the newest report if the loop runs."""
     reports = holder.of("report")
@@ -131,9 +145,6 @@ def test_the_holder_of_a_failing_component_gets_the_reason_and_others_stay(
 def test_a_holder_gets_the_log_records_of_its_component_only(
     client: rtcf.Client,
 ) -> None:
-    def witness(name: str) -> graph_pb2.ComponentSpec:
-        return rtcf.component("rtcf_test", "Witness", name=name)
-
     first = leased(client, witness("first"))
     second = leased(client, witness("second"))
     client.start()
@@ -231,6 +242,30 @@ def test_a_runner_in_use_cannot_be_leased(client: rtcf.Client) -> None:
     assert "whitelist" in str(error) and "*.ros.*" in str(error)
     assert [each.runner for each in client.get_status().runners] == ["rt_runner"]
     holder.end()
+
+
+@pytest.mark.parametrize("runner", ["rt_runner", "added"])
+def test_the_holder_of_a_runner_gets_the_log_records_of_all_hooks(
+    client: rtcf.Client, runner: str
+) -> None:
+    holder = held(client, runner)
+    client.load(witness("unleased"), runner)
+    client.start(runner)
+    wait_for(lambda: iteration(client, runner) > 2, "some cycles")
+    holder.end()
+    hooks = ["configure", "start", "update", "safe", "stop", "cleanup"]
+    assert records(holder, "/unleased") == [f"hook {each}" for each in hooks]
+
+
+def test_the_holder_of_a_runner_gets_the_last_log_records_of_a_failed_component(
+    client: rtcf.Client,
+) -> None:
+    runner = held(client)
+    component = leased(client, witness("bad", "throws:=true"), hold="token")
+    client.start()
+    assert component.why() == ENDED.WHY_FAILED
+    wait_for(lambda: "hook cleanup" in records(runner, "/bad"), "the records of cleanup()")
+    runner.end()
 
 
 def test_an_added_runner_is_removed_with_its_dead_holder(client: rtcf.Client) -> None:
