@@ -1,5 +1,6 @@
 """The component that rt_launcher loads, from its arguments or its private parameters."""
 
+import getopt
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -8,7 +9,9 @@ from rtcf_launch.codes import Code, Ending
 from rtcf_launch.parameters import Parameters
 
 _NAMES = ("rt_package", "rt_type")
-_FIRST_FLAGS = ("-f", "--is_first")
+# As in RTCF 2021, which accepts abbreviations, too.
+_FIRST = ("-f", "--is_first")
+_NAME = ("-c", "--component_info")
 
 
 @dataclass(frozen=True)
@@ -21,16 +24,23 @@ class ComponentChoice:
 
     @classmethod
     def parse(cls, words: Sequence[str]) -> "ComponentChoice":
-        """Take `[-f|--is_first] [PACKAGE COMPONENT]` in any order.  Raises Ending."""
-        names = []
+        """Take `[-f|--is_first] [PACKAGE COMPONENT]` in any order, or each name as the value of an
+        option -c or --component_info.  Raises Ending."""
+        names: list[str] = []
         first = False
-        for word in (each.strip() for each in words):
-            if word in _FIRST_FLAGS:
-                first = True
-            elif word.startswith("-"):
-                raise Ending(Code.USAGE, f"unknown option {word}: use -f, --is_first")
-            else:
-                names.append(word)
+        rest = [each.strip() for each in words]
+        while rest:
+            try:
+                options, rest = getopt.getopt(
+                    rest, "fc:", [_FIRST[1].lstrip("-"), f"{_NAME[1].lstrip('-')}="]
+                )
+            except getopt.GetoptError as error:
+                known = ", ".join((*_FIRST, *_NAME))
+                raise Ending(Code.USAGE, f"{error}: use {known}") from None
+            first = first or any(option in _FIRST for option, _ in options)
+            names += [value for option, value in options if option in _NAME]
+            names += rest[:1]
+            del rest[:1]
         if len(names) not in (0, 2):
             raise Ending(
                 Code.USAGE,

@@ -35,10 +35,12 @@ _RETRY_S = 0.3
 _END_S = 3.0
 
 USAGE = """\
-usage: rosrun rtcf rt_launcher [-f] PACKAGE COMPONENT [__name:=NAME] [FROM:=TO]...
+usage: rosrun rtcf rt_launcher [-f] [-c] PACKAGE [-c] COMPONENT [__name:=NAME] [FROM:=TO]...
                                [_PARAMETER:=VALUE]...
 
 Loads a component into the loop of an rt_runner, and unloads it when this process ends.
+
+-c, --component_info may precede PACKAGE and COMPONENT, as in RTCF 2021.
 
 private parameters; all others are values of parameters that the component declares:
   runner                   name of the rt_runner (default: the nearest one named rt_runner, else

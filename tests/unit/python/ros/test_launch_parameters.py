@@ -433,7 +433,16 @@ def test_masters_are_equal_if_host_and_port_are() -> None:
 
 
 def test_the_component_is_named_by_arguments_or_parameters() -> None:
-    for words in (["-f", "pkg", "T"], ["--is_first", "pkg", "ns::T"], ["pkg", " T ", "-f"]):
+    for words in (
+        ["-f", "pkg", "T"],
+        ["--is_first", "pkg", "ns::T"],
+        ["pkg", " T ", "-f"],
+        # RTCF 2021's other options and abbreviations
+        ["--is", "-c", "pkg", "-cT"],
+        ["-fc", "pkg", "T"],
+        ["pkg", "--component_info=T", "-f"],
+        ["--comp", "pkg", "T", "--is_f"],
+    ):
         assert ComponentChoice.parse(words).with_parameters({"gain": 1}) == ComponentChoice(
             "pkg", "T", True
         )
@@ -450,7 +459,8 @@ def test_the_component_is_named_by_arguments_or_parameters() -> None:
     [
         (["pkg"], {}, "name a package and a component"),
         (["pkg", "T", "more"], {}, "name a package and a component"),
-        (["--first", "pkg", "T"], {}, "unknown option --first: use -f, --is_first"),
+        (["--first", "pkg", "T"], {}, "option --first not recognized: use -f, --is_first, -c, "),
+        (["pkg", "-c"], {}, "option -c requires argument: use -f"),
         ([], {}, "by ~rt_package and ~rt_type"),
         ([], {"rt_type": "T"}, "by ~rt_package and ~rt_type"),
         (["pkg", "T"], {"rt_type": "T"}, "~rt_type and the arguments both name the component"),
