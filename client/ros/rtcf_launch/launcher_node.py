@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import rtcf
-from rtcf.reasons import HolderGoneError
+from rtcf.reasons import ExpressionInvalidError, HolderGoneError
 from rtcf.v1 import control_pb2, graph_pb2
 
 from rtcf_launch import arguments, component_parameters
@@ -33,6 +33,7 @@ _LAST_CALL_S = 0.5
 _RETURN_S = 15.0
 _RETRY_S = 0.3
 _END_S = 3.0
+_IGNORE_ALL = ".*"
 
 USAGE = """\
 usage: rosrun rtcf rt_launcher [-f] [-c] PACKAGE [-c] COMPONENT [__name:=NAME] [FROM:=TO]...
@@ -176,6 +177,7 @@ class LauncherNode:
 
     def _load(self, entry: RunnerEntry) -> None:
         self._entry = entry
+        self._screen.use_daemon(entry.socket)
         self._client = rtcf.Client(entry.socket)
         package, type_name = self._component.package, self._component.type
         offered = {each.type: each for each in self._client.list_types(package).types}
@@ -274,6 +276,14 @@ class LauncherNode:
             self._screen.warn(note)
 
     def _reconnect(self, error: rtcf.RtcfError) -> None:
+        if isinstance(error, ExpressionInvalidError) and self._spec.ignore != _IGNORE_ALL:
+            # As RTCF 2021.
+            self._screen.error(
+                f"~topics_ignore_for_graph: {error}; falling back to '{_IGNORE_ALL}'"
+            )
+            self._spec.ignore = _IGNORE_ALL
+            self._take_lease()
+            return
         if isinstance(error, rtcf.RefusedError):
             if self._loaded:
                 raise Ending(Code.LOST, str(error))

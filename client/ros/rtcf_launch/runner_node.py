@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import rtcf
-from rtcf.connection import DEFAULT_SOCKET
 from rtcf.private_daemon import PrivateDaemon, program
 from rtcf.reasons import ExpressionInvalidError
 from rtcf.v1 import control_pb2, runner_pb2
@@ -27,7 +26,7 @@ from rtcf_launch.daemon_choice import choose
 from rtcf_launch.inbox import EndRequest, Inbox, LeaseLost, MasterBack
 from rtcf_launch.master import Master, MasterSilent
 from rtcf_launch.ros_node import RosNode, wait_until_gone
-from rtcf_launch.screen import Screen
+from rtcf_launch.screen import Screen, system_socket
 
 # After its restart, rtcfd waits 10 s for the holders of leases; the restart itself takes time, too.
 _RETURN_S = 15.0
@@ -38,6 +37,7 @@ _END_S = 3.0
 _LAST_CALL_S = 0.5
 _CHECK_S = 1.0  # between two checks of the loop's node
 _STATISTICS_S = 1.0  # timeout of a query for statistics
+_FIXED_NAMES = ("/rosout", "/diagnostics", "/clock")  # of the loop's node, besides those below it
 
 USAGE = """\
 usage: rosrun rtcf rt_runner [__name:=NAME] [_PARAMETER:=VALUE]...
@@ -145,7 +145,18 @@ class RunnerNode:
         parameters.settings.ros.master_uri = self._given.master_uri
         parameters.settings.ros.hostname = self._given.hostname
         parameters.settings.ros.ns = self._node
+        self._warn_of_remaps()
         return parameters
+
+    def _warn_of_remaps(self) -> None:
+        """Warn of remaps of the loop's own names.  Others may be for all nodes of the launch."""
+        for source, target in self._given.remaps:
+            name = arguments.resolve(source.replace("~", f"{self._node}/", 1), self._given.ns)
+            if name in _FIXED_NAMES or name.startswith(f"{self._node}/"):
+                self._screen.warn(
+                    f"remap of {source} to {target} ignored: the names of the loop's own topics "
+                    "and services are fixed; remap them in the nodes that use them"
+                )
 
     def _enter_ros(self) -> None:
         """Register as a node.  This displaces a node of the same name: wait until it has ended."""
@@ -176,7 +187,7 @@ class RunnerNode:
 
     def _take(self) -> None:
         wanted = self._parameters.daemon
-        socket = os.environ.get("RTCF_SOCKET") or DEFAULT_SOCKET
+        socket = system_socket()
         why = f"~daemon is {wanted}"
         if wanted != "private":
             self._await_predecessor(socket)
@@ -196,6 +207,7 @@ class RunnerNode:
             self._screen.info(f"private daemon at {socket}, log in {self._daemon.log_file} ({why})")
         else:
             self._screen.info(f"system daemon at {socket} ({why})")
+        self._screen.use_daemon(socket)
         self._client = rtcf.Client(socket)
         self._token = secrets.token_hex(8)
         self._hold()

@@ -13,7 +13,10 @@ import threading
 import time
 from typing import Any
 
+from rtcf.connection import DEFAULT_SOCKET
 from rtcf.v1 import control_pb2
+
+from rtcf_launch import hints
 
 _WORDS = {
     control_pb2.LogRecord.LEVEL_DEBUG: "DEBUG",
@@ -29,6 +32,11 @@ _COLOURS = {"DEBUG": "\033[32m", "WARN": "\033[33m", "ERROR": "\033[31m", "FATAL
 _TOKEN = re.compile(r"\$\{([a-z]+)(?::([^}]*))?\}")
 
 
+def system_socket() -> str:
+    """Return the control socket that rtcfctl uses by default."""
+    return os.environ.get("RTCF_SOCKET") or DEFAULT_SOCKET
+
+
 class Screen:
     """Prints lines; owned by the node."""
 
@@ -36,6 +44,11 @@ class Screen:
         self._name = name
         self._format = os.environ.get("ROSCONSOLE_FORMAT", "")
         self._least = "INFO"
+        self._socket = ""  # of a private rtcfd
+
+    def use_daemon(self, socket: str) -> None:
+        """Make commands in messages name the control socket, unless it is the system's."""
+        self._socket = "" if socket == system_socket() else socket
 
     def set_level(self, level: str) -> None:
         """Set the lowest level of the node's own messages to print, e.g. "warn".  Any thread."""
@@ -74,6 +87,7 @@ class Screen:
         name: str = "",
         place: tuple[str, int] = ("", 0),
     ) -> None:
+        text = hints.fitted(text, self._socket)
         stream: Any = sys.stderr if word in ("WARN", "ERROR", "FATAL") else sys.stdout
         line = (
             self._formatted(word, time_s, text, name, place)

@@ -279,6 +279,49 @@ def test_an_invalid_expression_falls_back_as_in_rtcf_2021(alone: Launching) -> N
     assert runner.end() == DONE
 
 
+def test_an_invalid_ignore_expression_falls_back_as_in_rtcf_2021(alone: Launching) -> None:
+    runner = alone.node("rt_runner")
+    component = launcher(alone, "it", "_topics_ignore_for_graph:=*.tmp")
+    component.wait_for_output("loaded into runner")
+    (line,) = [each for each in component.output().splitlines() if "ERROR" in each]
+    assert "~topics_ignore_for_graph: " in line
+    assert "bad regular expression '*.tmp': " in line
+    assert line.endswith("; falling back to '.*'")
+    with alone.client() as (client, name):
+        (info,) = client.list_components(name)
+        assert info.spec.ignore == ".*"
+    assert (component.end(), runner.end()) == (DONE, DONE)
+
+
+def test_remaps_of_the_loops_own_names_cause_a_warning(alone: Launching) -> None:
+    runner = alone.node("rt_runner", "~iteration_info:=/ii", "/rosout:=/mine", "/in:=/out", "in:=x")
+    runner.wait_for_output("the loop runs")
+    assert runner.end() == DONE
+    lines = [each for each in runner.output().splitlines() if "remap of " in each]
+    assert len(lines) == 2
+    for line, names in zip(lines, ("~iteration_info to /ii", "/rosout to /mine"), strict=True):
+        assert "WARN" in line and f"remap of {names} ignored: " in line
+
+
+def test_commands_in_messages_fit_the_launch(alone: Launching) -> None:
+    runner = alone.node("rt_runner", "_mode:=wait_for_trigger")
+    runner.wait_for_output("waiting for ")
+    with alone.client() as (client, _):
+        assert f"waiting for `rtcfctl --socket {client.socket} -r rt_runner start`" in (
+            runner.output()
+        )
+    kind = ("rt_launcher", "rtcf_examples", "Identity")
+    first = alone.node(*kind, "__name:=first", "in:=/b", "out:=/a")
+    first.wait_for_output("loaded into runner")
+    second = alone.node(*kind, "__name:=second", "in:=/a", "out:=/b")
+    assert second.wait() == REFUSED
+    assert "the connections form a loop" in second.output()
+    assert "~topics_ignore_for_graph or ~is_first of first" in second.output()
+    assert "~topics_ignore_for_graph or ~is_first of second" in second.output()
+    assert "rtcfctl" not in second.output()
+    assert (first.end(), runner.end()) == (DONE, DONE)
+
+
 def test_a_launcher_waits_for_its_runner_and_can_be_interrupted(
     alone: Launching,
 ) -> None:
