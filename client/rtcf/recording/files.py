@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import BinaryIO, TypeVar
 
+from rtcf_shared.disks import free_mib
 from rtcf_shared.errors import RtcfError
 from rtcf_shared.mcap_writer import McapWriter
 from rtcf_shared.ports import PortBatch
@@ -15,6 +16,9 @@ from rtcf.connection import Closing
 
 Result = TypeVar("Result")
 
+# Free space at which a recording ends, so that it leaves room for others on its disk.
+LEAST_FREE_MIB = 100
+
 
 class Files(Closing):
     """Writes a stream to `path`; after each next() to a new file with -1, -2, … in its name.
@@ -22,9 +26,19 @@ class Files(Closing):
     Each file is a complete recording.  Methods raise RtcfError for errors of the disk.
     """
 
-    def __init__(self, path: Path, runner: str, *, force: bool = False) -> None:
+    def __init__(
+        self,
+        path: Path,
+        runner: str,
+        *,
+        force: bool = False,
+        least_free_mib: float = LEAST_FREE_MIB,
+    ) -> None:
         """Create the first file; raises ValueError if it exists, unless `force` is set, or if its
-        name promises another format than MCAP."""
+        name promises another format than MCAP.
+
+        If less than `least_free_mib` is free on the disk, this and flush() raise RtcfError.
+        """
         if path.name == "-":
             raise ValueError("-: a recording is written to a file, name one: FILE.mcap")
         if path.suffix in (".bag", ".csv"):
@@ -37,6 +51,7 @@ class Files(Closing):
         self._first = path
         self._runner = runner
         self._force = force
+        self._least_free_mib = least_free_mib
         self._begun_ns = 0
         self._open()
 
@@ -65,6 +80,9 @@ class Files(Closing):
     def flush(self) -> None:
         """Write buffered cycles to the disk."""
         self._doing(self._recorder.flush)
+        path = self.paths[-1]
+        if path.is_file():
+            self._require_room(path, "the recording ends; the cycles written before are readable")
 
     def next(self) -> None:
         """Close this file and open the next one."""
@@ -93,6 +111,8 @@ class Files(Closing):
         number = len(self.paths)
         stem, suffix = self._first.stem, self._first.suffix
         path = self._first.with_name(f"{stem}-{number}{suffix}") if number else self._first
+        if not path.exists():
+            self._require_room(path, "no cycle was written")
         try:
             # The file gets its name once it has a header, so that it is always readable.
             with whole_file(path, force=self._force) as part:
@@ -105,6 +125,17 @@ class Files(Closing):
         self.paths.append(path)
         self._begun_ns = 0
         self._recorder = Recorder(self._writer, self._runner)
+
+    def _require_room(self, path: Path, result: str) -> None:
+        try:
+            free = free_mib(path.parent)
+        except OSError:
+            return  # writing the file gives the reason
+        if free < self._least_free_mib:
+            raise RtcfError(
+                f"{path}: {free} MiB are free on its disk, less than {self._least_free_mib:g} "
+                f"(--min-free): {result}"
+            )
 
     def _finish(self) -> None:
         # Closing writes buffered data, so it can fail on a full disk, too.

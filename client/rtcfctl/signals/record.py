@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import rtcf
-from rtcf.recording.files import Files
+from rtcf.recording.files import LEAST_FREE_MIB, Files
 from rtcf.recording.moment import Moment
 from rtcf.streams.condition import Condition
 from rtcf.streams.ports import PortStream
@@ -65,6 +65,13 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
     record.add_argument(
         "--post", type=amount("s"), metavar="S", help=f"time after --trigger ({_AROUND_S:g})"
     )
+    record.add_argument(
+        "--min-free",
+        type=amount("MiB"),
+        default=float(LEAST_FREE_MIB),
+        metavar="MIB",
+        help=f"end when less is free on the disk of the file ({LEAST_FREE_MIB}; 0: never)",
+    )
     record.add_argument("--force", action="store_true", help="overwrite an existing file")
     record.set_defaults(run=run)
 
@@ -83,7 +90,10 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
             moment.condition.check(stream.schema)
         say_if_idle(client, args.runner, output)
         runner = args.runner or "rt_runner"
-        with ended_by_signals(stream), Files(args.file, runner, force=args.force) as files:
+        with (
+            ended_by_signals(stream),
+            Files(args.file, runner, force=args.force, least_free_mib=args.min_free) as files,
+        ):
             _follow(stream, files, moment, args, output)
     _tell(files, moment, output)
 
@@ -92,6 +102,7 @@ def _checked(args: argparse.Namespace) -> Moment | None:
     """Check the options; return the trigger, if there is one.  Raises ValueError."""
     _require("--duration", args.duration, "s")
     _require("--size", args.size, "MiB")
+    _require("--min-free", args.min_free, "MiB", or_none=True)
     if args.split and args.duration is None and args.size is None:
         raise ValueError("--split requires --duration or --size")
     if args.trigger is None:

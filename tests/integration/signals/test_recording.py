@@ -252,7 +252,7 @@ def test_a_full_disk_is_named_and_left_unchanged(running: Daemon, full_disk: Pat
     assert running.ctl("incident", "take").returncode == 0
     full = "No space left on device"
     for verb, what in {
-        "record --duration 0.5 -o": f"{full}: no cycle was written",
+        "record --duration 0.5 --min-free 0 -o": f"{full}: no cycle was written",
         "trace --cycles 100 -o": f" cannot be written: {full}",
         "incident export --to": f" cannot be written: {full}",
     }.items():
@@ -270,7 +270,9 @@ def test_a_disk_without_room_for_a_cycle_is_left_unchanged(
 ) -> None:
     # Room for the head of a file only.
     subprocess.run(["mount", "-o", "remount,size=8k", full_disk], check=True)
-    done = running.ctl("record", "--duration", "0.5", "-o", str(full_disk / "out"))
+    done = running.ctl(
+        *("record", "--duration", "0.5", "--min-free", "0", "-o", str(full_disk / "out"))
+    )
     assert done.returncode == 1
     end = "No space left on device: no cycle was written; the file has been removed"
     assert done.stderr == f"rtcfctl: {full_disk / 'out'}: {end}\n"
@@ -286,9 +288,32 @@ def test_a_disk_that_fills_up_ends_the_recording_with_a_readable_file(
     subprocess.run(["mount", "-t", "tmpfs", "-o", "size=256k", "none", disk], check=True)
     try:
         file = disk / "run.mcap"
-        done = running.ctl("record", "-o", str(file))
+        done = running.ctl("record", "-o", str(file), "--min-free", "0")
         assert done.returncode == 1
         assert "No space left on device: the cycles written before are readable" in done.stderr
+        with rtcf.read_recording(file) as recording:
+            assert len(recording.cycles) > 0
+    finally:
+        subprocess.run(["umount", disk], check=True)
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="requires root to mount a disk")
+def test_a_recording_leaves_room_on_its_disk(running: Daemon, tmp_path: Path) -> None:
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    subprocess.run(["mount", "-t", "tmpfs", "-o", "size=3m", "none", disk], check=True)
+    try:
+        file = disk / "run.mcap"
+        done = running.ctl("record", "-o", str(file))
+        assert done.returncode == 1
+        assert done.stderr == (
+            f"rtcfctl: {file}: 3 MiB are free on its disk, less than 100 (--min-free): "
+            "no cycle was written\n"
+        )
+        assert list(disk.iterdir()) == []
+        done = running.ctl("record", "-o", str(file), "--min-free", "2MiB")
+        assert done.returncode == 1
+        assert "less than 2 (--min-free): the recording ends; the cycles written" in done.stderr
         with rtcf.read_recording(file) as recording:
             assert len(recording.cycles) > 0
     finally:
