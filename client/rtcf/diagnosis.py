@@ -5,12 +5,13 @@ go through a Host with a configurable root.
 """
 
 import enum
-import os
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+
+from rtcf_shared.disks import free_mib
 
 
 class Grade(enum.IntEnum):
@@ -426,28 +427,28 @@ def _settings_of_memory(host: Host, _: Loop) -> Iterator[Finding]:
             )
 
 
-_JOURNAL_MIB = 500
+_STATE = "var/lib/rtcfd"
+_WANTED_MIB = 500
 
 
-def _journal(host: Host, _: Loop) -> Iterator[Finding]:
+def disk(topic: str, folder: Path, remedy: str, shown: str = "", note: str = "") -> Finding:
+    """Return the finding on the free space on the disk of a folder; `note` follows the space."""
+    free = free_mib(folder)
+    found = f"{free} MiB free at {shown or folder}{note}"
+    if free >= _WANTED_MIB:
+        return Finding(topic, Grade.GOOD, found)
+    return Finding(topic, Grade.WARNING, found, f"{_WANTED_MIB} MiB", remedy)
+
+
+def _disks(host: Host, _: Loop) -> Iterator[Finding]:
+    if (state := host.root / _STATE).is_dir():
+        remedy = "rtcfctl incident rm, or lower incidents_mb in /etc/rtcfd/rtcfd.toml"
+        yield disk("disk of state and incidents", state, remedy, f"/{_STATE}")
     topic = "journal's disk"
     for folder in ("var/log/journal", "run/log/journal"):
-        path = host.root / folder
-        if not path.is_dir():
-            continue
-        found = os.statvfs(path)
-        free_mib = found.f_bavail * found.f_frsize // 2**20
-        if free_mib >= _JOURNAL_MIB:
-            yield Finding(topic, Grade.GOOD, f"{free_mib} MiB free at /{folder}")
-        else:
-            yield Finding(
-                topic,
-                Grade.WARNING,
-                f"{free_mib} MiB free at /{folder}",
-                f"{_JOURNAL_MIB} MiB",
-                "journalctl --vacuum-size=100M",
-            )
-        return
+        if (path := host.root / folder).is_dir():
+            yield disk(topic, path, "journalctl --vacuum-size=100M", f"/{folder}")
+            return
     yield Finding(topic, Grade.WARNING, "no journal", "a journal", "apt install systemd")
 
 
@@ -480,6 +481,6 @@ def _ros(host: Host, _: Loop) -> Iterator[Finding]:
 
 _CHECKS: tuple[Callable[[Host, Loop], Iterator[Finding]], ...] = (
     _kernel, _rights, _locked, _throttling, _group_scheduling, _isolation, _interrupts,
-    _competitors, _governor, _idle_states, _smt, _clock, _swap, _settings_of_memory, _journal,
+    _competitors, _governor, _idle_states, _smt, _clock, _swap, _settings_of_memory, _disks,
     _ros,
 )  # fmt: skip

@@ -7,15 +7,17 @@ import time
 import uuid
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import rtcf
-from rtcf.diagnosis import Finding, Grade, Host, Loop, cpu_of_next_loop, diagnose
+from rtcf.diagnosis import Finding, Grade, Host, Loop, cpu_of_next_loop, diagnose, disk
+from rtcf.recording.files import LEAST_FREE_MIB
 from rtcf.v1 import control_pb2, runner_pb2
 from rtcf_shared.enums import word
 
 from rtcfctl.terminal.output import Output
-from rtcfctl.terminal.words import amount
+from rtcfctl.terminal.words import amount, counted
 
 _SECONDS = 10.0
 _FREQUENCY_HZ = 1000.0
@@ -50,7 +52,8 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> int:
     found = _ask(client, args.runner)
     status = found.runner
     loop = _loop(host, found)
-    findings = [*_of_rtcfd(found), *diagnose(host, loop)]
+    findings = [*_of_rtcfd(found), *_of_incidents(client, found), *diagnose(host, loop)]
+    findings.append(_of_recordings())
     latency = _Latency(why_not="rtcfd does not answer" if args.seconds else "--seconds 0")
     if args.seconds and status is not None:
         latency = _measure(client, host, found, loop.cpu, args.seconds, output)
@@ -119,6 +122,39 @@ def _of_rtcfd(found: _Answer) -> list[Finding]:
         text = f"answers; its loop is {state}"
         findings.append(Finding(topic, Grade.GOOD, text))
     return findings
+
+
+def _of_incidents(client: rtcf.Client, found: _Answer) -> list[Finding]:
+    """Return the finding on incidents of all runners that nobody has read."""
+    if found.runner is None:
+        return []
+    try:
+        unseen = [each for each in client.list_incidents() if not each.seen]
+    except rtcf.RtcfError as error:
+        return [Finding("incidents", Grade.UNKNOWN, str(error))]
+    if not unseen:
+        return [Finding("incidents", Grade.GOOD, "none that nobody has looked at")]
+    newest = unseen[-1]
+    return [
+        Finding(
+            "incidents",
+            Grade.WARNING,
+            f"{counted(len(unseen), 'incident')} that nobody has looked at; the newest: "
+            f"{newest.reason or newest.name}",
+            "looked at, or removed",
+            f"rtcfctl incident show {newest.name}",
+        )
+    ]
+
+
+def _of_recordings() -> Finding:
+    """Return the finding on the disk of the current folder, where recordings are written."""
+    floor = f"; rtcfctl record ends at {LEAST_FREE_MIB} MiB"
+    topic = "disk of recordings"
+    try:
+        return disk(topic, Path.cwd(), "remove files, or use another disk", note=floor)
+    except OSError as error:  # the folder has been removed
+        return Finding(topic, Grade.UNKNOWN, str(error))
 
 
 @dataclass(frozen=True)

@@ -75,8 +75,9 @@ def show_all(client: rtcf.Client, args: argparse.Namespace, output: Output) -> N
         output.data(found)
         return
     output.table(
-        ("incident", "runner", "time", "MB", "reason"),
-        [(each.name, each.runner, date(each.time_ns), f"{each.bytes / 1e6:.1f}", each.reason)
+        ("incident", "runner", "time", "MB", "seen", "reason"),
+        [(each.name, each.runner, date(each.time_ns), f"{each.bytes / 1e6:.1f}",
+          "yes" if each.seen else "no", each.reason)
          for each in found],
         right=("MB",),
     )  # fmt: skip

@@ -30,6 +30,7 @@ from rtcfd.incidents import frame_memory, head
 log = logging.getLogger(__name__)
 
 _SUFFIX = ".mcap"
+_SEEN = ".seen"  # of an empty file beside one that a client has read
 _NAME = re.compile(r"[A-Za-z0-9_.-]+\Z")
 _PACE_S = 10.0  # shortest time between two automatic incidents of one runner
 _WRITE_TIMEOUT_S = 120.0
@@ -114,6 +115,12 @@ class Incidents:
     async def read(self, incident: incidents_pb2.Incident, at: int) -> bytes:
         """Return a piece of the file from byte `at` on; empty at its end."""
         return await self._look(_piece, Path(incident.file), at)  # type: ignore[no-any-return]
+
+    async def note_seen(self, incident: incidents_pb2.Incident) -> None:
+        """Note that a client has read the whole file."""
+        mark = Path(incident.file).with_suffix(_SEEN)
+        with contextlib.suppress(Unavailable):  # a full disk must not hide an incident
+            await self._look(mark.touch)
 
     async def remove(self, names: Sequence[str]) -> list[incidents_pb2.Incident]:
         """Remove files; none of them if there is no incident of one of the names."""
@@ -203,7 +210,7 @@ def _tidy(folder: Path, most: int, newest: Path) -> None:
         file = Path(each.file)
         room -= each.bytes
         if room < 0 and file != newest:
-            file.unlink(missing_ok=True)
+            _remove(file)
             log.info("incident %s removed: the incidents exceed incidents_mb", file.stem)
 
 
@@ -233,6 +240,7 @@ def _incident(file: Path) -> incidents_pb2.Incident:
         file=str(file),
         reason=fields.get("reason", ""),
         sequence=_number(fields, "sequence", 0),
+        seen=file.with_suffix(_SEEN).exists(),
     )
 
 
@@ -249,3 +257,4 @@ def _piece(file: Path, at: int) -> bytes:
 
 def _remove(file: Path) -> None:
     file.unlink(missing_ok=True)
+    file.with_suffix(_SEEN).unlink(missing_ok=True)

@@ -149,6 +149,7 @@ class Control(control_pb2_grpc.ControlServicer):
         while piece := await kept.read(found, at):
             at += len(piece)
             yield incidents_pb2.ReadIncidentResponse(data=piece)
+        await kept.note_seen(found)
 
     @unary
     async def ListComponents(self, request: control_pb2.ListComponentsRequest) -> Any:

@@ -156,6 +156,26 @@ def test_an_incident_of_a_running_loop_is_kept_on_request(
     assert incident.name in daemon.ctl("incident", "list").stdout
 
 
+def test_doctor_names_incidents_that_nobody_has_looked_at(
+    daemon: Daemon, client: rtcf.Client
+) -> None:
+    def said() -> str:
+        return daemon.ctl("doctor", "--seconds", "0").stdout
+
+    client.load(rtcf.component("rtcf_test", "Counter", name="a"))
+    client.start()
+    wait_for(lambda: state(client).iteration > 100, "some cycles")
+    assert "incidents: none that nobody has looked at" in said()
+    first, second = (client.take_incident(reason=reason) for reason in ("one", "two"))
+    assert "incidents: 2 incidents that nobody has looked at; the newest: two" in said()
+    assert f"remedy:    rtcfctl incident show {second.name}" in said()
+    assert daemon.ctl("incident", "show", second.name).returncode == 0
+    assert "incidents: 1 incident that nobody has looked at; the newest: one" in said()
+    client.remove_incidents([first.name, second.name])
+    assert "incidents: none that nobody has looked at" in said()
+    assert list(Path(first.file).parent.iterdir()) == []
+
+
 def test_a_file_is_exported_and_removed(
     daemon: Daemon, client: rtcf.Client, tmp_path: Path
 ) -> None:

@@ -102,6 +102,24 @@ def test_each_finding_follows_the_machine(
     assert {other for other, each in found.items() if each.grade > Grade.UNKNOWN} == {topic}
 
 
+def test_a_full_disk_is_a_finding(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rtcf.diagnosis.free_mib", lambda _: 99)
+    found = findings(tmp_path, {"/var/lib/rtcfd/state.json": ""})
+    for topic, remedy in (
+        ("disk of state and incidents", "rtcfctl incident rm"),
+        ("journal's disk", "journalctl --vacuum-size"),
+    ):
+        assert found[topic].grade == Grade.WARNING
+        assert found[topic].found.startswith("99 MiB free at /var/l")
+        assert remedy in found[topic].remedy
+
+
+def test_it_names_the_free_space_at_which_a_recording_ends(daemon: DaemonUnderTest) -> None:
+    said = daemon.ctl("doctor", "--seconds", "0").stdout
+    assert "disk of recordings: " in said
+    assert "; rtcfctl record ends at 100 MiB" in said
+
+
 def test_swap_is_a_finding_for_an_unlocked_loop(tmp_path: Path) -> None:
     swaps = {"/proc/swaps": "Filename Type\n/dev/sda2 partition"}
     assert findings(tmp_path, swaps)["swap"].grade == Grade.GOOD
