@@ -35,7 +35,7 @@ _PREDECESSOR_S = 5.0
 _DISPLACED_S = 10.0
 _END_S = 3.0
 _LAST_CALL_S = 0.5
-_CHECK_S = 1.0  # between two checks of the loop's node
+_CHECK_S = 1.0  # between two checks of the loop and its node
 _STATISTICS_S = 1.0  # timeout of a query for statistics
 _FIXED_NAMES = ("/rosout", "/diagnostics", "/clock")  # of the loop's node, besides those below it
 
@@ -272,7 +272,7 @@ class RunnerNode:
             self._apply()  # before launchers load, since it unloads all other components
         self._announce(runner_entry.own_entry(self._runner, self._client.socket, self._token))
         self._taken_once = True
-        threading.Thread(target=self._watch_node, args=(self._client,), daemon=True).start()
+        threading.Thread(target=self._watch_loop, args=(self._client,), daemon=True).start()
         if self._parameters.mode == "wait_for_components":
             what = f"waiting for {self._parameters.components} components"
         elif self._parameters.mode == "wait_for_trigger":
@@ -301,18 +301,23 @@ class RunnerNode:
             self._announce(self._entry)
             self._screen.info("registered again at the ROS master")
 
-    def _watch_node(self, client: rtcf.Client) -> None:
-        """End when a ROS peer kills the loop's node, which has the name in the launch file."""
+    def _watch_loop(self, client: rtcf.Client) -> None:
+        """Warn of each silence of a simulated clock.  End when a ROS peer kills the loop's node,
+        which has the name in the launch file."""
+        silent = False
         while not self._over.wait(_CHECK_S):
             with contextlib.suppress(rtcf.RtcfError, ValueError):  # closed meanwhile
                 (status,) = client.get_status(self._runner).runners
                 if status.ros.killed:
                     self._inbox.request_end("a ROS node requested a shutdown")
+                if status.clock_silence and not silent:
+                    self._screen.warn(status.clock_silence)
+                silent = bool(status.clock_silence)
 
     def _report(self, report: control_pb2.HoldReport) -> None:
         if report.running and not self._was_running:
             self._screen.info(f"the loop runs with {report.components} components")
-            self._say_what_is_missing()
+            self._say_status()
         elif self._was_running and not report.running:
             if not report.fault:
                 self._screen.info("the loop is stopped")
@@ -330,11 +335,14 @@ class RunnerNode:
         if due and not report.running:
             self._start()
 
-    def _say_what_is_missing(self) -> None:
-        """Warn of each missing prerequisite of real time, once per launch."""
+    def _say_status(self) -> None:
+        """Print the source of a simulated time, and warn of each missing prerequisite of real time
+        once per launch."""
         assert self._client is not None
         with contextlib.suppress(rtcf.RtcfError):
             for runner in self._client.get_status(self._runner).runners:
+                if runner.simulated:
+                    self._screen.info("the loop follows /clock: its time is simulated")
                 for reason in runner.degraded:
                     if reason not in self._said_missing:
                         self._screen.warn(f"!! {self._runner} IS NOT REAL TIME: {reason}")

@@ -56,7 +56,10 @@ def print_runners(runners: list[runner_pb2.RunnerStatus], output: Output) -> Non
         (
             (
                 runner.runner,
-                (enumerator(runner, "state"), STYLES.get(runner.state, "")),
+                (
+                    enumerator(runner, "state") + ", simulated" * runner.simulated,
+                    STYLES.get(runner.state, ""),
+                ),
                 f"{runner.settings.frequency_hz:g}",
                 _cpu(runner),
                 runner.settings.priority,
@@ -99,6 +102,8 @@ def _details(runner: runner_pb2.RunnerStatus, output: Output) -> None:
     """Print status lines that are not in the table."""
     if runner.status:
         output.line(f"{runner.runner}: {runner.status}", "yellow")
+    if runner.clock_silence:
+        output.line(f"{runner.runner}: {runner.clock_silence}", "yellow")
     if runner.faults:
         output.line(
             f"{runner.runner}: {counted(runner.faults, 'fault')} of components since its loop "

@@ -290,7 +290,7 @@ class _Top:
             *([f"!! {self._error}"] if self._error else []),
             *(f"!! NOT REAL TIME: {each}" for each in status.degraded),
             *([f"!! LATE: {status.late}"] if status.late else []),
-            *([status.status] if status.status else []),
+            *(each for each in (status.status, status.clock_silence) if each),
         ]
         return [first, *(line for each in warnings for line in _folded(each, width, "bold red"))]
 

@@ -115,9 +115,9 @@ def _of_rtcfd(found: _Answer) -> list[Finding]:
     if lines := [str(line) for line in status.degraded]:
         text = "; ".join(lines)
         findings.append(Finding(topic, Grade.WARNING, f"degraded: {text}", "real time"))
-    if status.status:
-        findings.append(Finding(topic, Grade.WARNING, status.status, "no notes"))
-    if not status.degraded and not status.status:
+    notes = [note for note in (status.status, status.clock_silence) if note]
+    findings += [Finding(topic, Grade.WARNING, note, "no notes") for note in notes]
+    if not status.degraded and not notes:
         state = word(runner_pb2.RunnerState.DESCRIPTOR, status.state)
         text = f"answers; its loop is {state}"
         findings.append(Finding(topic, Grade.GOOD, text))

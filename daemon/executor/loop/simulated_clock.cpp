@@ -1,5 +1,6 @@
 #include "loop/simulated_clock.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace rtcf::executor {
@@ -12,6 +13,7 @@ void SimulatedClock::tick(std::int64_t now_ns, std::int64_t arrived_ns) {
         } else {
             ticks_.back() = {now_ns, arrived_ns};
         }
+        if (!moved_ || moved_->time_ns != now_ns) moved_ = {now_ns, arrived_ns};
     }
     ticked_.notify_one();
 }
@@ -21,6 +23,8 @@ void SimulatedClock::reset(std::int64_t max_jump_ns) {
     ticks_.clear();
     tick_.reset();
     jumps_.clear();
+    steps_ = {};
+    moved_.reset();
     max_jump_ns_ = max_jump_ns;
 }
 
@@ -35,6 +39,12 @@ std::optional<SimulatedCycle> SimulatedClock::next(std::int64_t period_ns,
         if (!ticked_.wait_until(lock, until, [this] { return !ticks_.empty(); })) return {};
         const Tick tick = ticks_.front();
         ticks_.pop_front();
+        const std::int64_t step = tick_ ? tick_->time_ns - tick.time_ns : 0;
+        if (step > 0 && step <= kLongestStep) {
+            ++steps_.count;
+            steps_.longest_ns = std::max(steps_.longest_ns, step);
+            continue;
+        }
         const std::optional<Tick> last = std::exchange(tick_, tick);
         before_ = last.value_or(tick);
         const std::int64_t leap = tick.time_ns - before_.time_ns;
@@ -72,6 +82,16 @@ std::optional<ClockJump> SimulatedClock::takeJump() {
     const ClockJump jump = jumps_.front();
     jumps_.pop_front();
     return jump;
+}
+
+ClockSteps SimulatedClock::takeSteps() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return std::exchange(steps_, {});
+}
+
+std::optional<std::int64_t> SimulatedClock::lastMove() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return moved_ ? std::optional(moved_->arrived_ns) : std::nullopt;
 }
 
 std::optional<std::int64_t> SimulatedClock::now() const {

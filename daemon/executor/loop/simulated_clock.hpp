@@ -21,14 +21,25 @@ struct SimulatedCycle {
     double rate = 0.0;  ///< simulated time per real time since the last cycle; 0 = start or jump
 };
 
-/// A tick that restarts the count of cycles: the first one, one backwards, or one too far ahead.
+/// A tick that restarts the count of cycles: the first one, one far back, or one too far ahead.
 struct ClockJump {
     std::optional<std::int64_t> from_ns;  ///< previous tick; unset = this is the first one
     std::int64_t to_ns = 0;
 };
 
+/// Ticks that were a little earlier than the ones before them, as of a bag that is played, or of
+/// two clocks. No cycle runs until the clock has caught up.
+struct ClockSteps {
+    std::uint64_t count = 0;
+    std::int64_t longest_ns = 0;
+};
+
 class SimulatedClock {
    public:
+    /// Longest step back that is not a jump. Longer than the jitter of a clock, and much shorter
+    /// than a simulation or a bag that begins again.
+    static constexpr std::int64_t kLongestStep = 100'000'000;
+
     /// @name The thread that delivers ticks
     /// @{
     /// Sets the clock to `now_ns` (since 1970 or any other epoch). Returns at once.
@@ -55,6 +66,10 @@ class SimulatedClock {
     /// @{
     /// Takes the oldest jump.
     std::optional<ClockJump> takeJump();
+    /// Takes the steps back since the last call.
+    ClockSteps takeSteps();
+    /// Arrival of the last tick that changed the time; unset = none since reset().
+    std::optional<std::int64_t> lastMove() const;
     /// The last tick that the loop has reached.
     std::optional<std::int64_t> now() const;
     /// @}
@@ -82,6 +97,8 @@ class SimulatedClock {
     std::int64_t arrived_ns_ = 0;  // its arrival time
     std::int64_t max_jump_ns_ = INT64_MAX;
     std::deque<ClockJump> jumps_;
+    ClockSteps steps_;
+    std::optional<Tick> moved_;  // newest tick that changed the time
 };
 
 }  // namespace rtcf::executor

@@ -154,6 +154,7 @@ void LoopControl::loopEnded() {
     loop_.join(INT64_MAX);
     simulation_.end(settings_, *plan_);
     reportOverruns(true);
+    simulation_.report(report_event_, true);
     noteLoopFault();
     plan_.stopComponents();
     publish({loop_.fault().component_name.data()});
@@ -196,7 +197,7 @@ void LoopControl::tick() {
     }
     faults_.reportComponents(plan_->graph);
     reportOverruns(false);
-    simulation_.reportJumps(report_event_);
+    simulation_.report(report_event_, false);
     faults_.reportLostMessages(*plan_, settings_.bridge.largest_message);
 }
 
@@ -242,6 +243,7 @@ void LoopControl::publishStatus() {
     status.loop_fault = loop_fault_;
     status.bridge = bridge_.status();
     status.simulated = simulation_.active();
+    status.clock_silence = simulation_.silence();
     status.too_large = faults_.lostMessages();
     publication_.setStatus(std::move(status));
 }

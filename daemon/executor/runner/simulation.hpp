@@ -3,8 +3,10 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <functional>
 #include <memory>
+#include <string>
 
 #include "loop/loop.hpp"
 #include "loop/simulated_clock.hpp"
@@ -34,17 +36,29 @@ class Simulation {
     void end(RunnerSettings& settings, const Plan& plan);
     /// True between begin() and end().
     bool active() const noexcept { return active_; }
-    /// Reports jumps of the clock.
-    void reportJumps(const ReportEvent& report_event);
+    /// The reason why no cycle runs while the clock is silent or stands still; empty = it moves.
+    std::string silence() const;
+    /// Reports the clock's jumps, steps back and silence; summarises many.
+    /// @param last true = report what is left, as the loop has ended
+    void report(const ReportEvent& report_event, bool last);
 
    private:
     void set(bool active, RunnerSettings& settings, const Plan& plan);
+    void reportJump(const ClockJump& jump, const ReportEvent& report_event);
+    void send(const std::string& message, const ReportEvent& report_event) const;
 
     const Loop& loop_;
     BridgeLink& bridge_;
     const std::atomic<bool>& ending_;
     std::shared_ptr<SimulatedClock> clock_ = std::make_shared<SimulatedClock>();
     bool active_ = false;
+    // Times are CLOCK_MONOTONIC.
+    std::int64_t begun_ns_ = 0;
+    bool silence_reported_ = false;  // the present one
+    std::uint64_t jumps_ = 0;        // since the last summary
+    std::int64_t jumps_begun_ns_ = 0;
+    ClockSteps steps_;  // not reported yet
+    std::int64_t steps_reported_ns_ = 0;
 };
 
 }  // namespace rtcf::executor

@@ -701,6 +701,7 @@ pb::RunnerStatus Server::status() const {
     status.set_state(stateTo(present.state));
     status.set_status(present.loop_fault);
     status.set_simulated(present.simulated);
+    status.set_clock_silence(present.clock_silence);
     if (const RunningHook hook = stuck(); !hook.component.empty()) {
         status.set_state(pb::RUNNER_STATE_STUCK);
         status.set_status(stuckText(hook));

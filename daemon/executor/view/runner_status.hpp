@@ -28,6 +28,7 @@ struct RunnerStatus {
     std::string loop_fault;             ///< the fault that ended the loop; empty = none
     BridgeStatus bridge;
     bool simulated = false;       ///< the loop follows a simulated clock
+    std::string clock_silence;    ///< why no simulated cycle runs; empty = the clock moves
     std::uint64_t too_large = 0;  ///< messages lost because of their size
 };
 

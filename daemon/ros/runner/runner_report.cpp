@@ -79,7 +79,7 @@ rtcf_msgs::GetLoop::Response describeRunner(const executor::RunnerView& runner) 
     rtcf_msgs::GetLoop::Response response;
     response.runner = runner.name();
     response.state = stateName(present.state);
-    response.status = present.loop_fault;
+    response.status = present.loop_fault.empty() ? present.clock_silence : present.loop_fault;
     response.frequency = present.settings.frequency_hz;
     response.iteration = statistics.iteration.load(std::memory_order_relaxed);
     response.overruns = statistics.overruns.value();
@@ -228,6 +228,10 @@ DiagnosticStatus DiagnosticReport::loopStatus() {
         if (present.degraded != degraded_) raise(status, DiagnosticStatus::WARN, status.message);
     }
     degraded_ = present.degraded;
+    if (!present.clock_silence.empty()) {
+        raise(status, DiagnosticStatus::WARN,
+              fmt::format("{}: {}", stateName(present.state), present.clock_silence));
+    }
     const double wanted_hz = present.settings.frequency_hz;
     const double done_hz =
         elapsed_ns > 0 ? static_cast<double>(done) * 1e9 / static_cast<double>(elapsed_ns) : 0.0;
@@ -262,7 +266,10 @@ DiagnosticStatus DiagnosticReport::loopStatus() {
     addValue(status, "messages passed over for newer ones", passed_over);
     addValue(status, "log records lost", logs);
     addValue(status, "cycle messages lost", cycles);
-    addValue(status, "real time", present.degraded.empty() ? "yes" : joined(present.degraded));
+    addValue(status, "real time",
+             present.simulated          ? "no: follows /clock"
+             : present.degraded.empty() ? "yes"
+                                        : joined(present.degraded));
     addMicroseconds(status, "calculation",
                     summarize(difference(duration, duration_), loop.counter().nsPerTick()));
     addMicroseconds(status, "wake-up latency", summarize(difference(latency, latency_), 1.0));

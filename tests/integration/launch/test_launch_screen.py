@@ -2,6 +2,7 @@
 
 import re
 
+import rosgraph
 from daemon_process import wait_for
 from launch_processes import Launching
 
@@ -64,6 +65,21 @@ def test_missing_real_time_rights_are_warned_of_once_per_launch(launching: Launc
     for reason in reasons:
         (line,) = [each for each in runner.output().splitlines() if each.endswith(reason)]
         assert line.startswith("[ WARN] ") and "!! rt_runner IS NOT REAL TIME: " in line
+
+
+def test_a_loop_that_waits_for_the_clock_says_so(launching: Launching) -> None:
+    parameters = rosgraph.Master("/test", launching.master.uri)
+    parameters.setParam("/use_sim_time", True)
+    try:
+        runner = launching.node("rt_runner")
+        runner.wait_for_output("the loop follows /clock: its time is simulated")
+        silence = "no cycle runs: no message on /clock for "
+        runner.wait_for_output(silence)
+        assert runner.end() == DONE
+        (line,) = [each for each in runner.output().splitlines() if silence in each]
+        assert line.startswith("[ WARN] ")
+    finally:
+        parameters.deleteParam("/use_sim_time")
 
 
 def test_the_format_of_rosconsole_is_used(launching: Launching) -> None:

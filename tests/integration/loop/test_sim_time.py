@@ -61,10 +61,17 @@ def simulated(master: Master) -> Iterator[Master]:
 
 
 @pytest.fixture
-def client(tmp_path: Path, simulated: Master) -> Iterator[rtcf.Client]:
-    """Yield a client of a daemon whose loop counts its cycles and forwards /in."""
+def daemon(tmp_path: Path, simulated: Master) -> Iterator[Daemon]:
+    """Yield a daemon with this master."""
     daemon = Daemon(tmp_path, with_ros(simulated.uri, "/in|/out"))
     daemon.start()
+    yield daemon
+    daemon.end()
+
+
+@pytest.fixture
+def client(daemon: Daemon) -> Iterator[rtcf.Client]:
+    """Yield a client of the daemon, whose loop counts its cycles and forwards /in."""
     with rtcf.Client(daemon.socket) as client:
         client.set_runner(runner_pb2.RunnerSettings(frequency_hz=1000.0, max_clock_jump_s=2.0))
         client.load(
@@ -73,7 +80,6 @@ def client(tmp_path: Path, simulated: Master) -> Iterator[rtcf.Client]:
             )
         )
         yield client
-    daemon.end()
 
 
 @pytest.fixture
@@ -135,6 +141,57 @@ def test_a_jump_of_the_clock_runs_one_cycle_and_is_reported(
     wait_for(lambda: "jumped from 0.003000000 s to 60.0" in log.read_text(), "the jump's event")
     assert log.read_text().count("the simulated clock jumped from") == 2
     assert log.read_text().count("the simulated clock begins at 1.000000000 s") == 1
+
+
+def test_short_steps_back_of_the_clock_are_waited_out_and_summarised(
+    client: rtcf.Client, clock: Clock, daemon: Daemon
+) -> None:
+    # Each fifth tick is 8 ms earlier than the one before it.
+    late = [18_000_000 if k % 5 == 4 else 0 for k in range(201)]
+    clock.tick(*(SECOND + k * 10_000_000 - late[k] for k in range(201)))
+    _wait_for_exactly(client, 2001)
+    client.stop()
+    counts = re.findall(
+        r"the simulated clock went back (\S+)(?: times)?, by 0\.008000000 s at most", daemon.log()
+    )
+    assert sum(1 if count == "once" else int(count) for count in counts) == 40
+    assert daemon.log().count("the simulated clock") <= 3  # with the first tick
+
+
+def test_many_jumps_of_the_clock_are_summarised(
+    client: rtcf.Client, clock: Clock, daemon: Daemon
+) -> None:
+    clock.tick(*(SECOND * (1 + k % 2) for k in range(100)))  # a bag that is repeated
+    _wait_for_exactly(client, 50 + 50 * 1000)
+    client.stop()
+    lines = daemon.log().count("the simulated clock jumped from")
+    more = re.findall(r"the simulated clock jumped ([0-9]+) more times", daemon.log())
+    assert lines + sum(map(int, more)) == 49
+    assert lines <= 10
+
+
+def test_a_silent_clock_is_reported(
+    client: rtcf.Client, daemon: Daemon, simulated: Master, tmp_path: Path
+) -> None:
+    client.start()
+    silence = "no cycle runs: no message on /clock for "
+    wait_for(lambda: silence in state(client).clock_silence, "the report of a silent clock")
+    shown = daemon.ctl("status").stdout
+    assert "running, simulated" in shown
+    assert f"rt_runner: {silence}" in shown
+    assert f"runner rt_runner: {silence}" in daemon.ctl("doctor", "--seconds", "0").stdout
+    wait_for(lambda: silence in daemon.log(), "the event")
+    assert daemon.log().count(silence) == 1
+    wait_for(
+        lambda: f"running: {silence}" in simulated.run("rostopic", "echo", "-n1", "/diagnostics"),
+        "the warning in /diagnostics",
+    )
+    clock = Clock(simulated, tmp_path)
+    clock.wait_until_connected()
+    clock.tick(SECOND, SECOND + 5_000_000)
+    _wait_for_exactly(client, 6)
+    wait_for(lambda: "/clock has been at 1.005" in state(client).clock_silence, "a stopped clock")
+    clock.end()
 
 
 def test_published_stamps_have_simulated_time(

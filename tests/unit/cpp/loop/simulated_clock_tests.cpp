@@ -74,13 +74,55 @@ TEST(SimulatedClock, ContinuesAfterAJumpWithOneCycle) {
     EXPECT_EQ(due(clock, 50), (Times{1000, 1050, 1100}));
     clock.tick(1201, 0);
     EXPECT_EQ(due(clock, 50), Times{1201});
-    clock.tick(20, 0);
-    clock.tick(75, 0);
-    EXPECT_EQ(due(clock, 50), (Times{20, 70}));
+    const std::int64_t back = 1201 - SimulatedClock::kLongestStep - 1;
+    clock.tick(back, 0);
+    clock.tick(back + 55, 0);
+    EXPECT_EQ(due(clock, 50), (Times{back, back + 50}));
     std::vector<std::int64_t> to;
     while (const auto jump = clock.takeJump()) to.push_back(jump->to_ns);
-    EXPECT_EQ(to, (Times{1000, 1201, 20}));
-    EXPECT_EQ(clock.now(), 75);
+    EXPECT_EQ(to, (Times{1000, 1201, back}));
+    EXPECT_EQ(clock.now(), back + 55);
+    EXPECT_EQ(clock.takeSteps().count, 0);
+}
+
+TEST(SimulatedClock, WaitsOutShortStepsBack) {
+    constexpr std::int64_t kSpan = 1000 * kMillisecond;
+    SimulatedClock clock;
+    clock.reset(kNoJump);
+    std::size_t cycles = 0;
+    // Each fifth tick is 8 ms late, as of a bag with a jittering clock.
+    for (std::int64_t tick = 0; tick <= 100; ++tick) {
+        const std::int64_t late = tick % 5 == 4 ? 18 * kMillisecond : 0;
+        clock.tick(tick * 10 * kMillisecond - late, 0);
+        cycles += due(clock, kMillisecond).size();
+    }
+    EXPECT_EQ(cycles, kSpan / kMillisecond + 1);
+    EXPECT_TRUE(clock.takeJump());
+    EXPECT_FALSE(clock.takeJump());
+    const executor::ClockSteps steps = clock.takeSteps();
+    EXPECT_EQ(steps.count, 20);
+    EXPECT_EQ(steps.longest_ns, 8 * kMillisecond);
+    EXPECT_EQ(clock.takeSteps().count, 0);
+}
+
+TEST(SimulatedClock, FollowsAClockThatGoesBackInManyShortSteps) {
+    SimulatedClock clock;
+    clock.reset(kNoJump);
+    for (std::int64_t tick = 100; tick >= 0; --tick) clock.tick(tick * 10 * kMillisecond, 0);
+    Times times = due(clock, kMillisecond);
+    ASSERT_EQ(times.size(), 10);
+    EXPECT_EQ(times.back(), 10 * kMillisecond);
+}
+
+TEST(SimulatedClock, KnowsWhenItMovedLast) {
+    SimulatedClock clock;
+    clock.reset(kNoJump);
+    EXPECT_FALSE(clock.lastMove());
+    clock.tick(5000, 100);
+    clock.tick(5000, 200);
+    EXPECT_EQ(clock.lastMove(), 100);
+    clock.tick(5010, 300);
+    EXPECT_EQ(clock.lastMove(), 300);
 }
 
 TEST(SimulatedClock, ForgetsItsTicksAtARestart) {
@@ -110,7 +152,7 @@ TEST(SimulatedClock, SpreadsArrivalsBetweenTwoTicksOverTheirCycles) {
     clock.tick(145, 9000);  // it has stopped: arrivals do not get later times
     clock.tick(155, 9100);
     EXPECT_EQ(arrivals(), Times{9050});
-    clock.tick(20, 9500);  // a jump: earlier arrivals are older
+    clock.tick(-SimulatedClock::kLongestStep, 9500);  // a jump: earlier arrivals are older
     EXPECT_EQ(arrivals(), Times{9500});
 }
 
@@ -136,9 +178,10 @@ TEST(SimulatedClock, KnowsItsRateBetweenCycles) {
     EXPECT_EQ(rates(), Rates{10.0 / (9010 - 9005)});
     clock.tick(150, 9010);
     EXPECT_EQ(rates(), Rates{0.0}) << "no time has passed";
-    clock.tick(20, 9500);
+    const std::int64_t back = -SimulatedClock::kLongestStep;
+    clock.tick(back, 9500);
     EXPECT_EQ(rates(), Rates{0.0}) << "the clock jumped";
-    clock.tick(30, 9520);
+    clock.tick(back + 10, 9520);
     EXPECT_EQ(rates(), Rates{0.5});
 }
 
