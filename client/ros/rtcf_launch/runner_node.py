@@ -302,9 +302,10 @@ class RunnerNode:
             self._screen.info("registered again at the ROS master")
 
     def _watch_loop(self, client: rtcf.Client) -> None:
-        """Warn of each silence of a simulated clock.  End when a ROS peer kills the loop's node,
-        which has the name in the launch file."""
+        """Warn of each silence of a simulated clock, and of problems of the loop's node.  End when
+        a ROS peer kills that node, which has the name in the launch file."""
         silent = False
+        problem = ""
         while not self._over.wait(_CHECK_S):
             with contextlib.suppress(rtcf.RtcfError, ValueError):  # closed meanwhile
                 (status,) = client.get_status(self._runner).runners
@@ -313,6 +314,9 @@ class RunnerNode:
                 if status.clock_silence and not silent:
                     self._screen.warn(status.clock_silence)
                 silent = bool(status.clock_silence)
+                if status.ros.connected and status.ros.problem not in ("", problem):
+                    problem = status.ros.problem
+                    self._screen.warn(problem)
 
     def _report(self, report: control_pb2.HoldReport) -> None:
         if report.running and not self._was_running:

@@ -117,6 +117,8 @@ def _of_rtcfd(found: _Answer) -> list[Finding]:
         findings.append(Finding(topic, Grade.WARNING, f"degraded: {text}", "real time"))
     notes = [note for note in (status.status, status.clock_silence) if note]
     findings += [Finding(topic, Grade.WARNING, note, "no notes") for note in notes]
+    if problem := status.ros.problem:
+        findings.append(Finding(f"ROS node of {topic}", Grade.WARNING, problem, "no notes"))
     if not status.degraded and not notes:
         state = word(runner_pb2.RunnerState.DESCRIPTOR, status.state)
         text = f"answers; its loop is {state}"

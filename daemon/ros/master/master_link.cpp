@@ -12,6 +12,10 @@ namespace {
 constexpr auto kCallTimeout = std::chrono::milliseconds(1000);
 constexpr auto kResolving = std::chrono::milliseconds(500);
 
+bool isLoopback(const std::string& address) {
+    return address.rfind("127.", 0) == 0 || address == "::1";
+}
+
 }  // namespace
 
 // The answers of a master to check().
@@ -125,6 +129,25 @@ std::size_t MasterLink::end(Clock::time_point deadline) {
     const std::size_t left = node_.started() && node_.alive() ? leave(deadline) : 0;
     node_.stop();
     return left;
+}
+
+std::string MasterLink::unreachable() {
+    std::string host;
+    std::uint32_t port = 0;
+    if (!splitMasterUri(node_.uri(), host, port)) return {};
+    std::string reason;
+    const std::optional<std::string> address = hosts_.address(host, kResolving);
+    if (!address) {
+        reason = "which has no address";
+    } else if (!isOfThisMachine(*address)) {
+        reason = "which is not an address of this machine";
+    } else if (isLoopback(*address) && !isOfThisMachine(address_.address)) {
+        reason = "which is " + *address + ", to a ROS master on another machine";
+    } else {
+        return {};
+    }
+    return "ROS peers cannot connect: node " + name().full() + " advertises " + host + ", " +
+           reason + ": correct ROS_IP or ROS_HOSTNAME, and restart the runner";
 }
 
 void MasterLink::awaitRegistrations() {

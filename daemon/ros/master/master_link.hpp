@@ -65,6 +65,9 @@ class MasterLink {
 
     /// The reason for a state other than Up, one line; empty = Up.
     const std::string& problem() const { return problem_; }
+    /// The reason why peers cannot connect to the node by the address that it advertises; empty =
+    /// none is known. Waits half a second at most.
+    std::string unreachable();
     /// True if a peer has requested a shutdown.
     bool killed() const { return off_ == Why::Killed; }
     /// True once for each master at which the node is new.

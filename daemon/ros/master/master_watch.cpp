@@ -181,6 +181,11 @@ void MasterWatch::serve(const executor::BridgeSettings& looked) {
     }
     const Reconciled result = interface_.reconcile(link_, settings);
     link_.awaitRegistrations();
+    const std::string unreachable = link_.unreachable();
+    if (unreachable != unreachable_) {
+        unreachable_ = unreachable;
+        if (!unreachable.empty()) say(unreachable);
+    }
     setConnected();
     if (result == Reconciled::Again) wake();
     for (const std::string& rejection : interface_.newRejections()) say(rejection);
@@ -215,7 +220,7 @@ void MasterWatch::setConnected() {
     const std::lock_guard lock(mutex_);
     status_.connected = true;
     status_.killed = false;
-    status_.problem = interface_.notice();
+    status_.problem = unreachable_.empty() ? interface_.notice() : unreachable_;
 }
 
 void MasterWatch::say(const std::string& message) {

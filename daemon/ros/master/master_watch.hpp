@@ -83,6 +83,7 @@ class MasterWatch {
     MasterLink link_;
     RosInterface interface_;
     std::string said_;
+    std::string unreachable_;  // see MasterLink
 };
 
 }  // namespace rtcf::ros1

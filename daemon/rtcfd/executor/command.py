@@ -116,8 +116,15 @@ class ExecutorCommand:
 
     @staticmethod
     def environment() -> dict[str, str]:
-        """Return our environment (ROS_MASTER_URI, ROS_IP …) without the variables for rtcfd."""
-        return {name: value for name, value in os.environ.items() if name not in _OWN_VARIABLES}
+        """Return our environment (ROS_MASTER_URI, ROS_IP …) without the variables for rtcfd.
+
+        Also without empty names of this machine, which roscpp would advertise.
+        """
+        return {
+            name: value
+            for name, value in os.environ.items()
+            if name not in _OWN_VARIABLES and (value or name not in ("ROS_HOSTNAME", "ROS_IP"))
+        }
 
 
 def settings_error(binary: Path, settings: runner_pb2.RunnerSettings) -> str:

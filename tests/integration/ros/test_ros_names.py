@@ -1,9 +1,11 @@
 """Names at a master shared by several loops, and names that remain there after their end."""
 
 import json
+import socket
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import pytest
 import rosgraph
@@ -149,3 +151,32 @@ def test_no_name_remains_at_a_running_master(
         assert _all_names(master.uri) == before, json.dumps(_all_names(master.uri))
         assert parameters.getParamNames() == names
     assert clean
+
+
+@pytest.mark.parametrize(
+    ("host", "reason"),
+    [
+        ("192.0.2.1", "192.0.2.1, which is not an address of this machine: "),
+        ("nowhere.invalid", "nowhere.invalid, which has no address: "),
+    ],
+)
+def test_an_address_that_peers_cannot_reach_is_reported(
+    tmp_path: Path, master: Master, host: str, reason: str
+) -> None:
+    daemon = Daemon(tmp_path, with_ros(master.uri, ""), environment={"ROS_HOSTNAME": host})
+    daemon.start()
+    problem = wait_for(lambda: _connected(daemon).problem, "the report")
+    assert f" advertises {reason}correct ROS_IP or ROS_HOSTNAME" in problem
+    for shown in (daemon.ctl("status").stdout, daemon.ctl("doctor", "--seconds", "0").stdout):
+        assert problem in shown
+    assert daemon.log().count(problem) == 1
+    daemon.end()
+
+
+def test_an_empty_ros_hostname_counts_as_not_set(tmp_path: Path, master: Master) -> None:
+    daemon = Daemon(tmp_path, with_ros(master.uri, ""), environment={"ROS_HOSTNAME": ""})
+    daemon.start()
+    node = _connected(daemon).node
+    uri = urlsplit(rosgraph.Master("/test", master.uri).lookupNode(node))
+    assert uri.hostname == socket.gethostname().lower()
+    daemon.end()
