@@ -144,17 +144,65 @@ class TooLate : public RTT::TaskContext {
     RTT::InputPort<std_msgs::Float64> late_{"late"};
 };
 
-/// Adds one port twice.
+/// Adds one port twice, and replaces others by ports of the same names.
 class Twice : public RTT::TaskContext {
    public:
-    explicit Twice(const std::string& name) : TaskContext(name) { addPort(port_); }
+    explicit Twice(const std::string& name) : TaskContext(name) {
+        addPort(in_);
+        addPort(replaced_out_);
+        addPort(out_);
+        addPort("connected", connected_);
+    }
     bool configureHook() override {
-        addPort(port_);
+        addPort("in", in_);
+        addPort(in_);
+        addEventPort(replacing_in_, [this](RTT::base::PortInterface*) {
+            std_msgs::Float64 message;
+            replacing_in_.read(message);
+            out_.write(message);
+        });
+        return ports()->getPorts().size() == 3 && getPort("in") == &replacing_in_;
+    }
+    void updateHook() override {
+        std_msgs::Float64 connected;
+        connected.data = (in_.connected() ? 1.0 : 0.0) + (replacing_in_.connected() ? 10.0 : 0.0);
+        connected_.write(connected);
+        replaced_out_.write(connected);
+    }
+
+   private:
+    RTT::InputPort<std_msgs::Float64> in_{"in"};
+    RTT::InputPort<std_msgs::Float64> replacing_in_{"in"};
+    RTT::OutputPort<std_msgs::Float64> replaced_out_{"out"};
+    RTT::OutputPort<std_msgs::Float64> out_{"out"};
+    RTT::OutputPort<std_msgs::Float64> connected_;
+};
+
+/// Adds two ports with one name, which cannot replace each other.
+class Retyped : public RTT::TaskContext {
+   public:
+    explicit Retyped(const std::string& name) : TaskContext(name) { addPort(in_); }
+    bool configureHook() override {
+        addPort(out_);
         return true;
     }
 
    private:
-    RTT::InputPort<std_msgs::Float64> port_{"port"};
+    RTT::InputPort<std_msgs::Float64> in_{"port"};
+    RTT::OutputPort<std_msgs::Float64> out_{"port"};
+};
+
+/// Adds one port by two names.
+class Renamed : public RTT::TaskContext {
+   public:
+    explicit Renamed(const std::string& name) : TaskContext(name) { addPort("one", in_); }
+    bool configureHook() override {
+        addPort("other", in_);
+        return true;
+    }
+
+   private:
+    RTT::InputPort<std_msgs::Float64> in_;
 };
 
 /// Uses the extension before it exists.
@@ -196,6 +244,8 @@ ORO_LIST_COMPONENT_TYPE(rtcf_unit_test::Teller)
 ORO_LIST_COMPONENT_TYPE(rtcf_unit_test::Writer)
 ORO_LIST_COMPONENT_TYPE(rtcf_unit_test::TooLate)
 ORO_LIST_COMPONENT_TYPE(rtcf_unit_test::Twice)
+ORO_LIST_COMPONENT_TYPE(rtcf_unit_test::Retyped)
+ORO_LIST_COMPONENT_TYPE(rtcf_unit_test::Renamed)
 ORO_LIST_COMPONENT_TYPE(rtcf_unit_test::TooEarly)
 ORO_LIST_COMPONENT_TYPE(rtcf_unit_test::NeedsRos)
 ORO_LIST_COMPONENT_TYPE(rtcf_unit_test::Grower)

@@ -61,9 +61,21 @@ TEST_F(RttCompat, PortsAreFrozenAfterConfigureHook) {
               "configure()");
 }
 
-TEST_F(RttCompat, PortAddedTwiceIsRejected) {
-    EXPECT_EQ(errorOf([this] { loadOld("Twice", "T"); }),
-              "/T (rtcf_unit_test/Twice): configure failed: it threw: port 'port' is added twice");
+TEST_F(RttCompat, APortReplacesAnEarlierOneOfTheSameName) {
+    loadOld("Third", "F", {{"out", "thirds"}});
+    loadOld("Twice", "T", {{"in", "thirds"}});
+    step(4);  // to iteration 3
+    EXPECT_EQ(value("/T", "out"), 3.0);
+    EXPECT_EQ(value("/T", "connected"), 10.0);
+}
+
+TEST_F(RttCompat, PortsOfOneNameAndDifferentTypesAreRejected) {
+    EXPECT_EQ(errorOf([this] { loadOld("Retyped", "R"); }),
+              "/R (rtcf_unit_test/Retyped): configure failed: it threw: port 'port' is added "
+              "twice, with different types: rename one");
+    EXPECT_EQ(errorOf([this] { loadOld("Renamed", "R"); }),
+              "/R (rtcf_unit_test/Renamed): configure failed: it threw: port 'one' is added again "
+              "as 'other': a port has one name");
 }
 
 TEST_F(RttCompat, ReadReturnsWhetherDataExistAndAreNew) {

@@ -56,13 +56,26 @@ class PortInterface {
     /// @throws std::logic_error if the name is taken or not legal, if the port was added before,
     /// and after configureHook()
     void addTo(::rtcf::Component* component) {
-        if (added()) throw std::logic_error("port '" + name_ + "' is added twice");
+        if (added()) throw std::logic_error("port '" + name_ + "' is added to two components");
         declare(component);
+    }
+    /// Takes the place of a port of the same name, which has no peers from here on and must exist
+    /// as long as this one. Not real-time safe.
+    /// @throws std::logic_error if that has another direction or type, or if this port was added
+    /// before
+    void replace(PortInterface& earlier) {
+        if (added()) throw std::logic_error("port '" + name_ + "' is added to two components");
+        if (!takePlaceOf(earlier)) {
+            throw std::logic_error("port '" + name_ +
+                                   "' is added twice, with different types: rename one");
+        }
     }
 
    protected:
     virtual bool added() const noexcept = 0;
     virtual void declare(::rtcf::Component* component) = 0;
+    // Returns false if the other port has another direction or type.
+    virtual bool takePlaceOf(PortInterface& earlier) = 0;
     bool disconnected() const noexcept RTCF_NONBLOCKING { return disconnected_; }
 
    private:
@@ -123,14 +136,22 @@ class InputPort final : public base::InputPortInterface {
     }
 
    private:
-    bool added() const noexcept override { return port_.has_value(); }
+    bool added() const noexcept override { return port_ != nullptr; }
     void declare(::rtcf::Component* component) override {
         component_ = component;
-        port_.emplace(component, getName());
+        port_ = &own_.emplace(component, getName());
+    }
+    bool takePlaceOf(base::PortInterface& earlier) override {
+        auto* const other = dynamic_cast<InputPort*>(&earlier);
+        if (other == nullptr) return false;
+        component_ = other->component_;
+        port_ = std::exchange(other->port_, nullptr);
+        return true;
     }
 
     const ::rtcf::Component* component_ = nullptr;
-    std::optional<::rtcf::Input<T>> port_;
+    std::optional<::rtcf::Input<T>> own_;
+    ::rtcf::Input<T>* port_ = nullptr;  // own_, or that of a port that this one has replaced
     bool cleared_ = false;
 };
 
@@ -177,14 +198,22 @@ class OutputPort final : public base::OutputPortInterface {
     }
 
    private:
-    bool added() const noexcept override { return port_.has_value(); }
+    bool added() const noexcept override { return port_ != nullptr; }
     void declare(::rtcf::Component* component) override {
-        port_.emplace(component, getName());
+        port_ = &own_.emplace(component, getName());
         if (sample_) port_->reserve(*sample_);
+    }
+    bool takePlaceOf(base::PortInterface& earlier) override {
+        auto* const other = dynamic_cast<OutputPort*>(&earlier);
+        if (other == nullptr) return false;
+        port_ = std::exchange(other->port_, nullptr);
+        if (sample_) port_->reserve(*sample_);
+        return true;
     }
 
     std::optional<T> sample_;
-    std::optional<::rtcf::Output<T>> port_;
+    std::optional<::rtcf::Output<T>> own_;
+    ::rtcf::Output<T>* port_ = nullptr;  // own_, or that of a port that this one has replaced
 };
 
 }  // namespace RTT

@@ -43,16 +43,24 @@ class DataFlowInterface {
     explicit DataFlowInterface(::rtcf::Component* owner) : owner_(owner) {}
 
     /// @name In the constructor or in configureHook(); not real-time safe
-    /// The port's address must not change any more.
-    /// @throws std::logic_error like PortInterface::addTo()
+    /// The port's address must not change any more. As in OROCOS, a port replaces another one of
+    /// the same name, and has no effect if it was added before.
+    /// @throws std::logic_error like PortInterface::addTo() and PortInterface::replace()
     /// @{
     base::PortInterface& addPort(base::PortInterface& port) {
-        port.addTo(owner_);
-        ports_.push_back(&port);
+        base::PortInterface* const earlier = getPort(port.getName());
+        if (earlier == nullptr) {
+            port.addTo(owner_);
+            ports_.push_back(&port);
+        } else if (earlier != &port) {
+            port.replace(*earlier);
+            std::replace(ports_.begin(), ports_.end(), earlier, &port);
+            dropCallbacks(earlier);
+        }
         return port;
     }
     base::PortInterface& addPort(const std::string& name, base::PortInterface& port) {
-        port.setName(name);
+        rename(port, name);
         return addPort(port);
     }
     /// Like addPort(): the component is updated in every cycle, with or without new data. In cycles
@@ -60,12 +68,13 @@ class DataFlowInterface {
     /// thread.
     base::PortInterface& addEventPort(base::PortInterface& port, Callback callback = {}) {
         addPort(port);
+        dropCallbacks(&port);
         if (callback) callbacks_.emplace_back(&port, std::move(callback));
         return port;
     }
     base::PortInterface& addEventPort(const std::string& name, base::PortInterface& port,
                                       Callback callback = {}) {
-        port.setName(name);
+        rename(port, name);
         return addEventPort(port, std::move(callback));
     }
     /// @}
@@ -97,6 +106,17 @@ class DataFlowInterface {
     }
 
    private:
+    static void rename(base::PortInterface& port, const std::string& name) {
+        if (port.setName(name) || port.getName() == name) return;
+        throw std::logic_error("port '" + port.getName() + "' is added again as '" + name +
+                               "': a port has one name");
+    }
+    void dropCallbacks(const base::PortInterface* port) {
+        callbacks_.erase(std::remove_if(callbacks_.begin(), callbacks_.end(),
+                                        [&](const auto& each) { return each.first == port; }),
+                         callbacks_.end());
+    }
+
     ::rtcf::Component* owner_;
     Ports ports_;
     std::vector<std::pair<base::PortInterface*, Callback>> callbacks_;
