@@ -9,7 +9,7 @@ from rtcf.v1 import control_pb2, graph_pb2
 from rtcf_shared.enums import choices
 
 from rtcf_launch.codes import Code, Ending
-from rtcf_launch.parameters import Parameters, as_boolean, as_integer, as_number, close_to
+from rtcf_launch.parameters import Parameters, close_to
 
 _ON_LOST = choices(control_pb2.OnLeaseLost.DESCRIPTOR)
 PREFIX = "rtcf_"
@@ -167,13 +167,8 @@ def _is_array(name: str, declared: Iterable[str]) -> bool:
 
 
 def _value(info: graph_pb2.ParameterInfo, value: Any) -> graph_pb2.ParameterValue:
+    """Return a value with its own type; rtcfd converts it to the declared one if it fits."""
     made = graph_pb2.ParameterValue
-    if info.type == "int":
-        value = as_integer(value)
-    elif info.type == "bool":
-        value = as_boolean(value)
-    elif info.type == "double":
-        value = as_number(value)
     if isinstance(value, bool):
         found = made(bool_value=value)
     elif isinstance(value, int):

@@ -6,6 +6,7 @@
 #include <set>
 
 #include "common/error.hpp"
+#include "graph/fitted_value.hpp"
 #include "graph/inherited_parameters.hpp"
 
 namespace rtcf::executor {
@@ -52,6 +53,7 @@ std::vector<std::pair<std::string, ParameterValue>> otherParameters(
             if (given == name) value = given_value;
         }
         ParameterValue checked = value;
+        fit(declared[i]->declaration(), checked);
         const bool bad = !declared[i]->check(checked).empty();
         if (!bad && sameValue(checked, present.parameterValues()[i])) continue;
         detail += fmt::format("{}{} {} -> {}", detail.empty() ? "" : ", ", name,

@@ -8,6 +8,7 @@
 
 #include "common/error.hpp"
 #include "common/thrown.hpp"
+#include "graph/fitted_value.hpp"
 #include "graph/inherited_parameters.hpp"
 #include "realtime/component_arena.hpp"
 
@@ -326,6 +327,7 @@ std::vector<StagedValue*> Instance::stageParameters(
                                     parameterNames(*component_)));
         }
         ParameterValue value = given;
+        fit((*found)->declaration(), value);
         if (const std::string why = (*found)->check(value); !why.empty()) {
             throw Error(ErrorKind::InvalidArgument, fmt::format("{}: {}", context_.full_name, why));
         }

@@ -60,9 +60,12 @@ class RosInterface {
     /// Removes all taps, so that nothing is opened again.
     void drop() { publishing_.setTaps({}); }
 
-    /// Rejected connections that have not been reported yet.
+    /// Rejected connections and values of parameters that have not been reported yet.
     std::vector<std::string> newRejections() {
-        return rejected_ ? rejected_->take() : std::vector<std::string>();
+        std::vector<std::string> lines = reconfiguring_.takeRejections();
+        if (rejected_)
+            for (std::string& line : rejected_->take()) lines.push_back(std::move(line));
+        return lines;
     }
     /// A warning although everything is open: an unknown version of roscpp, a namespace of another
     /// node, or a rejected connection. Empty = none.

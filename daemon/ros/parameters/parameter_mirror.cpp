@@ -1,15 +1,13 @@
 #include "ros/parameters/parameter_mirror.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string_view>
-#include <utility>
 
 #include "common/utf8.hpp"
-#include "rtcf/read_number.hpp"
+#include "graph/fitted_value.hpp"
 
 namespace rtcf::ros1 {
 
@@ -50,33 +48,27 @@ bool listOverrides(XmlRpc::XmlRpcValue& values, const ParameterDeclaration& decl
     return list != nullptr && list->getType() == XmlRpc::XmlRpcValue::TypeArray;
 }
 
-// Converts a value; unset if a parameter cannot have this type. The loop checks the declared type.
-std::optional<ParameterValue> fromXmlRpc(XmlRpc::XmlRpcValue& value, const std::string& type) {
+// Unset if no parameter can have this type, as a list. The loop checks the declared type.
+std::optional<ParameterValue> plainValue(XmlRpc::XmlRpcValue& value) {
     switch (value.getType()) {
         case XmlRpc::XmlRpcValue::TypeBoolean:
             return static_cast<bool&>(value);
-        case XmlRpc::XmlRpcValue::TypeInt: {
-            const int integer = static_cast<int&>(value);
-            if (type == "double") return static_cast<double>(integer);
-            return std::int64_t{integer};
-        }
-        case XmlRpc::XmlRpcValue::TypeDouble: {
-            constexpr double kExact = 9007199254740992.0;  // largest exact integer
-            const double real = static_cast<double&>(value);
-            const bool whole = std::abs(real) <= kExact && std::trunc(real) == real;
-            if (type == "int" && whole) return static_cast<std::int64_t>(real);
-            return real;
-        }
-        case XmlRpc::XmlRpcValue::TypeString: {
-            const std::string& text = static_cast<std::string&>(value);
-            // rosparam and roslaunch read 1e-3 as text, as YAML 1.1 does.
-            const std::optional<double> real = readNumber(text);
-            if (type == "double" && real && std::isfinite(*real)) return *real;
-            return text;
-        }
+        case XmlRpc::XmlRpcValue::TypeInt:
+            return std::int64_t{static_cast<int&>(value)};
+        case XmlRpc::XmlRpcValue::TypeDouble:
+            return static_cast<double&>(value);
+        case XmlRpc::XmlRpcValue::TypeString:
+            return static_cast<std::string&>(value);
         default:
             return std::nullopt;
     }
+}
+
+std::optional<ParameterValue> fromXmlRpc(XmlRpc::XmlRpcValue& value,
+                                         const ParameterDeclaration& declaration) {
+    std::optional<ParameterValue> found = plainValue(value);
+    if (found) executor::fit(declaration, *found);
+    return found;
 }
 
 // True if XML can carry the value: it cannot carry control characters and invalid UTF-8, and
@@ -221,8 +213,13 @@ bool ParameterMirror::take(XmlRpc::XmlRpcValue& values, const Component& compone
         const std::string& name = declaration.name;
         XmlRpc::XmlRpcValue* const theirs = find(values, name);
         std::optional<ParameterValue> found;
-        if (theirs != nullptr) found = fromXmlRpc(*theirs, declaration.type);
+        if (theirs != nullptr) found = fromXmlRpc(*theirs, declaration);
         if (!found) {
+            if (theirs != nullptr && follows_)
+                rejections_.push_back("the value of " + set.full_name + "/" + name +
+                                      " on the parameter server is a list or a mapping: rejected, "
+                                      "parameter " +
+                                      name + " takes one " + declaration.type);
             known.values.erase(name);
             known.others.erase(name);
             continue;

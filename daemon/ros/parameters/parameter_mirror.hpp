@@ -10,6 +10,7 @@
 #include <mutex>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "bridge/bridge.hpp"
@@ -55,6 +56,10 @@ class ParameterMirror {
     /// Starts again with a new master.
     void forget();
 
+    /// Takes the rejections of values that no parameter can have, one line each. Others are
+    /// rejected by the loop.
+    std::vector<std::string> takeRejections() { return std::exchange(rejections_, {}); }
+
     /// A value that the parameter server cannot store, one line; empty = none. Any thread.
     std::string problem() const;
 
@@ -88,6 +93,7 @@ class ParameterMirror {
     // Calls still to make for removed components, before calls for new components of the same
     // names.
     std::map<std::string, std::vector<MasterCall>> owed_;
+    std::vector<std::string> rejections_;
     std::shared_ptr<Pending> pending_ = std::make_shared<Pending>();
 };
 

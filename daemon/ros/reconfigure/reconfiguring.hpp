@@ -58,6 +58,8 @@ class Reconfiguring {
     void allow(bool allowed);
     /// Notes that a parameter or a namespace has been written at the master. Any thread.
     void noteWritten(const std::string& key) { mirror_.noteWritten(key); }
+    /// See ParameterMirror. Watch thread.
+    std::vector<std::string> takeRejections() { return mirror_.takeRejections(); }
     /// Starts again with a new master. Watch thread.
     void forget();
     /// Closes everything; reconcile() opens it again. Watch thread.

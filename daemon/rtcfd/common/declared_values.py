@@ -1,10 +1,11 @@
 """Checks values against declared parameters, while no executor has the component.
 
-Applies the rules of ParameterBase::check() in the component API.  Errors of prepare() appear
-when the component is loaded.
+Applies the rules of fitted_value.hpp of the executor, and of ParameterBase::check() in the
+component API.  Errors of prepare() appear when the component is loaded.
 """
 
 import math
+import re
 from collections.abc import Iterable, Mapping
 
 from rtcf.v1 import control_pb2, errors_pb2, graph_pb2
@@ -14,6 +15,8 @@ from rtcf_shared.naming import closest, listing, suggestion
 from rtcfd.common.errors import InvalidArgument, NotFound
 
 _LONGEST_WORD = 60  # characters of a value in a message
+_EXACT = 2**53  # largest exact integer of a double
+_NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?", re.ASCII)
 _KINDS = {
     "bool_value": "a bool",
     "int_value": "an int",
@@ -29,7 +32,7 @@ def check(
 ) -> None:
     """Raise NotFound or InvalidArgument for a value that the component would reject.
 
-    Converts an int for a double in place.
+    Converts the value in place to the declared type where nothing is lost.
     """
     found = declared.get(setting.name)
     if found is None:
@@ -41,8 +44,7 @@ def check(
             parameter=setting.name,
             suggestion=closest(setting.name, declared),
         )
-    if found.type == "double" and setting.value.WhichOneof("kind") == "int_value":
-        setting.value.double_value = float(setting.value.int_value)
+    _fit(setting.value, found.type)
     if why := _problem(setting.value, found):
         raise InvalidArgument(
             f"{component}: parameter {setting.name} {why}",
@@ -95,6 +97,32 @@ def set_vector_sizes(
                 parameter=name,
             )
     given.ClearField("lists")
+
+
+def _fit(value: graph_pb2.ParameterValue, wanted: str) -> None:
+    kind = value.WhichOneof("kind")
+    if kind is None:
+        return
+    plain = getattr(value, kind)
+    if wanted == "double" and kind == "int_value":
+        value.double_value = float(plain)
+    elif wanted == "double" and kind == "string_value" and _NUMBER.fullmatch(plain):
+        if math.isfinite(number := float(plain)):
+            value.double_value = number
+    elif wanted == "int" and kind == "double_value" and plain.is_integer():
+        if abs(plain) <= _EXACT:
+            value.int_value = int(plain)
+    elif wanted == "bool" and kind == "int_value" and plain in (0, 1):
+        value.bool_value = plain == 1
+    elif wanted == "string" and kind != "string_value":
+        value.string_value = _text(plain)
+
+
+def _text(plain: bool | float) -> str:
+    """Return the text of a number or bool, as fmt prints it."""
+    if isinstance(plain, bool):
+        return str(plain).lower()
+    return repr(plain).removesuffix(".0")
 
 
 def _problem(value: graph_pb2.ParameterValue, declared: graph_pb2.ParameterInfo) -> str:

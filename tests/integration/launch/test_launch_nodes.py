@@ -10,11 +10,13 @@ from pathlib import Path
 import pytest
 import rosgraph
 import rtcf
+import yaml
 from daemon_process import Daemon, wait_for, with_ros
 from launch_processes import Launching, Process, left_over
+from parameter_rule import CASES
 from ros_processes import Master
 from rtcf.v1 import runner_pb2
-from values import iteration, wait_until_after
+from values import iteration, parameter_values, wait_until_after
 
 DONE, REFUSED, USAGE, FAILED, LOST = range(5)
 
@@ -349,3 +351,24 @@ def test_an_interrupted_runner_does_not_wait_for_its_private_daemon(
     assert not left_over(f"{runtime}/rtcf-")
     assert not list(runtime.iterdir())
     assert never_serves.with_name("ended").exists()  # in order, not killed
+
+
+def test_values_of_other_types_follow_one_rule_in_launches(
+    alone: Launching, master: Master
+) -> None:
+    runner = alone.node("rt_runner")
+    runner.wait_for_output("the loop runs")
+    server = rosgraph.Master("/test", master.uri)
+    for name, text, wanted in CASES:
+        server.setParam(f"/knobs/{name}", yaml.safe_load(text))
+        knobs = alone.node("rt_launcher", "rtcf_test", "Knobs", "__name:=knobs")
+        if wanted is None:
+            assert knobs.wait() in (REFUSED, USAGE), text
+            assert name in knobs.output()
+        else:
+            knobs.wait_for_output("loaded into runner")
+            with alone.client() as (client, _):
+                assert parameter_values(client, "/knobs")[name] == wanted, text
+            assert knobs.end() == DONE
+        server.deleteParam("/knobs")
+    assert runner.end() == DONE

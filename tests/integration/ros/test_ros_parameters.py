@@ -12,6 +12,7 @@ import yaml
 from daemon_process import Daemon, stopped, wait_for, wait_until_it_is, with_ros
 from holding_master import HoldingMaster
 from launch_processes import Launching
+from parameter_rule import CASES, SCALARS
 from ros_processes import Master
 from rtcf.v1 import runner_pb2
 from values import parameter_values, port_value
@@ -215,6 +216,65 @@ def test_the_loop_follows_the_parameter_server_within_its_bounds(
     wait_for(lambda: master.parameter(f"{_NAME}/count") == 5, "the value to return")
     assert refused() == 1
     listener.end()
+
+
+def test_values_of_other_types_follow_one_rule_in_clients_and_graph_files(
+    knobs: tuple[Daemon, rtcf.Client],
+) -> None:
+    _, client = knobs
+    for name, text, wanted in SCALARS:
+        try:
+            client.set_parameters(_NAME, [rtcf.parse_parameter(f"{name}:={text}")])
+        except rtcf.RefusedError as error:
+            assert f"parameter {name} takes " in str(error)
+            assert wanted is None, text
+        else:
+            assert values(client)[name] == wanted, text
+
+    def apply(parameters: str) -> None:
+        graph = (
+            "components: [{name: knobs, ns: /arm, package: rtcf_test, type: Knobs, "
+            f"parameters: {{{parameters}}}}}]"
+        )
+        client.apply(rtcf.read_graphs(graph, "graph.yaml")[0].components)
+
+    apply("")
+    defaults = values(client)
+    for name, text, wanted in CASES:
+        try:
+            apply(f"{name}: {text}")
+        except rtcf.RtcfError as error:
+            assert wanted is None, (text, error)
+            continue
+        assert values(client) == defaults | {name: wanted}, text
+
+
+def test_values_of_other_types_follow_one_rule_on_the_parameter_server(
+    knobs: tuple[Daemon, rtcf.Client], master: Master
+) -> None:
+    daemon, client = knobs
+    server = rosgraph.Master("/test", master.uri)
+
+    def follows(name: str, value: Any) -> None:
+        key = f"{_NAME}/{name}"
+        wait_until_it_is(value, lambda: values(client)[name], f"the loop's {name}")
+        wait_until_it_is(value, lambda: master.parameter(key), f"the server's {name}")
+
+    for name, text, wanted in CASES:
+        before = values(client)[name]
+        server.setParam(f"{_NAME}/{name}", yaml.safe_load(text))
+        if wanted is None:
+            follows(name, before)
+        else:
+            wait_until_it_is(wanted, lambda key=name: values(client)[key], text)  # type: ignore[misc]
+            server.setParam(f"{_NAME}/{name}", before)
+            follows(name, before)
+    wait_for(lambda: "/arm/knobs/mode on the parameter server is a list" in daemon.log(), "a line")
+    assert "/arm/knobs/label on the parameter server is a list" in daemon.log()
+    # dynparam itself makes a text of each value for a text.
+    for text in ("7", "7.5", "[1, 2]"):
+        dynparam(master, "set", _NAME, "label", text)
+        assert values(client)["label"] == text
 
 
 def test_unloading_a_component_ends_its_server(
