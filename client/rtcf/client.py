@@ -368,7 +368,7 @@ class Client(Closing):
 
         name = parse_port(port)
         if not isinstance(value, str):
-            value = json.dumps(value, default=lambda array: array.tolist())
+            value = json.dumps(value, separators=(",", ":"), default=lambda array: array.tolist())
         request = control_pb2.WritePortRequest(
             runner=runner, component=name.component, port=name.port, value=value
         )

@@ -1,9 +1,10 @@
 """A client of the action FollowJointTrajectory; the tests start it as a separate program.
 
-Reads a goal per line as JSON: {"joints": [...], "points": [[time, positions, velocities], ...],
-"path": {joint: tolerance}, "goal": {joint: tolerance}, "cancel": s, "replace": s}. With "replace",
-the next line is sent so many seconds later, without waiting. Prints its result as JSON:
-{"state": ..., "code": ..., "text": ..., "feedback": number}.
+Reads a goal per line as JSON:
+{"joints": [...], "points": [[time, positions, velocities, accelerations], ...],
+"path": {joint: tolerance}, "goal": {joint: tolerance}, "cancel": s, "replace": s}. Points need no
+accelerations. With "replace", the next line is sent so many seconds later, without waiting. Prints
+its result as JSON: {"state": ..., "code": ..., "text": ..., "feedback": number}.
 """
 
 import json
@@ -23,11 +24,12 @@ def goal_of(told: dict[str, Any]) -> Any:
     """Return a goal message."""
     goal = MESSAGES["FollowJointTrajectoryGoal"]()
     goal.trajectory.joint_names = told["joints"]
-    for at, positions, velocities in told["points"]:
+    for at, positions, velocities, *accelerations in told["points"]:
         goal.trajectory.points.append(
             JointTrajectoryPoint(
                 positions=positions,
                 velocities=velocities,
+                accelerations=accelerations[0] if accelerations else [],
                 time_from_start=rospy.Duration.from_sec(at),
             )
         )

@@ -44,13 +44,17 @@ _ANY = 16 * 1024 * 1024  # a graph or a recording: the limit of rtcfd's gRPC ser
 LONGEST_NAME = 255  # the limit of ROS
 LONGEST_TEXT = 4096  # remaps, expressions, URIs
 LONGEST_VALUE = 64 * 1024  # string parameters
+LONGEST_MESSAGE = _LISTS  # values of inputs: a trajectory of 1024 points for 7 joints has 550 KB
 _NAME_FIELDS = frozenset(
     {
         "runner", "component", "components", "package", "type", "name", "ns", "port", "run_id",
         "token", "holder",
     }
 )  # fmt: skip
-_VALUES = "rtcf.v1.ParameterValue"
+_LONGEST = {  # by type of message
+    "rtcf.v1.ParameterValue": LONGEST_VALUE,
+    "rtcf.v1.WritePortRequest": LONGEST_MESSAGE,
+}
 _BULK = frozenset({"rtcf.v1.RecordedMessage"})
 
 
@@ -89,7 +93,7 @@ CALLS = {
     "Step": Call(Level.OPERATE),
     "Replay": Call(Level.OPERATE, _ANY),
     "SetBreaks": Call(Level.OPERATE, _LISTS),
-    "WritePort": Call(Level.OPERATE),
+    "WritePort": Call(Level.OPERATE, _LISTS),
     "ResetState": Call(Level.OPERATE),
     "SetState": Call(Level.OPERATE, _LISTS),
     "TakeSnapshot": Call(Level.OPERATE),
@@ -133,11 +137,9 @@ def check_texts(message: Any) -> None:
                 check_texts(each)
         elif field.cpp_type == field.CPPTYPE_STRING and field.type == field.TYPE_STRING:
             longest = (
-                LONGEST_VALUE
-                if full_name == _VALUES
-                else LONGEST_NAME
+                LONGEST_NAME
                 if field.name in _NAME_FIELDS
-                else LONGEST_TEXT
+                else _LONGEST.get(full_name, LONGEST_TEXT)
             )
             for text in [value] if isinstance(value, str) else value:
                 if len(text) > longest:

@@ -2,7 +2,7 @@
 
 import json
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
@@ -122,6 +122,33 @@ def test_the_arm_follows_a_trajectory_with_joints_in_any_order(
     result = peer.send(points, JOINTS[::-1], goal=dict.fromkeys(JOINTS, 0.01))
     assert (result["state"], result["code"]) == (GoalStatus.SUCCEEDED, 0), result
     assert result["feedback"] >= 3
+    for joint, wanted in zip(JOINTS, goal, strict=True):
+        assert measured(launching, f"{joint}_position") == pytest.approx(wanted, abs=0.02)
+
+
+def smooth(begin: Sequence[float], end: Sequence[float], duration: float, count: int) -> Any:
+    """Return the points of a motion of degree 5 with velocities and accelerations."""
+    points = []
+    for s in (number / count for number in range(1, count + 1)):
+        shares = (
+            s**3 * (10 - 15 * s + 6 * s**2),
+            30 * s**2 * (1 - s) ** 2 / duration,
+            60 * s * (1 - s) * (1 - 2 * s) / duration**2,
+        )
+        ways = [[share * (b - a) for a, b in zip(begin, end, strict=True)] for share in shares]
+        positions = [a + way for a, way in zip(begin, ways[0], strict=True)]
+        points.append([s * duration, positions, *ways[1:]])
+    return points
+
+
+@pytest.mark.parametrize("count", [200, 1023])
+def test_the_arm_follows_a_trajectory_of_many_points(
+    launching: Launching, peer: Peer, count: int
+) -> None:
+    peer.send([[1.5, READY, STANDS]])
+    goal = [each + 0.1 for each in READY]
+    result = peer.send(smooth(READY, goal, 2.0, count), goal=dict.fromkeys(JOINTS, 0.01))
+    assert (result["state"], result["code"]) == (GoalStatus.SUCCEEDED, 0), result
     for joint, wanted in zip(JOINTS, goal, strict=True):
         assert measured(launching, f"{joint}_position") == pytest.approx(wanted, abs=0.02)
 

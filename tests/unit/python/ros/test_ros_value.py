@@ -1,11 +1,14 @@
 """Values as text become the same messages as with genpy, or an error line."""
 
 import io
+import json
 from typing import Any
 
 import genpy
 import pytest
 from geometry_msgs.msg import PoseArray, PoseWithCovariance, Twist, TwistStamped, Vector3
+from rtcf.v1 import control_pb2
+from rtcfd.access import calls
 from rtcfd.common.ros_value import encode
 from sensor_msgs.msg import JointState
 from std_msgs.msg import (
@@ -19,6 +22,7 @@ from std_msgs.msg import (
     Time,
     UInt8MultiArray,
 )
+from trajectory_msgs.msg import JointTrajectory
 
 
 def read(kind: Any, text: str) -> Any:
@@ -58,10 +62,23 @@ def read(kind: Any, text: str) -> Any:
         (UInt8MultiArray, "[1, 255]", UInt8MultiArray(data=b"\x01\xff")),
         (JointState, "{name: [a, b], position: [1, 2]}",
          JointState(name=["a", "b"], position=[1.0, 2.0])),
+        (JointState, '{"name":["😀"],"position":[-1e-3,Infinity]}',
+         JointState(name=["😀"], position=[-0.001, float("inf")])),
+        (Bool, '{"data":false}', Bool(False)),
+        (String, '{"data":true}', String("true")),
     ],
 )  # fmt: skip
 def test_a_text_is_a_message(kind: Any, text: str, expected: Any) -> None:
     assert read(kind, text) == expected
+
+
+def test_a_trajectory_of_1024_points_is_a_message() -> None:
+    point = dict.fromkeys(("positions", "velocities", "accelerations"), [-1.0 / 3.0] * 7)
+    text = json.dumps({"joint_names": list("abcdefg"), "points": [point] * 1024})
+    calls.check_texts(control_pb2.WritePortRequest(component="arm", port="in", value=text))
+    points = read(JointTrajectory, text).points
+    assert len(points) == 1024
+    assert points[-1].accelerations == (-1.0 / 3.0,) * 7
 
 
 def test_nested_messages_are_created() -> None:
@@ -95,8 +112,12 @@ def test_nested_messages_are_created() -> None:
         (Float64, "{a", "invalid YAML: "),
         (Float64, "[" * 5000, "invalid YAML: "),
         (PoseArray, "{poses: [&a {}, *a]}", "invalid YAML: an alias (*)"),
+        (UInt8MultiArray, "[" + "1, " * 30_000 + "]",
+         "YAML of 90002 characters is too long, at most 65536: write JSON"),
+        (Float64, '{"data": true}', 'data: "true" is not a valid float64'),
+        (Float64, '{"data": null}', 'data: "null" is not a valid float64'),
     ],
-)
+)  # fmt: skip
 def test_unsuitable_values_are_rejected_with_their_place(kind: Any, text: str, said: str) -> None:
     with pytest.raises(ValueError) as error:
         encode(kind._full_text, text)

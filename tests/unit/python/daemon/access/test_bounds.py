@@ -59,6 +59,11 @@ def test_texts_have_their_own_limits() -> None:
         setattr(long.component, field, "ä" * 256)
         with pytest.raises(InvalidArgument, match=f"{field} of 256 characters is too long"):
             calls.check_texts(long)
+    value = control_pb2.WritePortRequest(component="n", port="in", value="1" * 1_000_000)
+    calls.check_texts(value)
+    value.port = "p" * 256
+    with pytest.raises(InvalidArgument, match="port of 256 characters is too long"):
+        calls.check_texts(value)
     names = control_pb2.UnloadRequest(components=["short", "x" * 256])
     with pytest.raises(InvalidArgument, match="components of 256 characters"):
         calls.check_texts(names)
