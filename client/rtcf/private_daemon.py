@@ -49,6 +49,13 @@ def _sleep(seconds: float) -> bool:
     return False
 
 
+def _new_folder() -> Path:
+    # Other users cannot access XDG_RUNTIME_DIR, nor a folder of mkdtemp.
+    runtime = os.environ.get("XDG_RUNTIME_DIR")
+    parent = runtime if runtime and os.access(runtime, os.W_OK) else None
+    return Path(tempfile.mkdtemp(prefix="rtcf-", dir=parent))
+
+
 class PrivateDaemon:
     """The process of a private rtcfd, and its folder."""
 
@@ -59,18 +66,18 @@ class PrivateDaemon:
         options: Sequence[str] = (),
         socket: Path | None = None,
     ) -> None:
-        """Create the folder.
+        """Create the folder, unless `socket` is given, which is by default in the folder.
 
-        Without `log_file`, rtcfd logs to this process's standard error.  `socket` is by default in
-        the folder.  `options` are further options of rtcfd.
+        Without `log_file`, rtcfd logs to this process's standard error.  `options` are further
+        options of rtcfd.
         """
         self._program = program
         self._options = options
-        # Other users cannot access XDG_RUNTIME_DIR, nor a folder of mkdtemp.
-        runtime = os.environ.get("XDG_RUNTIME_DIR")
-        parent = runtime if runtime and os.access(runtime, os.W_OK) else None
-        self._folder = Path(tempfile.mkdtemp(prefix="rtcf-", dir=parent))
-        self.socket = socket or self._folder / "control.sock"
+        self._folder: Path | None = None
+        if socket is None:
+            self._folder = _new_folder()
+            socket = self._folder / "control.sock"
+        self.socket = socket
         self.log_file = log_file
         self._process: subprocess.Popen[bytes] | None = None
 
@@ -167,4 +174,5 @@ class PrivateDaemon:
                 # Its executors stop, too, without rtcfd.
                 process.kill()
                 process.wait()
-        shutil.rmtree(self._folder, ignore_errors=True)
+        if self._folder is not None:
+            shutil.rmtree(self._folder, ignore_errors=True)

@@ -8,13 +8,12 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Any
 
 import rtcf
 from rtcf.connection import DEFAULT_SOCKET
 
-from rtcfctl.terminal.repeated_signals import kill_at_next
+from rtcfctl.terminal.interruption import interrupt, interrupted_by_termination
 from rtcfctl.terminal.safe_streams import safe_streams
 
 if TYPE_CHECKING:
@@ -104,7 +103,7 @@ def _main(words: list[str], build_tree: Path | None) -> int:
     minds = signal.getsignal(signal.SIGINT) is signal.SIG_DFL
     try:
         if minds:
-            signal.signal(signal.SIGINT, _interrupt)
+            signal.signal(signal.SIGINT, interrupt)
         try:
             return _run(args, output)
         finally:
@@ -121,32 +120,12 @@ def _main(words: list[str], build_tree: Path | None) -> int:
         return code
 
 
-# Modules of Python's import system, to recognise their frames.
-_IMPORTS = [sys.modules[name] for name in ("_frozen_importlib", "_frozen_importlib_external")]
-
-
-def _interrupt(number: int, frame: FrameType | None) -> None:
-    """Raise KeyboardInterrupt at the first Ctrl-C; the next one kills the process at once.
-
-    During an import, try again 20 ms later: the import system would lose the exception, or
-    report a missing module.
-    """
-    if number == signal.SIGINT:
-        kill_at_next(number)
-    while frame is not None:
-        if any(frame.f_globals is vars(each) for each in _IMPORTS):
-            signal.signal(signal.SIGALRM, _interrupt)
-            signal.setitimer(signal.ITIMER_REAL, 0.02)
-            return
-        frame = frame.f_back
-    raise KeyboardInterrupt
-
-
 def _run(args: argparse.Namespace, output: "Output") -> int:
     """Run the parsed command; return the exit code."""
     try:
         with ExitStack() as ways:
             if args.host is not None:
+                ways.enter_context(interrupted_by_termination())
                 ways.enter_context(_another_machine(args))
             client = ways.enter_context(rtcf.Client(args.socket))
             # A verb may return an exit code of its own, as doctor does.

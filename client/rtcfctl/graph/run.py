@@ -15,6 +15,7 @@ from rtcf.private_daemon import BUILT, PrivateDaemon, component_folders, program
 from rtcf.v1 import graph_pb2
 
 from rtcfctl.graph import files, python_source
+from rtcfctl.terminal.interruption import interrupted_by_termination
 from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.words import counted
 
@@ -47,27 +48,28 @@ def show(_: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         folders = component_folders(args.path)
     except ValueError as error:
         raise ValueError(f"--path {error}") from None
-    daemon = PrivateDaemon(
-        program(args.build_tree),
-        options=[word for path in folders for word in ("--path", str(path))],
-        socket=Path(args.socket) if args.socket else None,
-    )
-    try:
-        daemon.start()
-        with rtcf.Client(daemon.socket) as client:
-            runners = source.apply(client, graphs)
-            for runner in [] if args.no_start else runners:
-                client.start(runner, output.progress)
-            _say(f"{'stopped' if args.no_start else 'running'}; Ctrl-C ends it")
-            _say(f"from another terminal: rtcfctl --socket {daemon.socket} status")
-            while not daemon.ended:
-                time.sleep(_POLL_S)
-                source.reload(client)
-        raise rtcf.RtcfError("rtcfd has ended: see above")
-    except KeyboardInterrupt:
-        return
-    finally:
-        daemon.end()
+    with interrupted_by_termination():
+        daemon = PrivateDaemon(
+            program(args.build_tree),
+            options=[word for path in folders for word in ("--path", str(path))],
+            socket=Path(args.socket) if args.socket else None,
+        )
+        try:
+            daemon.start()
+            with rtcf.Client(daemon.socket) as client:
+                runners = source.apply(client, graphs)
+                for runner in [] if args.no_start else runners:
+                    client.start(runner, output.progress)
+                _say(f"{'stopped' if args.no_start else 'running'}; Ctrl-C ends it")
+                _say(f"from another terminal: rtcfctl --socket {daemon.socket} status")
+                while not daemon.ended:
+                    time.sleep(_POLL_S)
+                    source.reload(client)
+            raise rtcf.RtcfError("rtcfd has ended: see above")
+        except KeyboardInterrupt:
+            return
+        finally:
+            daemon.end()
 
 
 def _say(line: str) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from rtcf.streams.ports import PortStream
 
-from rtcfctl.terminal.repeated_signals import kill_at_next
+from rtcfctl.terminal.interruption import kill_at_next
 
 
 @contextlib.contextmanager

@@ -13,7 +13,7 @@ import tty
 from types import FrameType
 from typing import Any, Self
 
-from rtcfctl.terminal.repeated_signals import kill_at_next
+from rtcfctl.terminal.interruption import kill_at_next
 from rtcfctl.terminal.safe_streams import control
 
 _ENTER = control("\x1b[?1049h\x1b[?25l\x1b[?7l")

@@ -111,6 +111,22 @@ def test_a_graph_file_runs_until_ctrl_c_and_is_reapplied_when_saved(
     assert loop.said.count("rtcfctl: graph.yaml:") == 1, "the message occurs once"
 
 
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_termination_leaves_no_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
+) -> None:
+    (tmp_path / "graph.yaml").write_text(GRAPH.format(amplitude=1.5))
+    left = tmp_path / "left"
+    left.mkdir()
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(left))
+    with running(tmp_path, "graph.yaml", at=left / "s") as loop:
+        loop.wait_for("running; Ctrl-C ends it")
+        loop.process.send_signal(number)
+        assert loop.process.wait() == 0
+    # The loops of all private daemons of the user share this one.
+    assert [each.name for each in left.iterdir()] == ["rtcf-cpus"]
+
+
 def test_tuned_values_stay_when_a_graph_file_is_saved(tmp_path: Path) -> None:
     def values() -> dict[str, float]:
         found = client.get_component("wave").parameters
