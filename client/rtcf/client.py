@@ -301,16 +301,19 @@ class Client(Closing):
         runner: str = "",
         on_progress: OnProgress | None = None,
         lists: Iterable[graph_pb2.ListLength] = (),
+        undo_with: str = "",
     ) -> control_pb2.ChangeResult:
         """Set parameters of a component, all at one cycle boundary.
 
-        lists  lists of which `parameters` has the elements; they set the sizes of vectors
+        lists      lists of which `parameters` has the elements; they set the sizes of vectors
+        undo_with  a leased component: rtcfd undoes the change if the holder of the lease dies
         """
         request = control_pb2.SetParametersRequest(
             runner=runner,
             component=component,
             parameters=several("parameters", parameters),
             lists=several("lists", lists),
+            undo_with=undo_with,
         )
         return self._connection.changed(self._stub.SetParameters, request, on_progress)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import itertools
+import os
 import threading
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -22,9 +23,11 @@ from rtcf_shared.ports import PortBatch
 from rtcf_shared.value_text import parse
 
 from rtcf.client import DEFAULT_RUNNER, Client
+from rtcf.connection import OnProgress
 from rtcf.errors import DaemonUnreachableError
+from rtcf.lease import Lease
 from rtcf.streams.ports import PortStream
-from rtcf.v1 import graph_pb2, runner_pb2
+from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 
 Array = npt.NDArray[np.float64]
 
@@ -77,6 +80,7 @@ class Experiment:
         self._runner = runner
         self._excitation = excitation
         self._measured = measured
+        self._lease: Lease | None = None
 
     @classmethod
     def by_component(
@@ -100,7 +104,8 @@ class Experiment:
     ) -> Iterator[Experiment]:
         """Load an Excitation for an input without a writer, and unload it at the end.
 
-        The input keeps the value that it had before.
+        The input keeps the value that it had before.  rtcfd unloads the Excitation if this program
+        dies.
         """
         target = rtcf_shared.spec.parse_port(port)
         found = client.get_component(target.component, runner)
@@ -132,21 +137,32 @@ class Experiment:
             remaps=[f"out:={inputs[0].mapped_name}", f"measured:={outputs[0].mapped_name}"],
             parameters=[f"idle:={before!r}"], breaks=["measured"],
         )  # fmt: skip
-        client.load(spec, runner)
-        try:
-            yield cls(client, runner, f"/{name}", _full(measured))
-        except DaemonUnreachableError:
-            raise  # the Excitation stays, and ends with its lease
-        except BaseException:
-            with contextlib.suppress(RtcfError):
-                client.unload([f"/{name}"], runner)
-            raise
-        client.unload([f"/{name}"], runner)
+        with _leased(client, runner, spec) as lease:
+            experiment = cls(client, runner, f"/{name}", _full(measured))
+            experiment._lease = lease
+            yield experiment
 
     @property
     def excitation(self) -> str:
         """The full name of the Excitation."""
         return self._excitation
+
+    def set_parameters(
+        self, component: str, settings: list[graph_pb2.ParameterSetting], on_progress: OnProgress
+    ) -> None:
+        """Set parameters of a component; rtcfd undoes the change if this program dies.
+
+        Not with an Excitation of the graph.
+        """
+        leased = "" if self._lease is None else self._excitation
+        try:
+            self._client.set_parameters(
+                component, settings, self._runner, on_progress, undo_with=leased
+            )
+        except KeyboardInterrupt:
+            if self._lease is not None:
+                self._lease.drop()  # rtcfd undoes the change if it has begun
+            raise
 
     @property
     def measured(self) -> str:
@@ -363,6 +379,29 @@ def connected_output(
         f"no output is connected to {reader.full_name}.{input_} ({mapped[0]}): connect it, or name "
         "the measured output"
     )
+
+
+@contextlib.contextmanager
+def _leased(client: Client, runner: str, spec: graph_pb2.ComponentSpec) -> Iterator[Lease]:
+    """Load a component, and unload it at the end, or when this program dies."""
+    opening = control_pb2.OpenLease(
+        runner=runner, component=spec, on_lost=control_pb2.ON_LEASE_LOST_UNLOAD,
+        holder=f"the experiment of process {os.getpid()}", unseen=True,
+    )  # fmt: skip
+    lease = client.lease_component(opening)
+    messages = iter(lease)
+    try:
+        next(each for each in messages if each.HasField("loaded"))
+    except BaseException:
+        lease.drop()
+        raise
+    try:
+        yield lease
+    finally:
+        lease.end()
+        with contextlib.suppress(RtcfError):  # dropped, or lost: rtcfd unloads the component
+            for _ in messages:
+                pass
 
 
 def _full(name: str) -> str:

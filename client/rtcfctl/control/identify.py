@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import rtcf
 
 from rtcfctl.control import excited
+from rtcfctl.terminal.interruption import interrupted_by_termination
 from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.words import amount, counted, figure, whole
 
@@ -98,7 +99,10 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         plots.require_format(args.file)
     if args.apply:
         _require_pid(client, args)
-    with excited.experiment(client, args.runner, args.input, args.measured) as experiment:
+    with (
+        interrupted_by_termination(),
+        excited.experiment(client, args.runner, args.input, args.measured) as experiment,
+    ):
         experiment.configure(**_parameters(client, args))
         recorded = experiment.run(stepped=args.stepped)
     excited.complete(recorded, experiment.excitation)

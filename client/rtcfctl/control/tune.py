@@ -13,6 +13,7 @@ from rtcf_shared.ports import numpy_module
 
 from rtcfctl.control import excited
 from rtcfctl.terminal.drawings import drawn
+from rtcfctl.terminal.interruption import interrupted_by_termination
 from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.words import amount, figure
 
@@ -93,9 +94,12 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     controller = client.get_component(args.controller, args.runner)
     name = controller.full_name
     measured = args.measured or connected_output(client, args.runner, controller, "measured")
-    with excited.experiment(
-        client, args.runner, args.input or f"{name}.setpoint", measured
-    ) as experiment:
+    with (
+        interrupted_by_termination(),
+        excited.experiment(
+            client, args.runner, args.input or f"{name}.setpoint", measured
+        ) as experiment,
+    ):
         experiment.configure(
             **excited.limits(args), shape="step", mode="replace", amplitude=args.size,
             delay=args.duration, duration=args.duration,
@@ -103,7 +107,7 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         found = [_step(experiment, args)]
         worse = False
         if settings:
-            client.set_parameters(name, settings, args.runner, output.progress)
+            experiment.set_parameters(name, settings, output.progress)
             try:
                 found.append(_step(experiment, args))
             except BaseException as error:

@@ -22,7 +22,8 @@ from rtcfd.common.errors import FailedPrecondition, InvalidArgument, NotFound, R
 from rtcfd.common.names import absolute
 from rtcfd.executor.link import Progress
 from rtcfd.operations.runner_core import Change, PendingParameters, RunnerCore
-from rtcfd.state.history import UNANSWERED, ParameterChange
+from rtcfd.state.desired import ComponentLeaseTerms
+from rtcfd.state.history import MOST_OF_A_COMPONENT, UNANSWERED, ParameterChange
 
 _MOST_CHANGES = 500  # in one response
 _MOST_BYTES = 2 * 1024 * 1024  # in one response; other gRPC clients accept 4 MiB
@@ -48,7 +49,8 @@ async def set_parameters(
     async def work() -> control_pb2.ChangeResult:
         if request.lists:
             declared_values.set_vector_sizes(name, request, await _declared(runner, name))
-        return await _set(runner, name, list(request.parameters), acting, progress)
+        lease = _lease(runner, absolute(request.undo_with)) if request.undo_with else None
+        return await _set(runner, name, list(request.parameters), acting, progress, lease=lease)
 
     return await runner.change(f"a change of parameters of {name}", work)
 
@@ -69,14 +71,34 @@ async def undo(
                 errors_pb2.REASON_NOTHING_TO_UNDO,
                 component=name,
             )
-        now = await values_of(runner, name)
-        settings = [_taken_back(runner, each, now) for each in last]
-        result = await _set(runner, name, settings, acting, progress, last[0].number)
-        words = ", ".join(f"{each.name} = {word(each.value)}" for each in settings)
-        result.notes.append(f"{words}, as before {last[0].who} changed it")
-        return result
+        return await _undo(runner, name, last, acting, progress)
 
     return await runner.change(f"an undo of parameters of {name}", work)
+
+
+async def undo_with(runner: RunnerCore, lease: ComponentLeaseTerms, why: str) -> None:
+    """Undo the changes that last only with a lease, newest first; errors are logged.
+
+    A change that is undone, or that another one of its component followed, stays.
+    """
+
+    async def work() -> None:
+        while lease.changes:
+            name, number = lease.changes.pop()
+            last = runner.desired.history.to_take_back(name)
+            if not last or last[0].number != number:
+                continue
+            runner.log.warning("%s: %s: its last change is undone", name, why)
+            try:
+                await _undo(runner, name, last, None, lambda _: None)
+            except RequestError as error:
+                runner.log.error("%s", error)
+
+    try:
+        # Also without changes so far: one may be running.
+        await runner.change("an undo of parameters", work, patient=True)
+    except RequestError as error:
+        runner.log.error("%s", error)
 
 
 async def write_input(
@@ -175,17 +197,18 @@ def note(
     author: str = "",
     takes_back: int = 0,
     quiet: bool = False,
-) -> None:
+) -> int:
     """Note a change of parameters and its author: in the history and, unless `quiet` (for new
     components of a graph), in the log and the events.
 
     `author` overrides the caller; `takes_back` is the number of the change that this one undoes.
+    Returns the number of the change, 0 without `settings`.
     """
     settings = list({each.name: each for each in settings}.values())
     if not settings:
-        return
+        return 0
     author = author or _who(acting, how)
-    runner.desired.history.note(
+    number = runner.desired.history.note(
         component,
         [(each.name, before.get(each.name), each.value) for each in settings],
         author,
@@ -193,7 +216,7 @@ def note(
         takes_back,
     )
     if quiet:
-        return
+        return number
     words = ", ".join(f"{each.name} = {word(each.value)}" for each in settings)
     deed = "restored" if takes_back else "set"
     if how == UNANSWERED:
@@ -209,6 +232,35 @@ def note(
         author if how == "set" or takes_back else f"{author}, {how}",
         extra={"runner": runner.name, "peer": None if acting is None else acting.peer},
     )
+    return number
+
+
+def _lease(runner: RunnerCore, component: str) -> ComponentLeaseTerms:
+    """Return the terms of a lease; raises NotFound."""
+    terms = runner.desired.leased.get(component)
+    if terms is None:
+        raise NotFound(
+            f"{component} is not leased in runner {runner.name}: lease it before the change, or "
+            "omit undo_with",
+            errors_pb2.REASON_LEASE_NOT_FOUND,
+            component=component,
+        )
+    return terms
+
+
+async def _undo(
+    runner: RunnerCore,
+    name: str,
+    last: list[ParameterChange],
+    acting: Caller | None,
+    progress: Progress,
+) -> control_pb2.ChangeResult:
+    now = await values_of(runner, name)
+    settings = [_taken_back(runner, each, now) for each in last]
+    result = await _set(runner, name, settings, acting, progress, last[0].number)
+    words = ", ".join(f"{each.name} = {word(each.value)}" for each in settings)
+    result.notes.append(f"{words}, as before {last[0].who} changed it")
+    return result
 
 
 async def _set(
@@ -218,6 +270,7 @@ async def _set(
     acting: Caller | None,
     progress: Progress,
     takes_back: int = 0,
+    lease: ComponentLeaseTerms | None = None,
 ) -> control_pb2.ChangeResult:
     await settle_lists(runner, name)
     before = await values_of(runner, name)
@@ -230,7 +283,11 @@ async def _set(
         with contextlib.suppress(RequestError):  # its executor has died meanwhile
             settings = _adopted(settings, await values_of(runner, name))
     runner.desired.set_parameters(name, settings)
-    note(runner, name, settings, before, acting, "undo" if takes_back else "set", "", takes_back)
+    how = "undo" if takes_back else "set"
+    number = note(runner, name, settings, before, acting, how, "", takes_back)
+    if lease is not None:
+        lease.changes.append((name, number))
+        del lease.changes[:-MOST_OF_A_COMPONENT]
     result.notes.extend(await runner.save())
     return result
 

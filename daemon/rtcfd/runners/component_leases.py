@@ -301,6 +301,7 @@ class ComponentLeases:
         lost = f"{terms.holder or 'its holder'} {how}"
         if terms.on_lost == control_pb2.ON_LEASE_LOST_KEEP:
             runner.log.warning("%s: %s: kept", name, lost)
+            await parameters.undo_with(runner, terms, lost)
             self._terms.pop(name, None)
             await runner.save()
             return
@@ -309,6 +310,7 @@ class ComponentLeases:
             await stop_quietly(runner)
         else:
             runner.log.warning("%s: %s", name, lost)
+        await parameters.undo_with(runner, terms, lost)
         self._leave(name)
 
     def _leave(self, name: str) -> "asyncio.Task[None]":

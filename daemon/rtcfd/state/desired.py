@@ -4,7 +4,7 @@ Owned by its Runner; store.py keeps it on disk.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from google.protobuf import json_format
@@ -29,6 +29,8 @@ class ComponentLeaseTerms:
     run_id: str
     on_lost: int  # OnLeaseLost
     holder: str  # name for messages
+    # Component and number of each change in the history to undo if the holder dies.
+    changes: list[tuple[str, int]] = field(default_factory=list)
 
 
 @dataclass
@@ -186,8 +188,8 @@ def replacement(
         result.CopyFrom(old)
         del result.parameters[:]  # the executor keeps those that fit
         del result.lists[:]
-    for field in ("remaps", "breaks"):
-        if getattr(given, field):
-            result.ClearField(field)
+    for name in ("remaps", "breaks"):
+        if getattr(given, name):
+            result.ClearField(name)
     result.MergeFrom(given)
     return result

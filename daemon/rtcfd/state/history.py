@@ -82,8 +82,11 @@ class History:
         who: str,
         how: str,
         takes_back: int = 0,
-    ) -> None:
-        """Add changes of one component's parameters: name, value before, new value."""
+    ) -> int:
+        """Add changes of one component's parameters: name, value before, new value.
+
+        Returns their number.
+        """
         self._last += 1
         now = time.time_ns()
         for name, before, value in changes:
@@ -93,6 +96,7 @@ class History:
             self._put(change)
             self._new.append(change)
         self._trim(component)
+        return self._last
 
     def of(self, component: str = "", parameter: str = "") -> list[ParameterChange]:
         """Return the changes of a component, or of all, and of a parameter, or of all."""

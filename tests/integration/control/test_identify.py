@@ -298,9 +298,12 @@ def value(daemon: Daemon, name: str) -> str:
     return daemon.ctl("get", name).stdout.strip()
 
 
-def test_ctrl_c_ends_it_at_once(daemon: Daemon, client: rtcf.Client) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_ctrl_c_and_termination_end_it_at_once(
+    daemon: Daemon, client: rtcf.Client, number: signal.Signals
+) -> None:
     process = begin(daemon, client)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     assert process.wait(60) == 1
     assert client.get_order() == ["/motor"]
     wait_for(lambda: value(daemon, "motor.command") == "0.0125", "the command before")
@@ -311,8 +314,8 @@ def test_a_killed_caller_ends_it(daemon: Daemon, client: rtcf.Client) -> None:
     process = begin(daemon, client)
     process.kill()
     process.wait()
-    wait_for(lambda: value(daemon, "excitation.state") == str(LEASE_ENDED), "the end of the lease")
-    wait_for(lambda: value(daemon, "motor.command") == "0.0125", "the command before")
+    wait_until_it_is(["/motor"], client.get_order, "the order")
+    assert value(daemon, "motor.command") == "0.0125"
     cycles = iteration(client)
     wait_for(lambda: iteration(client) > cycles, "the loop to go on")
     client.stop()
@@ -325,6 +328,8 @@ def test_a_lost_connection_ends_it(daemon: Daemon, client: rtcf.Client) -> None:
     assert process.wait(60) == 3
     wait_until_it_is("0.0125", lambda: value(daemon, "motor.command"), "the command before")
     assert value(daemon, "excitation.state") == str(LEASE_ENDED)
+    with rtcf.Client(daemon.socket) as again:
+        wait_until_it_is(["/motor"], again.get_order, "the order")
     assert daemon.ctl("stop").returncode == 0
 
 

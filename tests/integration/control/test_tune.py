@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import signal
+import subprocess
 
 import pytest
 import rtcf
-from daemon_process import Daemon
+from daemon_process import DEADLINE_S, MINDS_CTRL_C, Daemon, wait_for, wait_until_it_is
 from motors import LAG, gains, load
 
 TUNE = ("tune", "pid", "--lower", "0", "--upper", "50", "--size", "5", "--duration", "2", "--step")
@@ -85,6 +87,29 @@ def test_a_worse_step_is_undone_and_fails(
     if output:
         assert json.loads(done.stdout)["after"]["settling_time"] is None
     assert gains(client) == SLOW
+
+
+@pytest.mark.parametrize(
+    ("number", "code"),
+    [(signal.SIGINT, 1), (signal.SIGTERM, 1), (signal.SIGHUP, 1), (signal.SIGKILL, -9)],
+)
+def test_the_gains_are_set_back_if_it_ends_early(
+    controlled: Daemon, client: rtcf.Client, number: signal.Signals, code: int
+) -> None:
+    client.start()
+    words = (*TUNE[:-1], "--param", "kp:=0.01", "--duration", "4")
+    with subprocess.Popen(
+        [*MINDS_CTRL_C, "rtcfctl", *words],
+        env=controlled.environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
+        wait_for(lambda: gains(client) != SLOW, "the new gains")
+        process.send_signal(number)
+        said = process.communicate(timeout=DEADLINE_S)[1]
+    assert process.returncode == code
+    assert ("interrupted" in said) == (code == 1)
+    wait_until_it_is(SLOW, lambda: gains(client), "the gains")
+    wait_until_it_is(["/pid", "/motor"], client.get_order, "the order")
+    assert controlled.ctl("get", "pid.setpoint").stdout == "10\n"
 
 
 @pytest.mark.parametrize(

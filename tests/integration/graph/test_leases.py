@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 import rtcf
-from daemon_process import Daemon, wait_for
+from daemon_process import Daemon, wait_for, wait_until_it_is
 from holders import Holder, held, hold, lease, leased
 from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
 from values import iteration, state, wait_until_after
@@ -19,6 +19,19 @@ ENDED = control_pb2.LeaseEnded
 
 def counter(name: str) -> graph_pb2.ComponentSpec:
     return rtcf.component("rtcf_test", "Counter", name=name, ns="/", remaps=["out:=~out"])
+
+
+def knobs(name: str) -> graph_pb2.ComponentSpec:
+    return rtcf.component("rtcf_test", "Knobs", name=name, parameters=["rate:=1"])
+
+
+def set_rate(client: rtcf.Client, name: str, rate: int, **more: Any) -> None:
+    client.set_parameters(name, [rtcf.parse_parameter(f"rate:={rate}")], **more)
+
+
+def rate_of(client: rtcf.Client, name: str) -> float:
+    found = client.get_component(name).parameters
+    return float(next(each.value.double_value for each in found if each.name == "rate"))
 
 
 def names(client: rtcf.Client) -> list[str]:
@@ -95,6 +108,49 @@ def test_a_component_leased_with_keep_is_saved_after_its_holders_death(
     wait_for(lambda: saved(daemon)["components"], "the component in the saved graph")
     wait_until_after(client, iteration(client) + 10)
     assert client.get_component("kept").holder == ""
+
+
+@pytest.mark.parametrize("policy", [UNLOAD, KEEP])
+def test_the_death_of_a_holder_undoes_its_changes(client: rtcf.Client, policy: Any) -> None:
+    client.load(knobs("one"))
+    client.load(knobs("two"))
+    holder = leased(client, counter("leaves"), policy)
+    for rate in (2, 3):
+        set_rate(client, "one", rate, undo_with="leaves")
+    set_rate(client, "two", 4, undo_with="leaves")
+    set_rate(client, "two", 5)
+    holder.lease.drop()
+    wait_until_it_is(1.0, lambda: rate_of(client, "one"), "the rate of one")
+    assert rate_of(client, "two") == 5.0, "another change followed"
+
+
+def test_the_changes_of_a_dead_holder_are_undone_after_a_restart_of_rtcfd(
+    client: rtcf.Client, daemon: Daemon
+) -> None:
+    client.load(knobs("one"))
+    leased(client, counter("leaves"), UNLOAD)
+    set_rate(client, "one", 2, undo_with="leaves")
+    daemon.end(signal.SIGKILL)
+    daemon.start()
+    with rtcf.Client(daemon.socket) as again:
+        assert rate_of(again, "one") == 2.0
+        wait_until_it_is(1.0, lambda: rate_of(again, "one"), "the rate")
+
+
+def test_a_lease_that_ends_in_order_keeps_the_changes(client: rtcf.Client) -> None:
+    client.load(knobs("one"))
+    holder = leased(client, counter("leaves"), UNLOAD)
+    set_rate(client, "one", 2, undo_with="leaves")
+    holder.end()
+    assert rate_of(client, "one") == 2.0
+
+
+def test_a_change_with_a_component_that_is_not_leased_is_rejected(client: rtcf.Client) -> None:
+    client.load(knobs("one"))
+    with pytest.raises(rtcf.RefusedError, match="/one is not leased") as refused:
+        set_rate(client, "one", 2, undo_with="one")
+    assert refused.value.reason == "LEASE_NOT_FOUND"
+    assert rate_of(client, "one") == 1.0
 
 
 def test_leases_that_end_together_unload_in_one_transaction(client: rtcf.Client) -> None:
