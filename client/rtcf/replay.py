@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from rtcf_shared.mcap_writer import MAGIC
 from rtcf_shared.whole_files import whole_file
 
 from rtcf.client import Client, ReplayCall
@@ -190,6 +191,11 @@ class _Writer:
             ) from None
 
 
+def _is_mcap(path: Path) -> bool:
+    with path.open("rb") as file:
+        return file.read(len(MAGIC)) == MAGIC
+
+
 @contextlib.contextmanager
 def _reader(path: Path) -> Iterator[Any]:
     rosbag = bags.rosbag()
@@ -199,7 +205,13 @@ def _reader(path: Path) -> Iterator[Any]:
         raise RecordingError(
             f"{path} has no index because its recording was interrupted: rosbag reindex {path}"
         ) from None
-    except rosbag.ROSBagException as error:
+    except (rosbag.ROSBagException, ValueError) as error:
+        if _is_mcap(path):
+            bag_path = path.with_suffix(".bag")
+            raise RecordingError(
+                f"{path} is an MCAP file, but replay reads bags: `rtcfctl convert {path} "
+                f"{bag_path}`, then replay {bag_path}"
+            ) from None
         raise RecordingError(f"{path} is not a bag: {error}") from None
     except OSError as error:
         raise RecordingError(f"{path} cannot be read: {error.strerror or error}") from None

@@ -13,6 +13,7 @@ import rtcf
 from daemon_process import Daemon, wait_for
 from rtcf import reasons
 from rtcf.v1 import control_pb2, runner_pb2
+from rtcf_shared.mcap_writer import MAGIC
 from std_msgs.msg import Float64, String
 
 START_NS = 1_700_000_000_000_000_000
@@ -124,12 +125,18 @@ def test_a_gap_as_of_a_clock_that_was_set_is_rejected(daemon: Daemon, tmp_path: 
 def test_an_unsuitable_bag_is_rejected_in_one_line(daemon: Daemon, tmp_path: Path) -> None:
     text = tmp_path / "text.bag"
     text.write_text("no bag")
+    recording = tmp_path / "recording.mcap"
+    recording.write_bytes(MAGIC)
+    bag = recording.with_suffix(".bag")
+    bag.write_bytes(b"\x89")
     empty = _write(tmp_path / "empty.bag", [])
     other = _write(tmp_path / "other.bag", [("/G2_R2", 0, String("?"))])
     good = _write(tmp_path / "good.bag", [("/G2_R2", 0, Float64(1))])
     for arguments, words in [
         ([str(tmp_path / "none.bag")], "none.bag cannot be read: No such file"),
         ([str(text)], "text.bag is not a bag"),
+        ([str(bag)], f"{bag} is not a bag"),
+        ([str(recording)], f"replay reads bags: `rtcfctl convert {recording} {bag}`, then replay"),
         ([str(empty)], "empty.bag has no messages"),
         ([str(other)], "/G2_R2 is recorded as std_msgs/String"),
         ([str(good), "--write", str(good)], "is the recording itself"),
