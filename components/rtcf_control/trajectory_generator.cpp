@@ -267,6 +267,9 @@ class TrajectoryGenerator final : public rtcf::Component {
                                           rtcf::Live()};
     rtcf::State<std::uint64_t> last_id_{this, "last_trajectory_number", 0,
                                         rtcf::Doc("number of the last trajectory"), rtcf::Live()};
+    rtcf::State<std::uint32_t> last_seq_{this, "last_trajectory_seq", 0,
+                                         rtcf::Doc("header.seq of the last trajectory"),
+                                         rtcf::Live()};
     rtcf::State<std::int64_t> points_begin_{this,
                                             "trajectory_begin",
                                             0,
@@ -779,6 +782,7 @@ class TrajectoryGenerator final : public rtcf::Component {
             for (std::size_t i = 0; i < count(); ++i) to[i] = motionAt(each, memory_->order[i]);
         }
         last_id_ += 1;
+        last_seq_ = message.header.seq;
         points_id_ = last_id_;
         memory_->points_id = last_id_;
     }

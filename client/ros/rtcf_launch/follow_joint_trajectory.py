@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import os
+import random
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -38,9 +39,11 @@ private parameters:
 """
 _FEEDBACK_S = 0.05
 _SIGNALS = (
-    "done", "halted", "last_trajectory_number", "rejections", "position", "commanded_velocity"
+    "done", "halted", "last_trajectory_number", "last_trajectory_seq", "rejections", "position",
+    "commanded_velocity",
 )  # fmt: skip
 _ACCEPT_CYCLES = 2000  # longest wait until a trajectory is accepted or rejected
+_QUEUE_CYCLES = 8  # the generator takes one message per cycle from a queue of this length
 _END_S = 5.0  # longest wait for the stop of the joints at the end of the node
 
 
@@ -51,6 +54,7 @@ class _Sample:
     done: bool
     halted: bool
     accepted: int  # number of accepted trajectories
+    seq: int  # header.seq of the last accepted one
     rejected: int  # number of rejected ones, and of stops at a limit
     position: list[float]
     velocity: list[float]
@@ -183,11 +187,13 @@ class Server:
             samples = self._samples(stream)
             before = next(samples)
             self._moves = True
+            # Other senders use small numbers, by roscpp and rospy, or none.
+            seq = random.randrange(2**31, 2**32)
             self._client.write(
-                f"{self._generator}.trajectory", _as_dict(goal.trajectory), self._runner
+                f"{self._generator}.trajectory", _as_dict(goal.trajectory, seq), self._runner
             )
-            self._await_acceptance(samples, before)
-            self._await_end(samples, before, goal)
+            accepted = self._await_acceptance(samples, before, seq)
+            self._await_end(samples, accepted, goal)
             self._await_goal(samples, goal)
 
     def _samples(self, stream: Any) -> Iterator[_Sample]:
@@ -203,7 +209,8 @@ class Server:
             for row in range(len(batch)):
                 yield _Sample(
                     bool(columns["done"][row]), bool(columns["halted"][row]),
-                    int(columns["last_trajectory_number"][row]), int(columns["rejections"][row]),
+                    int(columns["last_trajectory_number"][row]),
+                    int(columns["last_trajectory_seq"][row]), int(columns["rejections"][row]),
                     [float(each) for each in columns["position"][row][:count]],
                     [float(each) for each in columns["commanded_velocity"][row][:count]],
                 )  # fmt: skip
@@ -211,25 +218,34 @@ class Server:
                 break
         raise _FailedError("INVALID_GOAL", "the loop has ended")
 
-    def _await_acceptance(self, samples: Iterator[_Sample], before: _Sample) -> None:
-        for sample, _ in zip(samples, range(_ACCEPT_CYCLES), strict=False):
-            if sample.accepted > before.accepted:
-                return
-            if sample.rejected > before.rejected:
-                raise _FailedError(
-                    "INVALID_GOAL",
-                    f"{self._generator} rejects the trajectory: see its log, `rtcfctl logs`",
-                )
+    def _await_acceptance(self, samples: Iterator[_Sample], before: _Sample, seq: int) -> _Sample:
+        """Return the values of the cycle that accepts the trajectory with this header.seq."""
+        cycles, rejected = _ACCEPT_CYCLES, False
+        for sample in samples:
+            if sample.seq == seq:
+                return sample
+            if not rejected and sample.rejected > before.rejected:
+                # Perhaps another sender's, which was in the queue before this one.
+                cycles, rejected = _QUEUE_CYCLES, True
+            cycles -= 1
+            if cycles <= 0:
+                break
+        if rejected:
+            raise _FailedError(
+                "INVALID_GOAL",
+                f"{self._generator} rejects the trajectory: see its log, `rtcfctl logs`",
+            )
         raise _FailedError("INVALID_GOAL", f"{self._generator} does not read the trajectory")
 
     def _await_end(self, samples: Iterator[_Sample], before: _Sample, goal: Any) -> None:
+        """Return when the trajectory ends that was accepted in the cycle `before`."""
         import rospy
 
         sent = rospy.Time(0)
         for sample in samples:
             if self._server.is_preempt_requested():
                 raise _PreemptedError
-            if sample.accepted > before.accepted + 1:
+            if sample.accepted > before.accepted:
                 raise _ReplacedError("INVALID_GOAL", "another trajectory has replaced it")
             if sample.halted:
                 raise _FailedError("INVALID_GOAL", f"{self._generator} is halted")
@@ -294,12 +310,12 @@ class Server:
         self._server.publish_feedback(feedback)
 
 
-def _as_dict(trajectory: Any) -> dict[str, Any]:
+def _as_dict(trajectory: Any, seq: int) -> dict[str, Any]:
     def time(value: Any) -> dict[str, int]:
         return {"secs": value.secs, "nsecs": value.nsecs}
 
     return {
-        "header": {"stamp": time(trajectory.header.stamp)},
+        "header": {"seq": seq, "stamp": time(trajectory.header.stamp)},
         "joint_names": list(trajectory.joint_names),
         "points": [
             {

@@ -168,6 +168,22 @@ def test_a_new_goal_replaces_the_present_one(launching: Launching, peer: Peer) -
     assert measured(launching, "joint1_position") == pytest.approx(-0.3, abs=0.02)
 
 
+def test_another_senders_trajectory_that_replaces_a_goal_goes_on(
+    launching: Launching, peer: Peer
+) -> None:
+    peer.send([[1.5, READY, STANDS]])
+    with launching.client() as (client, runner), ThreadPoolExecutor() as pool:
+        sent = pool.submit(peer.send, FAR)
+        wait_for(lambda: measured(launching, "joint1_velocity") > 0.1, "the arm to move")
+        point = {"positions": [-0.2, *READY[1:]], "velocities": STANDS, "time_from_start": 2.0}
+        other = {"joint_names": JOINTS, "points": [point]}
+        client.write("/trajectory.trajectory", other, runner)
+        result = sent.result(timeout=30.0)
+    assert result["state"] == GoalStatus.ABORTED
+    assert result["text"] == "another trajectory has replaced it"
+    wait_for(lambda: measured(launching, "joint1_position") < -0.19, "the other goal")
+
+
 @pytest.mark.parametrize(
     ("points", "more", "code", "said"),
     [
