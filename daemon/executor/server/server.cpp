@@ -698,7 +698,9 @@ pb::RunnerStatus Server::status() const {
     const Loop& loop = runner_->loop();
     pb::RunnerStatus status;
     status.set_runner(runner_->name());
-    status.set_state(stateTo(present.state));
+    // The graph thread, which notes the end of a loop, may be in a hook.
+    const bool ended = present.state == RunnerState::Running && !loop.running();
+    status.set_state(stateTo(ended ? RunnerState::Stopped : present.state));
     status.set_status(present.loop_fault);
     status.set_simulated(present.simulated);
     status.set_clock_silence(present.clock_silence);

@@ -2,14 +2,17 @@
 
 import os
 import signal
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 
 import fig_1
 import pytest
 import rtcf
-from daemon_process import Daemon, wait_for
+from daemon_process import DEADLINE_S, Daemon, wait_for, wait_until_it_is
 from fig_1 import mimo
 from rtcf.v1 import graph_pb2, runner_pb2
-from values import iteration
+from values import iteration, state
 
 
 def test_fig_1_runs_in_its_order(client: rtcf.Client) -> None:
@@ -25,6 +28,37 @@ def test_fig_1_runs_in_its_order(client: rtcf.Client) -> None:
     assert ports["out1"].HasField("value")
     client.stop()
     assert client.get_status().runners[0].state == runner_pb2.RUNNER_STATE_STOPPED
+
+
+def test_a_loop_that_is_stopped_during_a_replacement_is_reported_as_stopped(
+    client: rtcf.Client, tmp_path: Path
+) -> None:
+    file = tmp_path / "plugged in"
+    client.load(mimo("A", {}))
+    client.start()
+    slow = rtcf.component(
+        "rtcf_test", "ConfiguresOnceThereIs", name="A", parameters=[f"file:={file}"]
+    )
+    with ThreadPoolExecutor() as pool:
+        began = threading.Event()
+
+        def said(line: str) -> None:
+            if "configur" in line:
+                began.set()
+
+        replacing = pool.submit(client.replace, "A", slow, on_progress=said)
+        try:
+            assert began.wait(DEADLINE_S)
+            stopping = pool.submit(client.stop)
+            wait_until_it_is(
+                runner_pb2.RUNNER_STATE_STOPPED, lambda: state(client).state, "the state"
+            )
+            assert not replacing.done()
+        finally:
+            file.touch()
+        stopping.result()
+        replacing.exception()
+    assert state(client).state == runner_pb2.RUNNER_STATE_STOPPED
 
 
 def test_a_cycle_is_refused_with_the_command_that_breaks_it(client: rtcf.Client) -> None:
