@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import signal
 import socket
@@ -184,6 +185,39 @@ def test_ctrl_c_during_imports_ends_it_silently(tmp_path: Path) -> None:
     module.write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\nmain = print\n")
     done = subprocess.run([*MINDS_CTRL_C, str(script)], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
+
+
+def test_ctrl_c_while_python_starts_ends_it_silently(tmp_path: Path) -> None:
+    """Python handles the signal some time before it reads the script."""
+    command = [*MINDS_CTRL_C, str(BUILD_TREE / "bin" / "rtcfctl"), "--socket", str(tmp_path / "s")]
+    for _ in range(50):
+        with subprocess.Popen(
+            [*command, "status"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        ) as process:
+            while not (handles := _handles_ctrl_c(process.pid)) and process.poll() is None:
+                pass
+            if not handles:
+                continue
+            process.send_signal(signal.SIGSTOP)
+            found = os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WEXITED | os.WNOWAIT)
+            early = (
+                found is not None
+                and found.si_code == os.CLD_STOPPED
+                and _handles_ctrl_c(process.pid)
+                and "grpc" not in Path(f"/proc/{process.pid}/maps").read_text()
+            )
+            process.send_signal(signal.SIGINT)
+            process.send_signal(signal.SIGCONT)
+            said = process.communicate()
+        if early:
+            assert (process.returncode, *said) == (-signal.SIGINT, "", "")
+            return
+    pytest.fail("rtcfctl could not be stopped while Python starts")
+
+
+def _handles_ctrl_c(pid: int) -> bool:
+    (caught,) = re.findall(r"SigCgt:\s+(\w+)", Path(f"/proc/{pid}/status").read_text())
+    return bool(int(caught, 16) & 1 << (signal.SIGINT - 1))
 
 
 # A second Ctrl-C while the first one is handled, and one between the end of rtcfctl and the end
