@@ -22,6 +22,10 @@ _CROWDED_S = 15.0  # for a place in the listen queue of rtcfd's socket
 _RETRY_S = 0.05
 _CLOSE_S = 2.0
 _LONGEST_PATH = 107  # unix(7)
+# The timeout of one attempt to connect: systemd accepts connections before rtcfd has started, and a
+# busy machine may schedule rtcfd late.
+_CONNECT_MS = 60_000
+_CONNECT_TO_STRANGER_MS = 10_000  # to the socket of another user, which may not be rtcfd's
 
 _OPTIONS = (
     ("grpc.max_receive_message_length", 64 * 1024 * 1024),
@@ -31,9 +35,6 @@ _OPTIONS = (
     ("grpc.use_local_subchannel_pool", 1),
     # Reconnect soon after a restart of rtcfd, not after gRPC's 1 to 120 s.
     ("grpc.initial_reconnect_backoff_ms", 100),
-    # The timeout of one attempt to connect: systemd accepts connections before rtcfd has started,
-    # and a busy machine may schedule rtcfd late.
-    ("grpc.min_reconnect_backoff_ms", 60_000),
     ("grpc.max_reconnect_backoff_ms", 1000),
 )
 
@@ -79,7 +80,9 @@ class Connection(Closing):
                 f"{self.socket} is longer than the {_LONGEST_PATH} characters of a unix socket's "
                 "path"
             )
-        self._channel = grpc.insecure_channel(f"unix:{self.socket}", options=_OPTIONS)
+        patience = _CONNECT_TO_STRANGER_MS if failures.stranger(self.socket) else _CONNECT_MS
+        options = (*_OPTIONS, ("grpc.min_reconnect_backoff_ms", patience))
+        self._channel = grpc.insecure_channel(f"unix:{self.socket}", options=options)
         self.stub: Any = control_pb2_grpc.ControlStub(self._channel)  # type: ignore[no-untyped-call]
 
     def close(self) -> None:

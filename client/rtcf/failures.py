@@ -14,6 +14,7 @@ _DETAILS_KEY = "grpc-status-details-bin"
 _INFO_TYPE = "type.googleapis.com/google.rpc.ErrorInfo"
 _DOMAIN = "rtcf"
 _PROBE_TIMEOUT_S = 1.0
+_TIMED_OUT = "timed out"  # in gRPC's text: the socket accepted the connection, but nobody answers
 
 
 def refused(
@@ -34,7 +35,7 @@ def from_grpc(error: Any, socket: str) -> RtcfError:
     if code == "UNAVAILABLE":
         return _unreachable(socket, text)
     if code == "DEADLINE_EXCEEDED":
-        return DaemonUnreachableError(f"rtcfd at {socket} does not answer in time")
+        return _silent(socket)
     if code == "UNIMPLEMENTED":
         return RtcfError(f"rtcfd at {socket} is older than this client: {text}")
     if code == "RESOURCE_EXHAUSTED":  # without details from rtcfd: gRPC's size limit
@@ -73,7 +74,8 @@ def is_crowded(error: Any, socket: str) -> bool:
     """Return whether a call failed because the listen queue of rtcfd's socket is full."""
     if error.code().name != "UNAVAILABLE" or _details(error):
         return False
-    if "failed to connect" not in (error.details() or ""):
+    text = error.details() or ""
+    if "failed to connect" not in text or _TIMED_OUT in text:
         return False
     # gRPC does not report EAGAIN as such: check that a server listens.
     with sockets.socket(sockets.AF_UNIX, sockets.SOCK_STREAM) as probe:
@@ -97,11 +99,38 @@ def _unreachable(socket: str, text: str) -> DaemonUnreachableError:
             "start it with `sudo systemctl start rtcfd`, or name another socket with --socket or "
             "RTCF_SOCKET",
         )
+    except BlockingIOError:
+        return _silent(socket)  # its queue of connections is full
     except OSError as error:
         return DaemonUnreachableError(
             f"cannot reach rtcfd at {socket}", f"{error.strerror or error}"
         )
+    if _TIMED_OUT in text:
+        return _silent(socket)
     return DaemonUnreachableError(f"the connection to rtcfd at {socket} was lost", text)
+
+
+def _silent(socket: str) -> DaemonUnreachableError:
+    remedy = ""
+    if owner := stranger(socket):
+        remedy = f"its socket belongs to {owner}; name another one with --socket or RTCF_SOCKET"
+    return DaemonUnreachableError(f"rtcfd at {socket} does not answer in time", remedy)
+
+
+def stranger(socket: str) -> str:
+    """Return the owner of a socket, for a message; empty = root, this user, or no socket."""
+    import pwd
+
+    try:
+        owner = os.stat(socket).st_uid
+    except OSError:
+        return ""
+    if owner in (0, os.geteuid()):
+        return ""
+    try:
+        return f"user {pwd.getpwuid(owner).pw_name}"
+    except KeyError:
+        return f"uid {owner}"
 
 
 def _user() -> str:
