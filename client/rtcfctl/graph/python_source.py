@@ -21,7 +21,7 @@ from rtcf_shared.folders import compiled_folder
 
 _POLL_S = 0.2
 _VERIFY = "1s"  # processor time of the comparison
-_DIFFERENT = 3  # exit status of rtcf-compile if machine code and interpreter differ
+_DIFFERENT = 3  # exit status of rtcf-compile if the comparison rejects the component
 _VERIFIED = " verified"
 
 

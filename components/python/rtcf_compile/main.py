@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 DONE, REFUSED, USAGE, DIFFERENT = range(4)
+INTERRUPTED = 130
 
 _AMOUNT = re.compile(r"0*[1-9]\d{0,11}|(?=[\d.]*[1-9])\d{1,9}(\.\d{1,9})?s")
 
@@ -19,7 +20,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         prog="rtcf-compile",
         description="Compile components in Python to a library, which runs without Python.",
         epilog="Exit codes: 0 success, 1 error, 2 usage error, 3 results differ from the "
-        "interpreter's.",
+        "interpreter's, or update raises in every cycle, 130 Ctrl-C.",
     )
     parser.add_argument("sources", metavar="SOURCE", nargs="+", type=Path)
     parser.add_argument("-o", dest="output", metavar="LIB", type=Path, help="write this library")
@@ -60,6 +61,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (Mistake, DeclarationError) as error:
         print(f"rtcf-compile: {' '.join(str(error).split())}", file=sys.stderr)
         return REFUSED
+    except KeyboardInterrupt:
+        return INTERRUPTED
     return DONE
 
 

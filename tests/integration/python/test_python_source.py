@@ -205,10 +205,19 @@ def test_a_saved_source_that_differs_does_not_change_the_loop(
             f"rtcfctl: {source}:10: `while self.count > 0:`: Counts: update, cycle 0: it did not "
             "end within 2 s"
         )
+        source.write_text(COUNTS.replace("STEP", "1 // (0 * self.count)"))
+        watching.wait_for("cycles with random inputs: ZeroDivisionError")
+        assert re.search(
+            rf"\nrtcfctl: {source}:9: `.*`: Counts: update raises in each of \d+ cycles .*, "
+            r"--no-verify skips this\n",
+            watching.said,
+        ), watching.said
+        client.step(10)
+        assert _states(client) == {"count": "30"}
         source.write_text(COUNTS.replace("STEP", "1000"))
         watching.wait_for("reloaded /Counts")
         client.step(1)
-        assert _states(client) == {"count": "1020"}
+        assert _states(client) == {"count": "1030"}
 
 
 @pytest.fixture

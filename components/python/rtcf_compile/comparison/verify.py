@@ -5,6 +5,8 @@ the interpreter's state, so that differences do not accumulate. In the interpret
 `@` and np.linalg, for the same order of sums, and the division of single numbers, because division
 of NumPy numbers does not raise. Other NumPy functions may round differently. A difference no larger
 than the effect of the last place of the values that the hook reads does not count.
+
+A component whose update() raises in every cycle is rejected, too: it would end the loop.
 """
 
 import ast
@@ -62,7 +64,7 @@ class Comparison:
     rounded: int = 0
     largest_ulp: int = 0
     differences: list[str] = field(default_factory=list)
-    problem: str = ""  # the first difference, with its file
+    problem: str = ""  # the first difference or the constant fault, with its file
 
     def __str__(self) -> str:
         """Return the result in one line."""
@@ -73,11 +75,22 @@ class Comparison:
             more += f", {self.pythons_own} not compared: OverflowError only in Python"
         first = f"; {self.differences[0]}" if self.differences else ""
         verdict = f"{len(self.differences)} DIFFER{first}" if self.differences else "the same"
+        if self.problem and not self.differences:
+            verdict += ", BUT UPDATE ALWAYS RAISES"
         return f"{self.name}: {self.cycles} cycles, {self.largest_ulp} ulp{more}: {verdict}"
 
     def differ(self, what: str, file: str, line: int = 0) -> None:
         """Record a difference."""
         self.differences.append(what)
+        self._reject(what, file, line)
+
+    def always_raises(self, said: str, file: str) -> None:
+        """Record that update raises in every cycle; `said` is the line and the last exception."""
+        line, _, exception = said.partition(": ")
+        what = f"update raises in each of {self.cycles} cycles with random inputs: {exception}"
+        self._reject(what, file, int(line))
+
+    def _reject(self, what: str, file: str, line: int) -> None:
         if not self.problem:
             place = (
                 f"{display(file)}:{line}: `{source_line(file, line)}`" if line else display(file)
@@ -150,6 +163,8 @@ class _Comparing:
         self._cls, self._compiled, self._bounds = cls, compiled, bounds
         self._inside = Inside(compiled)
         self._cycle = 0
+        self._updates_raised = 0
+        self._last_raised = ""
         self._mine = bounds.record(compiled.description.record)
         self._draw = np.random.default_rng(1)  # separate, so that inputs do not depend on it
         self._prepared: dict[bytes, Any] = {}  # records by parameter values
@@ -187,6 +202,8 @@ class _Comparing:
             result.cycles = self._cycle
         if "safe" in hooks:
             self._both("safe")
+        if 0 < self._cycle == self._updates_raised:
+            result.always_raises(self._last_raised, self._compiled.file)
 
     def _prepare(self) -> None:
         """Compute Derived members, once for each set of parameters."""
@@ -228,6 +245,9 @@ class _Comparing:
             return
         if said is not None:
             result.raised += 1
+            if hook == "update":
+                self._updates_raised += 1
+                self._last_raised = said
             return
         theirs = component._record
         mine["_line"] = theirs["_line"] = record["_line"]

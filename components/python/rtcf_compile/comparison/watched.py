@@ -137,6 +137,8 @@ def _work(
         parts = (mistake.file, mistake.line, mistake.what, mistake.remedy, mistake.text)
         pickle.dump(parts, results)
         results.flush()
+    except KeyboardInterrupt:
+        pass  # Ctrl-C, which ends the parent, too
     except BaseException:
         traceback.print_exc()
     finally:

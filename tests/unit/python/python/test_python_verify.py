@@ -3,12 +3,14 @@
 import os
 import re
 import signal
+import subprocess
 import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from daemon_process import BUILD_TREE, MINDS_CTRL_C
 from pages import TREE
 from rtcf_compile import main
 from rtcf_compile.comparison import inside, verify, watched
@@ -47,7 +49,7 @@ def test_machine_code_and_interpreter_agree(
     name: str, compiled: dict[str, object_file.Compiled]
 ) -> None:
     found = compared(name, compiled, 3_000)
-    assert found.differences == []
+    assert found.differences == [] and found.problem == ""
     assert found.cycles == 3_000
     assert (found.raised > 0) == (name == "Raiser")
 
@@ -129,6 +131,34 @@ def test_a_difference_is_reported_with_hook_cycle_member_and_both_values(
     )
     assert "DIFFER; update, cycle" in said.out
     assert not library.exists()
+
+
+def test_an_update_that_raises_in_every_cycle_is_rejected_with_its_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    library = tmp_path / "lib" / "tried.so"
+    file = written(tmp_path, "    def update(self):\n        self.out.write(1.0 / (0 * self.gain))")
+    assert main.main([file, "--verify", "300", "-o", str(library)]) == main.DIFFERENT
+    said = capsys.readouterr()
+    assert re.fullmatch(
+        r"rtcf-compile: \S*tried\.py:11: `self\.out\.write\(.+\)`: Tried: update raises "
+        r"in each of 300 cycles with random inputs: ZeroDivisionError: .+\n",
+        said.err,
+    ), said.err
+    assert "300 raised in both: the same, BUT UPDATE ALWAYS RAISES" in said.out
+    assert not library.exists()
+    file = written(tmp_path, "    def update(self):\n        self.out.write(1.0 / int(self.gain))")
+    assert main.main([file, "--verify", "3000"]) == main.DONE, "it raises only for some gains"
+
+
+def test_ctrl_c_ends_it_silently(tmp_path: Path) -> None:
+    file = tmp_path / "tried.py"
+    file.write_text("import os, signal\n\nos.kill(os.getpid(), signal.SIGINT)\n")
+    done = subprocess.run(
+        [*MINDS_CTRL_C, str(BUILD_TREE / "bin" / "rtcf-compile"), str(file), "--verify"],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout, done.stderr) == (main.INTERRUPTED, "", "")
 
 
 def test_a_division_by_zero_only_in_machine_code_is_reported(
