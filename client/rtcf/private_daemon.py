@@ -1,7 +1,8 @@
 """A private rtcfd for one launch or command, under an ordinary user account.
 
-Its folder is accessible only to its user.  It loads components from that user's folders, keeps no
-state, and ends with the process that started it, even if that process is killed.
+Its folder is accessible only to its user.  It loads components from that user's folders, keeps
+incidents until its end but no other state, and ends with the process that started it, even if that
+process is killed.
 """
 
 import contextlib

@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import logging
 import os
+import shutil
 import signal
 import socket
 import sys
@@ -93,10 +94,7 @@ class Daemon:
             on_change=self._tell,
             serve_ros=ros_services.serve,
             limits=given.limits,
-            incidents=Incidents(
-                given.state_dir / "incidents" if given.state_dir else None,
-                lambda: self._shared.limits,
-            ),
+            incidents=Incidents(given.incidents_dir, lambda: self._shared.limits),
             name_of=self._clients.name_of,
         )
         self._runners = Runners(shared)
@@ -284,6 +282,8 @@ class Daemon:
         if self._runtime_lock.held:
             # Folders that are not empty stay.
             self._command.remove_folders()
+            if self._options.state_dir is None:
+                shutil.rmtree(self._options.incidents_dir, ignore_errors=True)
         if self._options.own_runtime_dir:
             with contextlib.suppress(OSError):
                 self._options.runtime_dir.rmdir()

@@ -5,7 +5,7 @@ import argparse
 import os
 import textwrap
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rtcf.v1 import runner_pb2
@@ -27,6 +27,7 @@ _RUNTIME_DIR = Path("/run/rtcfd")
 _STATE_DIR = Path("/var/lib/rtcfd")
 _GRAPHS_DIR = Path("/etc/rtcfd/graphs.d")
 _EXECUTOR = Path("/usr/lib/rtcf/rtcf-executor")
+_MOST_IN_MEMORY_MB = 100  # incidents
 _REALTIME = {
     "required": runner_pb2.REALTIME_REQUIRED,
     "preferred": runner_pb2.REALTIME_PREFERRED,
@@ -52,6 +53,11 @@ class Options:
     foreground: bool
     verbose: bool
     settings: Settings  # from the configuration file
+
+    @property
+    def incidents_dir(self) -> Path:
+        """The folder of incidents; without a state folder, it is removed at the end."""
+        return (self.state_dir or self.runtime_dir) / "incidents"
 
     def settings_error(self, settings: runner_pb2.RunnerSettings) -> str:
         """Return why an executor would reject the settings of a runner; empty = it accepts them."""
@@ -106,7 +112,7 @@ def parse(
         folders=_folders([*args.path, *file.path], build_tree)
         + ([Folder(compiled_folder(), named=True)] if args.foreground else []),
         access=file.access,
-        limits=file.limits,
+        limits=file.limits if state_dir else _in_memory(file.limits),
         defaults=runner_settings.merged(
             runner_settings.defaults(
                 _REALTIME[realtime],
@@ -138,8 +144,9 @@ def _parser(build_tree: Path | None) -> argparse.ArgumentParser:
             /run/rtcfd and /var/lib/rtcfd, requires real-time rights, and reads its
             settings from /etc/rtcfd/rtcfd.toml.
             With --foreground, rtcfd is private: it prefers real-time rights, keeps state
-            only with --state-dir, and reads settings only with --config.  Its loops stop
-            soon after it, even if it crashes (orphan_timeout_s = 2 instead of 60).
+            only with --state-dir, else incidents until its end, and reads settings only
+            with --config.  Its loops stop soon after it, even if it crashes
+            (orphan_timeout_s = 2 instead of 60).
 
             rtcfd searches for components in <folder>/<package>/*.so, in this order:
               each --path, then each `path` of the configuration file, then
@@ -259,6 +266,11 @@ def reload_wanted(arguments: Sequence[str] | None) -> Reload | None:
     except RequestError as error:
         named = Settings.socket_in_bad(file, _kept_folder(args)) if file else None
         return Reload(_socket(args, settings_file.Config(socket=named)), str(error))
+
+
+def _in_memory(limits: Limits) -> Limits:
+    """Return the limits if incidents are in the runtime folder, which is often in memory."""
+    return replace(limits, incidents_mb=min(limits.incidents_mb, _MOST_IN_MEMORY_MB))
 
 
 def _file(args: argparse.Namespace) -> Path | None:

@@ -23,7 +23,7 @@ from rtcf.v1 import errors_pb2, incidents_pb2
 
 import rtcfd
 from rtcfd.common import regular_files
-from rtcfd.common.errors import FailedPrecondition, NotFound, Unavailable
+from rtcfd.common.errors import NotFound, Unavailable
 from rtcfd.common.limits import Limits
 from rtcfd.incidents import frame_memory, head
 
@@ -43,9 +43,9 @@ _WRITER = (
 
 
 class Incidents:
-    """The incident files in a folder; None = none are kept."""
+    """The incident files in a folder, which is created for the first one."""
 
-    def __init__(self, folder: Path | None, limits: Callable[[], Limits]) -> None:
+    def __init__(self, folder: Path, limits: Callable[[], Limits]) -> None:
         self._folder = folder
         self._limits = limits
         self._threads = ThreadPoolExecutor(1, "rtcfd-incidents")
@@ -59,7 +59,7 @@ class Incidents:
     def wanted(self, runner: str) -> bool:
         """Return whether to keep an automatic incident: at most one per runner in _PACE_S, because
         a loop may fail again and again."""
-        if self._folder is None or not self._limits().incidents_mb:
+        if not self._limits().incidents_mb:
             return False
         now = time.monotonic()
         if now - self._kept.get(runner, -_PACE_S) < _PACE_S:
@@ -77,8 +77,8 @@ class Incidents:
 
         `complete` is called after the frames are copied, and may change the facts.
         """
+        folder = self._folder
         try:
-            folder = self._place()
             frozen = await self._in_thread(frame_memory.copied, descriptor, threads=self._copier)
         finally:
             os.close(descriptor)
@@ -99,8 +99,6 @@ class Incidents:
 
     async def all(self, runner: str = "") -> list[incidents_pb2.Incident]:
         """Return all incidents, the oldest first."""
-        if self._folder is None:
-            return []
         found = await self._look(_all, self._folder)
         return [each for each in found if not runner or each.runner == runner]
 
@@ -133,14 +131,6 @@ class Incidents:
         for each in gone:
             await self._look(_remove, Path(each.file))
         return gone
-
-    def _place(self) -> Path:
-        if self._folder is None:
-            raise FailedPrecondition(
-                "this rtcfd keeps no incidents: start it with --state-dir",
-                errors_pb2.REASON_DAEMON_FAILED,
-            )
-        return self._folder
 
     async def _look(self, work: Callable[..., Any], *arguments: Any) -> Any:
         return await self._in_thread(work, *arguments, threads=self._readers)

@@ -63,8 +63,8 @@ class SharedContext:
     # Answers the calls of ROS services of a runner.
     serve_ros: Callable[["RunnerCore", wire.ServiceCall], Awaitable[wire.ServiceAnswer]]
     events: EventLog = field(default_factory=EventLog)
+    incidents: Incidents
     limits: Limits = field(default_factory=Limits)
-    incidents: Incidents = field(default_factory=lambda: Incidents(None, Limits))
     keeping: Operations = field(  # incidents being written
         default_factory=lambda: Operations("incidents", logging.getLogger("rtcfd.incidents"))
     )

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import pytest
 import rtcf
-from daemon_process import BUILD_TREE, MINDS_CTRL_C, Daemon, clean_environment
+from daemon_process import BUILD_TREE, MINDS_CTRL_C, Daemon, clean_environment, wait_for
 from pages import TREE
 from rtcf.testing import Bench
 from rtcf_shared.graph_reader import read_graphs
@@ -265,6 +265,35 @@ def test_the_arm_is_shown_until_its_time_is_over() -> None:
     assert len(rows) >= 2
     assert int(rows[-1][0]) > int(rows[0][0])
     assert all(float(error) < np.degrees(TRACKING) for _, error in rows)
+
+
+def test_the_arm_is_shown_after_a_fault_with_its_incident() -> None:
+    with subprocess.Popen(
+        [*MINDS_CTRL_C, TREE / "components" / "rtcf_arm" / "show", "--no-browser"],
+        env=clean_environment(), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL, text=True,
+    ) as process:  # fmt: skip
+        assert process.stdout is not None
+        lines = process.stdout
+
+        def read_to(pattern: str) -> re.Match[str]:
+            for line in lines:
+                if found := re.search(pattern, line):
+                    return found
+            raise AssertionError(f"no line like {pattern}")
+
+        with rtcf.Client(read_to(r"--socket (\S+)")[1]) as client:
+            read_to(r"^ +\d+ s ")
+            client.write("robot.push", "[1e9, 1e9, 1e9, 0, 0, 0]")
+            read_to("^the loop has ended: .*the simulation diverged")
+            (incident,) = wait_for(client.list_incidents, "the incident")
+            assert "the simulation diverged" in incident.reason
+            client.write("robot.push", "[0, 0, 0, 0, 0, 0]")
+            client.restart_runner("rt_runner")
+            client.start()
+            read_to(r"^ +\d+ s ")
+        process.send_signal(signal.SIGINT)
+        assert process.wait() == 130
 
 
 def test_ctrl_c_ends_everything() -> None:

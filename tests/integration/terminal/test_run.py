@@ -127,6 +127,20 @@ def test_termination_leaves_no_files(
     assert [each.name for each in left.iterdir()] == ["rtcf-cpus"]
 
 
+def test_incidents_are_kept_until_it_ends(tmp_path: Path) -> None:
+    (tmp_path / "graph.yaml").write_text(GRAPH.format(amplitude=1.5))
+    with running(tmp_path, "graph.yaml") as loop:
+        loop.wait_for("running; Ctrl-C ends it")
+        with rtcf.Client(loop.socket) as client:
+            taken = client.take_incident(reason="on request")
+            assert client.list_incidents() == [taken]
+            with (tmp_path / "copy.mcap").open("wb") as to:
+                client.get_incident(to)
+    assert not Path(taken.file).exists()
+    with rtcf.read_recording(tmp_path / "copy.mcap") as copy:
+        assert copy.metadata["incident"]["reason"] == "on request"
+
+
 def test_tuned_values_stay_when_a_graph_file_is_saved(tmp_path: Path) -> None:
     def values() -> dict[str, float]:
         found = client.get_component("wave").parameters
