@@ -73,6 +73,7 @@ _MODULES = {
     "new": "machine.new",
 }
 _COMPLETION = "__complete"
+_HELP = "help"  # help VERB = VERB --help
 # Global options that take the next word as their value.
 _WITH_VALUE = ("-H", "--host", "--socket", "-r", "--runner", "-o", "--output")
 _WITH_EQUALS = ("--host=", "--socket=", "--runner=", "--output=")
@@ -93,9 +94,17 @@ def _main(words: list[str], build_tree: Path | None) -> int:
         for candidate in completion.candidates(parser(), words[1:]):
             print(candidate)
         return DONE
-    args = parser(verb_of(words)).parse_args(words)
+    if words[:1] == [_HELP]:
+        words = [*words[1:], "--help"]
+    verb = verb_of(words)
+    if not verb and (wrong := _first_word(words)):
+        from rtcf_shared.naming import suggestion
+
+        hint = suggestion(wrong, [*_MODULES, _HELP])
+        return _fail(f'no command "{wrong}"{hint}; `rtcfctl --help` lists all', USAGE)
+    args = parser(verb).parse_args(words)
     args.build_tree = build_tree
-    args.verb = verb_of(words)
+    args.verb = verb
     from rtcfctl.terminal.output import Output
 
     output = Output(args.output, args.verbose)
@@ -194,6 +203,9 @@ def parser(verb: str = "") -> argparse.ArgumentParser:
     result.add_argument("--version", action="version", version=f"rtcfctl {rtcf.__version__}")
     _global_options(result, defaults=True)
     verbs = result.add_subparsers(metavar="COMMAND", required=True)
+    if not verb:
+        helping = verbs.add_parser(_HELP, help="show the options of a command")
+        helping.add_argument("command", metavar="COMMAND", nargs="?", choices=_MODULES)
     # Global options may also follow the verb.  There they have no default, which would
     # override a value given before the verb.
     for module in [_MODULES[verb]] if verb else dict.fromkeys(_MODULES.values()):
@@ -206,14 +218,18 @@ def parser(verb: str = "") -> argparse.ArgumentParser:
 
 def verb_of(words: Sequence[str]) -> str:
     """Return the verb of a command line, or "" if only the whole parser can find it."""
+    word = _first_word(words)
+    return word if word in _MODULES else ""
+
+
+def _first_word(words: Sequence[str]) -> str:
+    """Return the first word after the global options; "" for another option or for none."""
     left = iter(words)
     for word in left:
-        if word in _MODULES:
-            return word
         if word in _WITH_VALUE:
             next(left, None)
         elif word not in ("-v", "--verbose") and not word.startswith(_WITH_EQUALS):
-            return ""
+            return "" if word.startswith("-") else word
     return ""
 
 

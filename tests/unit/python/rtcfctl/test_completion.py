@@ -53,6 +53,7 @@ def offered(daemon: DaemonUnderTest) -> DaemonUnderTest:
         ("get al", ["alpha"]),
         ("wait al", ["alpha.out1"]),
         ("nonsense ", [""]),
+        ("help stat", ["stats", "status"]),
     ],
 )
 def test_the_last_word_is_completed(offered: DaemonUnderTest, line: str, among: list[str]) -> None:

@@ -17,7 +17,7 @@ from daemon_process import BUILD_TREE, MINDS_CTRL_C, signal_twice, wait_for
 from daemon_under_test import DaemonUnderTest
 from rtcf.v1 import graph_pb2, runner_pb2
 from rtcfctl.loop.runner import settings_of
-from rtcfctl.main import parser, verb_of
+from rtcfctl.main import main, parser, verb_of
 from rtcfctl.terminal.plain import plain
 
 
@@ -130,6 +130,34 @@ def test_ctrl_c_is_exit_code_1_and_the_operation_continues(
 )
 def test_bad_usage_is_exit_code_2(stopped_daemon: DaemonUnderTest, command: str) -> None:
     assert stopped_daemon.ctl(*command.split()).returncode == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["stauts"], 'no command "stauts"; did you mean "stats" or "status"?; `rtcfctl --help`'),
+        (["-v", "--socket", "s", "qq"], 'no command "qq"; `rtcfctl --help` lists all'),
+        (["help", "stpo"], 'no command "stpo"; did you mean "stop" or "step"?'),
+    ],
+)
+def test_a_misspelt_command_is_reported_with_similar_ones(
+    capsys: pytest.CaptureFixture[str], words: list[str], said: str
+) -> None:
+    assert main(words) == 2
+    line = capsys.readouterr().err
+    assert line.startswith(f"rtcfctl: {said}") and line.count("\n") == 1
+
+
+@pytest.mark.parametrize("words", [["help", "status"], ["help"]])
+def test_help_shows_the_options_of_a_command(
+    capsys: pytest.CaptureFixture[str], words: list[str]
+) -> None:
+    shown = []
+    for line in (words, [*words[1:], "--help"]):
+        with pytest.raises(SystemExit, match="^0$"):
+            main(line)
+        shown.append(capsys.readouterr().out)
+    assert shown[0] == shown[1] and shown[0].startswith("usage: rtcfctl")
 
 
 def test_no_daemon_is_exit_code_3(stopped_daemon: DaemonUnderTest) -> None:
