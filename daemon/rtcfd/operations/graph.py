@@ -10,7 +10,7 @@ from collections.abc import Awaitable, Callable, Iterable, Mapping
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, errors_pb2, graph_pb2
 from rtcf_shared.graph_writer import same_value
-from rtcf_shared.naming import closest, listing, suggestion
+from rtcf_shared.naming import listing
 
 from rtcfd.access import caller
 from rtcfd.access.caller import Caller
@@ -20,7 +20,7 @@ from rtcfd.common.errors import InvalidArgument, NoMaster, NotFound, RequestErro
 from rtcfd.common.names import absolute, check_graph, full_name
 from rtcfd.executor.link import Progress
 from rtcfd.operations import parameters, tuned
-from rtcfd.operations.runner_core import Change, RunnerCore
+from rtcfd.operations.runner_core import Change, RunnerCore, no_component
 from rtcfd.state.desired import replacement
 
 _MASTER_POLL_S = 0.5
@@ -498,11 +498,5 @@ def require_known(runner: RunnerCore, full_names: Iterable[str]) -> None:
     """Raise NotFound if a component is not in the saved graph."""
     known = runner.desired.components
     for name in full_names:
-        if name not in known:
-            raise NotFound(
-                f"no component {name} in runner {runner.name}"
-                f"{suggestion(name, known)} (components: {listing(known)})",
-                errors_pb2.REASON_COMPONENT_NOT_FOUND,
-                component=name,
-                suggestion=closest(name, known),
-            )
+        if name not in runner.desired.components:
+            raise no_component(runner, name)

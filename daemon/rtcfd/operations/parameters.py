@@ -21,7 +21,7 @@ from rtcfd.common.declared_values import plain, word
 from rtcfd.common.errors import FailedPrecondition, InvalidArgument, NotFound, RequestError
 from rtcfd.common.names import absolute
 from rtcfd.executor.link import Progress
-from rtcfd.operations.runner_core import Change, PendingParameters, RunnerCore
+from rtcfd.operations.runner_core import Change, PendingParameters, RunnerCore, no_component
 from rtcfd.state.desired import ComponentLeaseTerms
 from rtcfd.state.history import MOST_OF_A_COMPONENT, UNANSWERED, ParameterChange
 
@@ -139,6 +139,8 @@ def history(
     """Return the newest changes that match a request, in order, oldest first."""
     component = absolute(request.component) if request.component else ""
     found = runner.desired.history.of(component, request.parameter)
+    if component and not found and component not in runner.desired.components:
+        raise no_component(runner, component, ", and no change of one")
     most = min(request.most or _MOST_CHANGES, _MOST_CHANGES)
     changes: list[control_pb2.ParameterChange] = []
     room = _MOST_BYTES

@@ -15,11 +15,12 @@ from typing import TypeVar
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, errors_pb2, graph_pb2, ports_pb2, runner_pb2
 from rtcf_shared.enums import word
+from rtcf_shared.naming import closest, listing, suggestion
 
 from rtcfd.access import caller
 from rtcfd.catalog.catalog import Catalog
 from rtcfd.common.background import WorkerThreads
-from rtcfd.common.errors import RequestError, Silent, Unavailable
+from rtcfd.common.errors import NotFound, RequestError, Silent, Unavailable
 from rtcfd.common.event_log import EventLog
 from rtcfd.common.limits import Limits
 from rtcfd.executor.command import ExecutorCommand
@@ -62,8 +63,8 @@ class SharedContext:
     on_change: Callable[[], None]  # called when summary() may have changed
     # Answers the calls of ROS services of a runner.
     serve_ros: Callable[["RunnerCore", wire.ServiceCall], Awaitable[wire.ServiceAnswer]]
-    events: EventLog = field(default_factory=EventLog)
     incidents: Incidents
+    events: EventLog = field(default_factory=EventLog)
     limits: Limits = field(default_factory=Limits)
     keeping: Operations = field(  # incidents being written
         default_factory=lambda: Operations("incidents", logging.getLogger("rtcfd.incidents"))
@@ -472,3 +473,15 @@ class RunnerCore(ABC):
     async def save(self) -> list[str]:
         """Save the desired state; see Saver.save()."""
         return await self.saver.save()
+
+
+def no_component(runner: RunnerCore, name: str, more: str = "") -> NotFound:
+    """Return the error for an unknown component, given by its full name."""
+    known = runner.desired.components
+    return NotFound(
+        f"no component {name} in runner {runner.name}{more}{suggestion(name, known)} "
+        f"(components: {listing(known)})",
+        errors_pb2.REASON_COMPONENT_NOT_FOUND,
+        component=name,
+        suggestion=closest(name, known),
+    )

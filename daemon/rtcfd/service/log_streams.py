@@ -6,11 +6,11 @@ from typing import Generic
 
 from rtcf.executor.v1 import executor_pb2 as wire
 from rtcf.v1 import control_pb2, errors_pb2
-from rtcf_shared.naming import closest, listing, suggestion
 
 from rtcfd.common.errors import NotFound
 from rtcfd.common.event_log import Entry, EventLog, NumberedLog
 from rtcfd.common.names import absolute
+from rtcfd.operations.runner_core import no_component
 from rtcfd.runners.runner import Runner
 
 _BATCH = 200
@@ -105,20 +105,13 @@ async def watch_logs(
 
 def _check_known(runner: Runner, names: Iterable[str]) -> None:
     """Raise NotFound for a component that does not exist and has logged nothing."""
-    known = dict.fromkeys(runner.desired.components)
-    missing = [name for name in names if name not in known]
+    missing = [name for name in names if name not in runner.desired.components]
     if missing:
         kept, _ = runner.logs.after(0, runner.logs.last)
         spoke = {each.component for each in kept}
         for name in missing:
             if name not in spoke:
-                raise NotFound(
-                    f"no component {name} in runner {runner.name}, and no log record of one"
-                    f"{suggestion(name, known)} (components: {listing(known)})",
-                    errors_pb2.REASON_COMPONENT_NOT_FOUND,
-                    component=name,
-                    suggestion=closest(name, known),
-                )
+                raise no_component(runner, name, ", and no log record of one")
 
 
 def _numbered(record: wire.LogRecord, number: int) -> control_pb2.LogRecord:

@@ -335,3 +335,16 @@ def test_an_answer_has_the_newest_changes_that_fit() -> None:
     assert 1024 * 1024 < answer.ByteSize() <= 2 * 1024 * 1024
     assert (answer.changes[-1].component, answer.changes[-1].parameter) == ("/h", "p7")
     assert len(answer.changes) < len(desired.history.of())
+
+
+def test_the_history_of_an_unknown_component_is_rejected(daemon: DaemonUnderTest) -> None:
+    assert daemon.ctl("load", "demo", "Fine", "--name", "alpha").returncode == 0
+    assert daemon.ctl("set", "alpha", "kp:=2").returncode == 0
+    done = daemon.ctl("history", "alhpa")
+    assert (done.returncode, done.stderr) == (
+        1,
+        "rtcfctl: no component /alhpa in runner rt_runner, and no change of one; did you mean "
+        '"/alpha"? (components: /alpha)\n',
+    )
+    assert daemon.ctl("unload", "alpha").returncode == 0
+    assert "kp" in daemon.ctl("history", "alpha").stdout, "the history of an unloaded one is kept"
