@@ -224,7 +224,7 @@ class Reloads:
             )
             try:
                 result = await self._runners.apply(request, lambda line: None)
-                lines.append(f"{given.file}: {len(result.differences)} differences applied")
+                lines.append(f"{given.file} applied; differences: {len(result.differences)}")
             except RequestError as error:
                 problem = f"{given.file}: {error}"
                 self._graph_problems.append(problem)

@@ -91,7 +91,7 @@ def _writers(connection: Any) -> str:
 
 
 def _end(endpoint: graph_pb2.Endpoint) -> str:
-    mark = " (broken)" if endpoint.broken else ""
+    mark = " (loop break)" if endpoint.broken else ""
     return f"{endpoint.component}.{endpoint.port}{mark}"
 
 

@@ -296,7 +296,7 @@ async def apply(
             name=name,
             request=result_of_apply,
             event=lambda result: (
-                f"graph of {len(specs)} components applied: {len(result.differences)} differences"
+                f"graph applied; components: {len(specs)}, differences: {len(result.differences)}"
             ),
             commit=commit,
             component="",
@@ -496,7 +496,6 @@ def _single(names: list[str]) -> str:
 
 def require_known(runner: RunnerCore, full_names: Iterable[str]) -> None:
     """Raise NotFound if a component is not in the saved graph."""
-    known = runner.desired.components
     for name in full_names:
         if name not in runner.desired.components:
             raise no_component(runner, name)

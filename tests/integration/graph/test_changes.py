@@ -97,6 +97,7 @@ def test_a_broken_input_reads_the_previous_cycle(daemon: Daemon, client: rtcf.Cl
         "/ramp": True,
         "/reader": True,
     }
+    assert "/reader.in1 (loop break)" in daemon.ctl("connections").stdout
     assert daemon.ctl("unbreak", "reader.in1").returncode == 0
     client.step(100)
     assert port_value(client, "reader", "out1") == ramp + 200
