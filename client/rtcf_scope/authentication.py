@@ -25,10 +25,14 @@ from rtcf_shared.printable import printable
 
 from rtcf_scope.connection import HEADERS, Connection
 from rtcf_scope.options import LOOPBACK
+from rtcf_scope.peer import user_of
 
 _MOST_SESSIONS = 256  # the least recently used ones are removed
 _SESSION_PROTOCOL = "session."  # subprotocol prefix; pages cannot set WebSocket headers
 _LOGIN_S = 5.0  # deadline of the first authenticated request
+# Connections of one user without such a request; the oldest is closed for another one.  Otherwise,
+# any user of this machine could take all connections.
+_MOST_UNAUTHENTICATED = 16
 _LONGEST = 80  # characters of a request that an error quotes
 _CROWDED = (
     b"HTTP/1.1 503 Service Unavailable\r\nContent-Type: text/plain\r\nConnection: close\r\n\r\n"
@@ -59,6 +63,7 @@ class Authentication:
         self._tickets: dict[bytes, Callable[[], None]] = {}  # by hash
         self._new: set[Any] = set()  # connections that the server has not counted yet
         self._authenticated: set[Any] = set()  # authenticated connections
+        self._recent: dict[Any, str] = {}  # users of the connections of the last _LOGIN_S, in order
 
     def ticket(self, used: Callable[[], None]) -> str:
         """Return a token for a single session; call `used` when it is exchanged."""
@@ -100,14 +105,29 @@ class Authentication:
             # The server counts a connection only in connection_made().
             if len(there | self._new) >= self._most:
                 return _Rejection()
-            protocol = Connection(server, loop, self._new.discard)
+            protocol = Connection(server, loop, self._counted)
             self._new.add(protocol)
             loop.call_later(_LOGIN_S, self._drop_unauthenticated, protocol)
             return protocol
 
         return connection
 
-    def _drop_unauthenticated(self, protocol: web.RequestHandler) -> None:
+    def _counted(self, protocol: Connection) -> None:
+        """Close the oldest unauthenticated connection of a user who has too many."""
+        self._new.discard(protocol)
+        assert protocol.transport is not None
+        user = user_of(protocol.transport.get_extra_info("socket"))
+        self._recent[protocol] = user
+        unauthenticated = [
+            each
+            for each, its_user in self._recent.items()
+            if its_user == user and each not in self._authenticated
+        ]
+        if len(unauthenticated) > _MOST_UNAUTHENTICATED:
+            self._drop_unauthenticated(unauthenticated[0])
+
+    def _drop_unauthenticated(self, protocol: Connection) -> None:
+        self._recent.pop(protocol, None)
         if protocol not in self._authenticated:
             protocol.force_close()
 

@@ -501,3 +501,22 @@ def test_invalid_frames_end_only_their_page(scope: ScopeProcess) -> None:
                 pass
         _is_calm(scope, frame)
     assert scope.ask("/api/about")[0] == 200
+
+
+IDLE = """\
+import socket, sys
+idle = [socket.create_connection(("127.0.0.1", int(sys.argv[1]))) for _ in range(140)]
+print("connected", flush=True)
+sys.stdin.read()
+"""
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="requires root to act as another user")
+def test_idle_connections_of_another_user_do_not_keep_others_away(scope: ScopeProcess) -> None:
+    with subprocess.Popen(
+        ["/usr/bin/python3", "-c", IDLE, str(scope.port)],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, user=NOBODY, group=NOBODY,
+    ) as other:  # fmt: skip
+        assert other.stdout is not None and other.stdout.readline() == "connected\n"
+        assert scope.ask("/api/about", token=scope.token)[0] == 200
+        other.communicate()
