@@ -21,6 +21,7 @@ from rtcf_scope.recordings import Recordings
 from rtcf_scope.robot import Robots
 from rtcf_scope.site import Site
 
+FAILED, USAGE = 1, 2  # exit statuses
 PORT = 8642
 MOST_CONNECTIONS = 128
 _END_S = 1.0  # for requests in progress when the server ends
@@ -80,7 +81,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         asyncio.run(serve(options(args), _tell_service_manager))
     except (RtcfError, ValueError) as error:
         print(f"rtcf-scope: {error}", file=sys.stderr)
-        return 1
+        return USAGE if isinstance(error, ValueError) else FAILED
     return 0
 
 

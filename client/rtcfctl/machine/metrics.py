@@ -61,7 +61,8 @@ def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     try:
         import prometheus_client
     except ImportError:
-        raise rtcf.RtcfError(
+        # Like a usage error, which ends rtcf-metrics.service for good.
+        raise ValueError(
             "prometheus_client not found: sudo apt install python3-prometheus-client"
         ) from None
     registry = prometheus_client.CollectorRegistry()

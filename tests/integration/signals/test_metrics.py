@@ -5,6 +5,7 @@ import json
 import re
 import socket
 import subprocess
+import sys
 import urllib.request
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator
@@ -16,6 +17,8 @@ from xml.etree.ElementTree import Element
 import pytest
 import rtcf
 from daemon_process import Daemon, wait_for
+from pages import TREE
+from rtcfctl.main import main
 from values import iteration
 
 # Some releases of Debian have this module without type hints.
@@ -256,3 +259,16 @@ def test_impossible_plots_are_rejected(daemon: Daemon, tmp_path: Path) -> None:
         done = daemon.ctl("stats", "--plot", *words)
         assert done.returncode == code
         assert done.stderr == f"rtcfctl: {said}\n"
+
+
+def test_a_missing_package_ends_the_service_for_good(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    modules: Any = sys.modules
+    monkeypatch.setitem(modules, "prometheus_client", None)
+    assert main(["metrics", "--listen", "9464"]) == 2
+    assert capsys.readouterr().err == (
+        "rtcfctl: prometheus_client not found: sudo apt install python3-prometheus-client\n"
+    )
+    unit = (TREE / "systemd" / "rtcf-metrics.service").read_text().splitlines()
+    assert "RestartPreventExitStatus=2" in unit
