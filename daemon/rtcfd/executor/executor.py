@@ -20,6 +20,7 @@ from rtcf_shared.processes import is_frozen
 
 from rtcfd import VERSION
 from rtcfd.common.background import log_failure
+from rtcfd.common.build_id import build_id
 from rtcfd.common.errors import FailedPrecondition, RequestError, Silent, Unavailable
 from rtcfd.common.limits import Limits
 from rtcfd.executor import left_over, stop_socket
@@ -74,6 +75,7 @@ class Executor:
         self.version = ""  # of rtcf
         self.unconfigured = False  # no rtcfd has sent it the runner's settings yet
         self.foreign = ""  # why it accepts only the requests stop and exit; empty = it accepts all
+        self.other_build = False  # it was built otherwise than the present program of this version
         self._protocol = 0
         self._runner = runner
         self._peer = f"executor of {runner} (pid {process.pid})"
@@ -149,6 +151,7 @@ class Executor:
         try:
             link.peer = executor._peer
             await executor._greet(link, QUERY_TIMEOUT_S)
+            executor.other_build = _is_other_build(link.peer_pid, command.binary)
             if executor.foreign:
                 executor.foreign += (
                     f": its loop goes on as it is; `rtcfctl -r {runner} stop` ends it, "
@@ -531,6 +534,14 @@ async def _link_to(runner: str, socket: Path, on_unasked: Unasked) -> Link | Non
                 pid,
             )
         await asyncio.sleep(_RENEW_LOOK_S)
+
+
+def _is_other_build(pid: int, program: Path) -> bool:
+    """Return whether the file of a program has another build id than a process of it."""
+    try:
+        return build_id(Path(f"/proc/{pid}/exe")) != build_id(program)
+    except (OSError, ValueError):
+        return False  # unknown, for example if the program is a script
 
 
 def _remove_dead(socket: Path) -> None:

@@ -86,11 +86,15 @@ async def status_of(runner: RunnerCore) -> runner_pb2.RunnerStatus:
         status.runner = runner.name
         status.pid = executor.pid if executor is runner.executor else 0
         status.version = executor.version
-        if executor.version != VERSION and not executor.foreign:
+        if not executor.foreign and (executor.version != VERSION or executor.other_build):
+            what = (
+                f"another build of rtcf {VERSION}"
+                if executor.version == VERSION
+                else f"rtcf {executor.version}, rtcfd {VERSION}"
+            )
             lines.append(
-                f"restart pending: its executor is of rtcf {executor.version}, rtcfd "
-                f"{VERSION}; `rtcfctl runner restart {runner.name}` stops the loop and starts "
-                "a new one"
+                f"restart pending: its executor is of {what}; `rtcfctl runner restart "
+                f"{runner.name}` stops the loop and starts a new one"
             )
     # The executor does not know all settings.
     status.settings.CopyFrom(runner_settings.merged(runner.settings(), status.settings))

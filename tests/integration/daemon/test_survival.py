@@ -15,9 +15,10 @@ from pathlib import Path
 
 import pytest
 import rtcf
-from daemon_process import Daemon, is_gone, stopped, wait_for
+from daemon_process import BUILD_TREE, Daemon, is_gone, stopped, wait_for
 from rtcf import direct_stop
 from rtcf.v1 import runner_pb2
+from rtcfd.common.build_id import build_id
 from rtcfd.executor import left_over
 from values import state
 
@@ -388,3 +389,30 @@ def test_no_kill_of_an_executor_loses_its_graph(daemon: Daemon, times: int) -> N
             churn.accept(rates(client))
             assert saved_rates(daemon) == churn.known
     assert "quarantined" in (daemon.socket.with_name("state") / "rt_runner.json").read_text()
+
+
+def test_a_loop_of_another_build_of_the_same_version_is_named(tmp_path: Path) -> None:
+    program = tmp_path / "rtcf-executor"
+    shutil.copy(BUILD_TREE / "bin" / "rtcf-executor", program)
+    daemon = Daemon(tmp_path, SETTINGS, arguments=["--executor", str(program)])
+    daemon.start()
+    with rtcf.Client(daemon.socket) as client:
+        client.start()
+        assert "restart pending" not in state(client).status
+    daemon.end(signal.SIGKILL)
+    # As by an upgrade of the package: another file under the same name.
+    content = program.read_bytes()
+    present = bytes.fromhex(build_id(program))
+    program.unlink()
+    program.write_bytes(content.replace(present, bytes(len(present))))
+    program.chmod(0o755)
+    daemon.start()
+    try:
+        with rtcf.Client(daemon.socket) as client:
+            assert "adopted: loop running" in daemon.log()
+            said = state(client).status
+            assert "restart pending: its executor is of another build of rtcf " in said
+            client.restart_runner("rt_runner")
+            assert "restart pending" not in state(client).status
+    finally:
+        daemon.end()
