@@ -110,7 +110,12 @@ async def status_of(runner: RunnerCore) -> runner_pb2.RunnerStatus:
         if status.state == runner_pb2.RUNNER_STATE_STOPPED:
             status.state = runner_pb2.RUNNER_STATE_FAULTED
     lines.append(runner.operations.busy(longer_than_s=_WORTH_SAYING_S))
-    lines += [f"{name} is left out: {reason}" for name, reason in desired.left_out.items()]
+    # The line of a recovery names the cause and the culprit.
+    lines += [
+        f"{name} is left out: {reason}"
+        for name, reason in desired.left_out.items()
+        if reason not in held
+    ]
     if status.state not in (runner_pb2.RUNNER_STATE_DOWN, runner_pb2.RUNNER_STATE_STUCK):
         lines.append(advice(runner))
     lines += [desired.replaced, runner.saver.problem]

@@ -53,6 +53,7 @@ def test_a_crash_in_an_update_is_named_and_its_component_quarantined(
         "`rtcfctl -r rt_runner release /bad` loads /bad again, `rtcfctl -r rt_runner unload /bad` "
         "removes it; `rtcfctl -r rt_runner start --without /bad` starts the loop without it"
     ) in status.status
+    assert status.status.count("was killed by SIGSEGV") == 1
     left_out = running.get_component("bad")
     assert left_out.state == graph_pb2.COMPONENT_STATE_LEFT_OUT
     assert "/bad.update" in left_out.fault
