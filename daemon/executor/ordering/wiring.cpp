@@ -94,6 +94,21 @@ class Collector {
     std::map<std::string, ConnectionPlan>& connections_;
 };
 
+// How to break the connections of `cut` in an applied graph.
+std::string breakKeys(const Graph& graph, const std::vector<Edge>& cut) {
+    std::map<std::string, std::string> ports;
+    for (const Edge& edge : cut) {
+        std::string& listed = ports[graph.nodes()[edge.to].instance->fullName()];
+        listed += (listed.empty() ? "" : ", ") + edge.to_port;
+    }
+    std::string advice;
+    for (const auto& [component, listed] : ports) {
+        advice += fmt::format("{}`breaks: [{}]` of {}", advice.empty() ? "" : " and ", listed,
+                              shortName(component));
+    }
+    return advice;
+}
+
 std::string breakCommand(const Graph& graph, const std::vector<Edge>& cut,
                          const std::string& loading) {
     std::string command;
@@ -115,8 +130,7 @@ std::string breakCommand(const Graph& graph, const std::vector<Edge>& cut,
     return advice;
 }
 
-[[noreturn]] void refuseLoop(const Graph& graph, const OrderResult& result,
-                             const std::string& loading) {
+[[noreturn]] void refuseLoop(const Graph& graph, const OrderResult& result, const Origin& origin) {
     // Of a long loop, only both ends are shown.
     constexpr std::size_t kListedAtEachEnd = 10;
     constexpr std::size_t kListedCuts = 5;
@@ -134,7 +148,10 @@ std::string breakCommand(const Graph& graph, const std::vector<Edge>& cut,
     }
     std::string advice;
     for (std::size_t i = 0; i < result.cuts.size() && i < kListedCuts; ++i) {
-        advice += (advice.empty() ? "" : ", or ") + breakCommand(graph, result.cuts[i], loading);
+        const std::vector<Edge>& cut = result.cuts[i];
+        advice +=
+            (advice.empty() ? "" : ", or ") +
+            (origin.applied ? breakKeys(graph, cut) : breakCommand(graph, cut, origin.loading));
     }
     if (result.cuts.size() > kListedCuts) advice += ", or elsewhere in the loop";
     throw Error(
@@ -211,10 +228,10 @@ void requireOneSource(const Graph& graph) {
 
 }  // namespace
 
-Wiring wire(const Graph& graph, const MappingFilter& filter, const std::string& loading) {
+Wiring wire(const Graph& graph, const MappingFilter& filter, const Origin& origin) {
     Wiring wiring;
     requireOneSource(graph);
-    assignPhases(graph, loading);
+    assignPhases(graph, origin.loading);
     Collector collector(graph, wiring.connections);
     for (std::size_t index = 0; index < graph.nodes().size(); ++index) collector.addNode(index);
     for (auto& [name, plan] : wiring.connections) {
@@ -231,7 +248,7 @@ Wiring wire(const Graph& graph, const MappingFilter& filter, const std::string& 
         for (const Writer& writer : plan.others) requirePublishable(graph, name, writer);
     }
     OrderResult result = findOrder(orderProblem(graph, wiring));
-    if (!result.orderable()) refuseLoop(graph, result, loading);
+    if (!result.orderable()) refuseLoop(graph, result, origin);
     wiring.order = std::move(result.order);
     return wiring;
 }

@@ -54,12 +54,16 @@ struct Wiring {
     std::vector<std::size_t> order;                     ///< node indices in order of execution
 };
 
+/// The change that leads to a graph, for messages.
+struct Origin {
+    std::string loading;   ///< full name of the component to load; empty = another change
+    bool applied = false;  ///< true = a whole graph is applied
+};
+
 /// Connects and orders a graph.
-/// @param loading full name of a component that is not part of the running graph yet, for the
-/// advice on loops; may be empty
 /// @throws Error if a name has two types, if a name with a reader has two writers, if a type
 /// cannot be published, and for a loop
-Wiring wire(const Graph& graph, const MappingFilter& filter, const std::string& loading);
+Wiring wire(const Graph& graph, const MappingFilter& filter, const Origin& origin);
 
 /// Legal but possibly surprising effects of components on topics, one line each.
 /// @param components full names

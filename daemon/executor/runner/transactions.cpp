@@ -60,7 +60,7 @@ std::vector<std::string> Transactions::adopt(Change change, const Progress& prog
     control_.noticeEnd();
     requireNoReplay();
     const Graph graph = change.graph;
-    Wiring wiring = wire(graph, filter(), change.loading);
+    Wiring wiring = wire(graph, filter(), change.origin);
     for (auto& [name, connection] : wiring.connections)
         connection.written = !connection.writer && written_.count(name) != 0;
     checkTaps(wiring);
@@ -166,7 +166,7 @@ ChangeOutcome Transactions::load(ComponentDefinition definition, const std::stri
     Change change;
     change.graph = plan_->graph;
     change.graph.add({instance, breaks});
-    change.loading = instance->fullName();
+    change.origin.loading = instance->fullName();
     change.arriving = {instance};
     adopt(std::move(change), progress);
     return outcomeOf(*instance);
@@ -224,7 +224,7 @@ ChangeOutcome Transactions::replace(const std::string& name, ComponentDefinition
     Change change;
     change.graph = plan_->graph;
     change.graph.replace(name, {instance, breaks});
-    change.loading = instance->fullName();
+    change.origin.loading = instance->fullName();
     change.arriving = {instance};
     change.leaving = {old.instance};
     handOver(change, *old.instance, *instance);
@@ -248,11 +248,12 @@ ChangeOutcome Transactions::apply(const std::vector<WantedComponent>& wanted, bo
     try {
         Change change;
         change.graph = plan_->graph;
+        change.origin.applied = true;
         const auto made = makeComponents(differences, progress, dry_run);
         for (std::size_t i = 0; i < differences.size(); ++i)
             addDifference(change, differences[i], made[i]);
         if (dry_run) {
-            (void)wire(change.graph, filter(), {});
+            (void)wire(change.graph, filter(), change.origin);
             restoreParameters();
         } else if (!differences.empty()) {
             notes = adopt(std::move(change), progress);

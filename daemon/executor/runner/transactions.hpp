@@ -37,7 +37,7 @@ class Transactions {
     /// The parts of a change of the graph.
     struct Change {
         Graph graph;
-        std::string loading;            // new component, for advice on loops
+        Origin origin;                  // for messages
         std::set<std::string> changed;  // components to copy into the graph view again
         std::vector<std::shared_ptr<Instance>> arriving;
         std::vector<std::shared_ptr<Instance>> leaving;

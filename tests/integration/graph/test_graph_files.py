@@ -116,7 +116,7 @@ LOOP = """\
 @pytest.mark.parametrize(
     ("components", "said"),
     [
-        (LOOP, "the connections form a loop"),
+        (LOOP, "let one input read the previous cycle: `breaks: [in]` of i"),
         ("    - {package: rtcf_test, type: Counter, name: 2nd}\n", "2nd"),
         ("    - {package: rtcf_test, type: Counter, remaps: {out: a b}}\n", "a b"),
         ("    - {package: rtcf_test, type: Knobs, parameters: {rate: fast}}\n", "rate"),

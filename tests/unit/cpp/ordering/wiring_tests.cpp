@@ -106,9 +106,19 @@ TEST_F(WiringTest, LoopThroughAComponentBeingLoadedNamesItsOption) {
     const std::string text =
         errorOf(graphOf({mimo("A", {{"in1", "b"}, {"out1", "a"}, {"out2", "a2"}}),
                          mimo("B", {{"in1", "a"}, {"out1", "b"}, {"out2", "b2"}})}),
-                "/B");
+                {"/B"});
     EXPECT_NE(text.find("loading B with `--break in1`"), std::string::npos) << text;
     EXPECT_NE(text.find("`rtcfctl break A.in1`"), std::string::npos) << text;
+}
+
+TEST_F(WiringTest, LoopInAnAppliedGraphNamesTheKeyOfItsFile) {
+    const std::string text =
+        errorOf(graphOf({mimo("A", {{"in1", "b"}, {"out1", "a"}, {"out2", "a2"}}),
+                         mimo("B", {{"in1", "a"}, {"in2", "a2"}, {"out1", "b"}, {"out2", "b2"}})}),
+                {"", true});
+    EXPECT_NE(text.find("`breaks: [in1, in2]` of B"), std::string::npos) << text;
+    EXPECT_NE(text.find("`breaks: [in1]` of A"), std::string::npos) << text;
+    EXPECT_EQ(text.find("rtcfctl"), std::string::npos) << text;
 }
 
 TEST_F(WiringTest, IgnoredConnectionIsALoopBreak) {

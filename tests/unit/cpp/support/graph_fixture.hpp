@@ -84,9 +84,9 @@ class GraphFixture : public ::testing::Test {
         return graph;
     }
 
-    static std::string errorOf(const executor::Graph& graph, const std::string& loading = {}) {
+    static std::string errorOf(const executor::Graph& graph, const executor::Origin& origin = {}) {
         try {
-            executor::wire(graph, {}, loading);
+            executor::wire(graph, {}, origin);
             return {};
         } catch (const executor::Error& refused) {
             return refused.what();
