@@ -20,6 +20,15 @@ Result = TypeVar("Result")
 LEAST_FREE_MIB = 100
 
 
+def require_mcap_name(path: Path) -> None:
+    """Raise ValueError if the name of a recording or incident promises another format than MCAP."""
+    if path.suffix in (".bag", ".csv"):
+        raise ValueError(
+            f"{path}: recordings are MCAP files: write {path.with_suffix('.mcap')}, then "
+            f"`rtcfctl convert {path.with_suffix('.mcap')} {path}`"
+        )
+
+
 class Files(Closing):
     """Writes a stream to `path`; after each next() to a new file with -1, -2, … in its name.
 
@@ -41,11 +50,7 @@ class Files(Closing):
         """
         if path.name == "-":
             raise ValueError("-: a recording is written to a file, name one: FILE.mcap")
-        if path.suffix in (".bag", ".csv"):
-            raise ValueError(
-                f"{path}: recordings are MCAP files: write {path.with_suffix('.mcap')}, then "
-                f"`rtcfctl convert {path.with_suffix('.mcap')} {path}`"
-            )
+        require_mcap_name(path)
         self.paths: list[Path] = []
         self._cycles = self._lost = 0  # of the files that are closed
         self._first = path

@@ -32,6 +32,10 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
 
 def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Replay a bag."""
+    if args.write is not None and args.write.suffix in (".mcap", ".csv"):
+        raise ValueError(
+            f"--write {args.write}: the outputs are a bag: name it {args.write.with_suffix('.bag')}"
+        )
     summary = replay(client, args.bag, args.runner, args.write, output.progress, args.gap)
     if not output.for_people:
         output.data(vars(summary))

@@ -98,6 +98,11 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
 
 def export(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Copy the file of an incident."""
+    if args.to is not None:
+        # Imported here to keep the other actions fast.
+        from rtcf.recording.files import require_mcap_name
+
+        require_mcap_name(args.to)
     with _received(client, args.name) as (incident, received):
         to = args.to or Path(f"{incident.name}.mcap")
         try:

@@ -185,6 +185,9 @@ def test_a_file_is_exported_and_removed(
     to = tmp_path / "copy.mcap"
     assert daemon.ctl("incident", "export", incident.name, "--to", str(to)).returncode == 0
     assert to.read_bytes() == Path(incident.file).read_bytes()
+    bag = daemon.ctl("incident", "export", incident.name, "--to", str(to.with_suffix(".bag")))
+    assert bag.returncode == 2 and "then `rtcfctl convert" in bag.stderr
+    assert not to.with_suffix(".bag").exists()
     again = daemon.ctl("incident", "export", incident.name, "--to", str(to))
     assert again.returncode != 0 and "exists: choose another file" in again.stderr
     refused = daemon.ctl("incident", "rm", incident.name, "other")

@@ -148,6 +148,13 @@ def test_a_misspelt_command_is_reported_with_similar_ones(
     assert line.startswith(f"rtcfctl: {said}") and line.count("\n") == 1
 
 
+def test_a_bag_is_not_written_under_the_name_of_another_format(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    assert main(["replay", "in.bag", "--write", str(tmp_path / "out.mcap")]) == 2
+    assert f"the outputs are a bag: name it {tmp_path}/out.bag" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize("words", [["help", "status"], ["help"]])
 def test_help_shows_the_options_of_a_command(
     capsys: pytest.CaptureFixture[str], words: list[str]
