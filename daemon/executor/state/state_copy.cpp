@@ -1,6 +1,7 @@
 #include "state/state_copy.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 
@@ -13,6 +14,10 @@ const StateDeclaration* find(const Component& component, const std::string& name
     const auto found = std::find_if(states.begin(), states.end(),
                                     [&](const auto& state) { return state.name == name; });
     return found == states.end() ? nullptr : &*found;
+}
+
+std::string joined(const std::vector<std::string>& names) {
+    return fmt::format("{} {}", names.size() == 1 ? "state" : "states", fmt::join(names, ", "));
 }
 
 }  // namespace
@@ -29,12 +34,12 @@ void planHandOver(const Component& previous, const Component& successor,
     if (accessTo(previous).states().empty() && !accessTo(successor).states().empty())
         notes.push_back(name +
                         " begins at its initial state: the replaced component declares no state");
+    std::vector<std::string> added;
     for (const StateDeclaration& state : accessTo(successor).states()) {
         const StateDeclaration* before = find(previous, state.name);
         if (before == nullptr) {
             if (accessTo(previous).states().empty()) continue;  // reported above
-            notes.push_back(fmt::format("state {} of {} is new: it begins at {}", state.name, name,
-                                        state.print(state.initial.data())));
+            added.push_back(state.name);
         } else if (before->identity != state.identity || before->size != state.size) {
             const std::string why =
                 before->type == state.type
@@ -46,10 +51,12 @@ void planHandOver(const Component& previous, const Component& successor,
             copies.push_back({state.value, before->value, state.size});
         }
     }
+    if (!added.empty()) notes.push_back(fmt::format("new in {}: {}", name, joined(added)));
+    std::vector<std::string> removed;
     for (const StateDeclaration& state : accessTo(previous).states()) {
-        if (find(successor, state.name) == nullptr)
-            notes.push_back(fmt::format("state {} of {} no longer exists", state.name, name));
+        if (find(successor, state.name) == nullptr) removed.push_back(state.name);
     }
+    if (!removed.empty()) notes.push_back(fmt::format("gone from {}: {}", name, joined(removed)));
 }
 
 std::vector<StateCopy> planReset(const Component& component, bool running) {
