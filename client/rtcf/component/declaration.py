@@ -116,8 +116,8 @@ class Parameter(Declarable):
 class State(Declarable):
     """A value that the component keeps from one cycle to the next: `self.integral += …`.
 
-    With `live=True`, neither `rtcfctl reset` nor `rtcfctl restore` changes it while the loop runs in
-    real time: for a latched stop, or the last command of a drive.
+    With `live=True`, neither `rtcfctl reset` nor `rtcfctl restore` changes it while the loop runs
+    in real time: for a latched stop, or the last command of a drive.
     """
 
     allowed = ("unit", "doc", "live")
