@@ -41,19 +41,28 @@ class Visit:
         """Run a command line; a daemon and a watch stay until leave()."""
         words = shlex.split(line)
         if words[:2] == ["rtcfd", "--foreground"]:
-            self._leave_running(line)
-            self._socket = words[words.index("--socket") + 1]
-            wait_for(lambda: self._shell("rtcfctl status", check=False), "the private rtcfd")
+            self.begin_private(line)
         elif "--watch" in words:
             self._leave_running(line)
-            wait_for(lambda: self._shell("rtcfctl info Observer", check=False), "the component")
+            wait_for(lambda: self.tells("rtcfctl info Observer"), "the component")
         else:
             self._shell(line)
+
+    def begin_private(self, line: str) -> None:
+        """Run a command with a private daemon, which the next commands use."""
+        self._leave_running(line)
+        words = shlex.split(line)
+        self._socket = words[words.index("--socket") + 1]
+        wait_for(lambda: self.tells("rtcfctl status"), "the private rtcfd")
 
     def leave(self) -> None:
         """End the commands that run."""
         for unit in reversed(self._left):
             self.machine.run("systemctl", "stop", unit)
+
+    def tells(self, line: str) -> bool:
+        """Return whether a command line succeeds."""
+        return self._shell(line, check=False)
 
     def _shell(self, line: str, check: bool = True) -> bool:
         socket = f"export RTCF_SOCKET={self._socket}; " if self._socket else ""
@@ -102,8 +111,8 @@ def _files(page: str, *wanted: tuple[str, str, str]) -> Callable[[Visit], None]:
 
 def _robot(visit: Visit) -> None:
     _files("robot.md", ("velocity_pi.py", "python", "VelocityPi"))(visit)
-    visit.type("rtcfctl apply /usr/share/rtcf_arm/arm.yaml")
-    visit.type("rtcfctl start")
+    # As the page says: only a private daemon loads a source file.
+    visit.begin_private(f"rtcfctl --socket {visit.folder}/s run /usr/share/rtcf_arm/arm.yaml")
 
 
 # Setup that a page assumes.
@@ -135,9 +144,6 @@ def test_the_commands_of_a_page_succeed_as_installed(service: Service, page: str
         for line in typed(page):
             visit.type(line)
             if "1e9" in line:  # the fault of the robot
-                wait_for(
-                    lambda: service.ctl("-o", "json", "incident", "list").stdout.count('"name"'),
-                    "the incident",
-                )
+                wait_for(lambda: visit.tells("rtcfctl incident show"), "the incident")
     finally:
         visit.leave()
