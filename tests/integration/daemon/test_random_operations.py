@@ -437,10 +437,10 @@ class Clients:
                 stack[-1][each.parameter] = before, plain(each.value)
         for name, known in model.changes.items():
             found = stacks.get(name, [])
+            expected: list[list[Change]] = [known, known[:-1], known + found[-1:]]
             assert any(
-                found == [*one, *last][-len(found) :]
-                and len(found) in (len(one) + len(last), *LONG)
-                for one, last in ((known, []), (known[:-1], []), (known, found[-1:]))
+                found == each[len(each) - len(found) :] and len(found) in (len(each), *LONG)
+                for each in expected
             ), f"{name}: {len(found)} changes {found[-2:]}, not {len(known)} {known[-2:]}"
         model.changes = {name: stack for name, stack in stacks.items() if stack}
 

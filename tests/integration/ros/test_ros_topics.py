@@ -269,7 +269,8 @@ def test_a_stop_whose_node_has_ended_stops(
     button.wait_until_connected()
 
     def value(port: str) -> str:
-        return {each.name: each.value for each in client.get_component("/es/stop").ports}[port]
+        found = {each.name: str(each.value) for each in client.get_component("/es/stop").ports}
+        return found[port]
 
     wait_for(lambda: value("stop1") == "data: 0", "the released button")
     client.write("/es/stop.in", "1.0")

@@ -142,14 +142,15 @@ auto RunnerFixture::begin(Work work) -> Pending<decltype(work())> {
     using Result = decltype(work());
     auto promise = std::make_shared<std::promise<Answer<Result>>>();
     Pending<Result> pending(promise->get_future());
-    runner_->post([this, promise, work = std::move(work)] {
+    // Not runner_, which is null while the runner ends.
+    runner_->post([&runner = *runner_, promise, work = std::move(work)] {
         Answer<Result> answer;
         try {
             answer.result = work();
         } catch (const Error& refused) {
             answer.error.emplace(refused.kind(), refused.what());
         }
-        runner_->cleanUpLeft();
+        runner.cleanUpLeft();
         promise->set_value(std::move(answer));
     });
     return pending;
