@@ -242,7 +242,7 @@ def test_a_launch_is_named(client: rtcf.Client) -> None:
     spec = rtcf.component("demo", "Fine", name="pid", parameters=["kp:=1.5"])
     opening = control_pb2.OpenLease(component=spec, holder="launch of ann")
     lease = client.lease_component(opening)
-    wait_for(lambda: client.get_history("pid"), "the change")
+    wait_for(lambda: client.get_history(), "the change")
     (change,) = client.get_history("pid")
     assert (change.who, change.how) == ("launch of ann", "launch")
     lease.end()
