@@ -266,10 +266,8 @@ DiagnosticStatus DiagnosticReport::loopStatus() {
     addValue(status, "messages passed over for newer ones", passed_over);
     addValue(status, "log records lost", logs);
     addValue(status, "cycle messages lost", cycles);
-    addValue(status, "real time",
-             present.simulated          ? "no: follows /clock"
-             : present.degraded.empty() ? "yes"
-                                        : joined(present.degraded));
+    const std::string missing = present.simulated ? "no: follows /clock" : joined(present.degraded);
+    addValue(status, "real time", missing.empty() ? "yes" : missing);
     addMicroseconds(status, "calculation",
                     summarize(difference(duration, duration_), loop.counter().nsPerTick()));
     addMicroseconds(status, "wake-up latency", summarize(difference(latency, latency_), 1.0));
