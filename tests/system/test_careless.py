@@ -82,9 +82,9 @@ def test_an_interrupted_verb_ends_and_leaves_nothing(service: Service) -> None:
     # Files under their final name are complete, or are recordings that can be opened.
     machine.shell(
         f"cd {_DESK} && python3 -c 'import json, pathlib, rtcf\n"
-        'rtcf.read_recording("recording.mcap").close()\n'
-        'trace = pathlib.Path("trace.json")\n'
-        "json.loads(trace.read_text()) if trace.exists() else None'"
+        'for each in pathlib.Path().glob("*.mcap"): rtcf.read_recording(str(each)).close()\n'
+        'for each in pathlib.Path().glob("*.json"): json.loads(each.read_text())\n'
+        'assert pathlib.Path("whole.mcap").exists()\''
     )
     wait_for(lambda: descriptors(service) <= before, "rtcfd to have as many descriptors as before")
     for verb in _ENDING:
