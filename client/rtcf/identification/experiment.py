@@ -41,6 +41,7 @@ _WHY = {
 _LEASE_S = 1.0
 _RENEWALS = 4  # per lease
 _PATIENCE_S = 10.0  # of loop time
+_END_S = 5.0  # of a lease
 _MOST_FILLED = 0.02  # share of cycles that may be missing
 _TYPE = ("rtcf_control", "Excitation")
 
@@ -398,10 +399,16 @@ def _leased(client: Client, runner: str, spec: graph_pb2.ComponentSpec) -> Itera
     try:
         yield lease
     finally:
+        # An interruption may have lost the request: then rtcfd unloads the component, too.
+        patience = threading.Timer(_END_S, lease.drop)
+        patience.start()
         lease.end()
-        with contextlib.suppress(RtcfError):  # dropped, or lost: rtcfd unloads the component
-            for _ in messages:
-                pass
+        try:
+            with contextlib.suppress(RtcfError):  # dropped, or lost: rtcfd unloads the component
+                for _ in messages:
+                    pass
+        finally:
+            patience.cancel()
 
 
 def _full(name: str) -> str:

@@ -84,7 +84,7 @@ void TopicSubscriber::close() {
     mute();
     shutDown(mutex_, subscriber_);
     const std::lock_guard lock(mutex_);
-    if (had_peers_) injector_->setFed(false);
+    if (peers_ > 0) injector_->setFed(false);
 }
 
 bool TopicSubscriber::isOpen() const {
@@ -97,8 +97,9 @@ void TopicSubscriber::watchConnections() {
     if (subscriber_ == nullptr) return;
     const std::size_t count = subscriber_.getNumPublishers();
     if (latched_->waits()) latched_->noteConnections(count);
-    had_peers_ = had_peers_ || count > 0;
-    if (had_peers_) injector_->setFed(count > 0);
+    // A message sets it, too, and the loss of a connection removes it: see reconnection.cpp.
+    if (count > peers_ || (count == 0 && peers_ > 0)) injector_->setFed(count > 0);
+    peers_ = count;
 }
 
 bool TopicSubscriber::hasPeers() const {

@@ -88,8 +88,8 @@ class TopicSubscriber {
     ros::Subscriber subscriber_;
     std::shared_ptr<LatchedBefore> latched_;
     std::string problem_;
-    bool had_peers_ = false;  // values without them come from clients
-    Retry retry_;             // watch thread
+    std::size_t peers_ = 0;
+    Retry retry_;  // watch thread
 };
 
 }  // namespace rtcf::ros1

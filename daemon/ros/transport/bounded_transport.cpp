@@ -74,6 +74,12 @@ void boundTopic(const std::string& topic, const std::shared_ptr<executor::Inject
     injectors[topic] = injector;
 }
 
+std::shared_ptr<executor::Injector> injectorOf(const std::string& topic) {
+    const std::lock_guard lock(topics().mutex);
+    const auto found = topics().injectors.find(topic);
+    return found == topics().injectors.end() ? nullptr : found->second.lock();
+}
+
 }  // namespace rtcf::ros1
 
 // The following functions replace those of roscpp and xmlrpcpp.

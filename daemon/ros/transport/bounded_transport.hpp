@@ -21,5 +21,7 @@ namespace rtcf::ros1 {
 /// Skips messages of the topic that are larger than the injector accepts, during the life of the
 /// injector. Any thread.
 void boundTopic(const std::string& topic, const std::shared_ptr<executor::Injector>& injector);
+/// The injector of a bound topic; null = none. Any thread.
+std::shared_ptr<executor::Injector> injectorOf(const std::string& topic);
 
 }  // namespace rtcf::ros1

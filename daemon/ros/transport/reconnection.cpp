@@ -3,12 +3,15 @@
 #include <dlfcn.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
+#include <ros/subscription.h>
 #include <ros/transport/transport_tcp.h>
 #include <ros/transport_publisher_link.h>
 #include <sys/socket.h>
 
 #include <algorithm>
 #include <atomic>
+
+#include "ros/transport/bounded_transport.hpp"
 
 namespace rtcf::ros1 {
 
@@ -60,6 +63,11 @@ void TransportPublisherLink::onRetryTimer(const SteadyTimerEvent& event) {
         dlsym(RTLD_NEXT, "_ZN3ros22TransportPublisherLink12onRetryTimerERKNS_16SteadyTimerEventE"));
     if (retry == nullptr) return;
     const ConnectionPtr before = connection_;
+    // A publisher that was killed stays in roscpp's list until the master forgets it.
+    if (const SubscriptionPtr topic = parent_.lock();
+        topic && before->isDropped() && topic->getNumPublishers() == 1) {
+        if (const auto injector = injectorOf(topic->getName())) injector->setFed(false);
+    }
     // roscpp's function doubles the pause before its attempt.
     if (soon) retry_period_ = std::min(retry_period_, WallDuration(kLongestPause / 2));
     retry(this, event);

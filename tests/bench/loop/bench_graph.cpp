@@ -57,7 +57,9 @@ BenchGraph::BenchGraph(const std::vector<Node>& nodes, const std::string& librar
                 if (from == port) to = connection;
             }
         }
-        graph.add({make("Mimo", node.name, std::move(remaps), node.first), {}});
+        auto instance = make("Mimo", node.name, std::move(remaps), node.first);
+        const executor::LoopBreaks& breaks = instance->definition().breaks;
+        graph.add({instance, breaks});
     }
     adopt(graph);
 }

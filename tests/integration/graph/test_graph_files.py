@@ -75,7 +75,7 @@ def test_unchanged_components_are_not_touched(
             "type: Counter, remaps", "type: Counter, first: true, remaps"
         )
     )
-    assert changes(daemon, str(file)) == {("parameters", "/arm/knobs"), ("replace", "/slow")}
+    assert changes(daemon, str(file)) == {("parameters", "/arm/knobs"), ("breaks", "/slow")}
     assert count(client, "steady") > before
     (rate,) = [
         each.value.double_value

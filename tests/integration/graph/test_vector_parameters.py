@@ -287,7 +287,7 @@ def test_a_graph_file_has_a_list_of_any_length(
         ("[1, -11]", "filter/taps_1 = -11 is below its minimum -10"),
         ("[1, [2]]", "has no parameter filter/taps_1_0"),
         ("[1], taps_size: 2", "is a list of length 1, but filter/taps_size is set"),
-        ("[1], taps_size: 1.0", "filter/taps_size takes an int"),
+        ("[1], taps_size: 1.5", "filter/taps_size takes an int"),
         ("[1], tap: []", "filter/tap is an empty list: only a vector can be empty"),
     ],
 )
