@@ -49,12 +49,6 @@ Topics& topics() {
     return all;
 }
 
-std::shared_ptr<executor::Injector> injectorOf(const std::string& topic) {
-    const std::lock_guard lock(topics().mutex);
-    const auto found = topics().injectors.find(topic);
-    return found != topics().injectors.end() ? found->second.lock() : nullptr;
-}
-
 // Allocates network memory; null if there is none left.
 boost::shared_array<std::uint8_t> tryNetworkBytes(std::size_t bytes) {
     try {

@@ -118,7 +118,7 @@ def test_an_unmapped_input_can_be_written_until_a_component_writes_it(
             "is not a message: name its fields, as in {position: …, orientation",
         ),
         ("c/chaos.list", "{x: &a [1], y: *a}", "invalid YAML: an alias (*)"),
-        pytest.param("a.in", "x" * 2_000_000, "too long", id="too long"),
+        pytest.param("a.in", "x" * 70_000, "is too long, at most 65536: write JSON", id="too long"),
     ],
 )  # fmt: skip
 def test_errors_are_one_line(passing: Daemon, name: str, value: str, said: str) -> None:
