@@ -113,7 +113,7 @@ class Authentication:
         return connection
 
     def _counted(self, protocol: Connection) -> None:
-        """Close the oldest unauthenticated connection of a user who has too many."""
+        """Close the oldest unauthenticated connection of a user with too many."""
         self._new.discard(protocol)
         assert protocol.transport is not None
         user = user_of(protocol.transport.get_extra_info("socket"))

@@ -39,7 +39,7 @@ class Simulation {
     /// The reason why no cycle runs while the clock is silent or stands still; empty = it moves.
     std::string silence() const;
     /// Reports the clock's jumps, steps back and silence; summarises many.
-    /// @param last true = report what is left, as the loop has ended
+    /// @param last true = report the rest, as the loop has ended
     void report(const ReportEvent& report_event, bool last);
 
    private:

@@ -235,8 +235,8 @@ def _parser(build_tree: Path | None) -> argparse.ArgumentParser:
         "--check-config",
         action="store_true",
         help="check settings and graphs, their components and users, and exit with status 0 "
-        "(valid) or 1; as root, without --config, also what the user of the service may read and "
-        "write",
+        "(valid) or 1; as root, without --config, also the access of the service's user to files "
+        "and folders",
     )
     parser.add_argument("--verbose", action="store_true", help="log debugging messages too")
     return parser

@@ -59,7 +59,7 @@ class Operator:
     # -- commands ---------------------------------------------------------------
 
     def ctl(self, *words: str) -> str:
-        """Run rtcfctl; return what it prints."""
+        """Run rtcfctl; return its output."""
         done = self.daemon.ctl(*words)
         said = done.stdout + done.stderr
         self.history.append(f"$ rtcfctl {shlex.join(words)}\n{said}({done.returncode})")
