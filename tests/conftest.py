@@ -11,6 +11,7 @@ import os
 from pathlib import Path
 
 import pytest
+from failures_at_once import FailuresAtOnce
 from hypothesis import HealthCheck, errors, settings
 from hypothesis.database import DirectoryBasedExampleDatabase
 from random_share import RandomShares
@@ -36,8 +37,11 @@ def pytest_configure(config: pytest.Config) -> None:
     # As in rtcf-compile, which many tests run in this process.
     gc.set_threshold(100_000, 20, 20)
     config.pluginmanager.register(RandomShares(_RANDOM_S))
+    is_worker = hasattr(config, "workerinput")
+    if not is_worker:
+        config.pluginmanager.register(FailuresAtOnce(config))
     # Not in the process that starts those of pytest-xdist.
-    if hasattr(config, "workerinput") or not config.getoption("numprocesses", None):
+    if is_worker or not config.getoption("numprocesses", None):
         config.pluginmanager.register(TimeTable(_BUILD / "test" / "times.tsv"))
 
 
