@@ -505,16 +505,19 @@ def test_invalid_frames_end_only_their_page(scope: ScopeProcess) -> None:
 
 IDLE = """\
 import socket, sys
-idle = [socket.create_connection(("127.0.0.1", int(sys.argv[1]))) for _ in range(140)]
+idle = [socket.create_connection(("127.0.0.1", int(sys.argv[1]))) for _ in range(int(sys.argv[2]))]
 print("connected", flush=True)
 sys.stdin.read()
 """
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="requires root to act as another user")
-def test_idle_connections_of_another_user_do_not_keep_others_away(scope: ScopeProcess) -> None:
+@pytest.mark.parametrize("number", [140, 600])
+def test_idle_connections_of_another_user_do_not_keep_others_away(
+    scope: ScopeProcess, number: int
+) -> None:
     with subprocess.Popen(
-        ["/usr/bin/python3", "-c", IDLE, str(scope.port)],
+        ["/usr/bin/python3", "-c", IDLE, str(scope.port), str(number)],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, user=NOBODY, group=NOBODY,
     ) as other:  # fmt: skip
         assert other.stdout is not None and other.stdout.readline() == "connected\n"
