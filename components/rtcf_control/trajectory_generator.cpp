@@ -16,6 +16,7 @@
 #include <rtcf/component.hpp>
 #include <rtcf/read_number.hpp>
 
+#include "bounded_step.hpp"
 #include "joint_names.hpp"
 #include "trajectory/stop_motion.hpp"
 #include "trajectory/synchronized_motion.hpp"
@@ -29,8 +30,6 @@ class TrajectoryGenerator final : public rtcf::Component {
     static_assert(kMostJoints == SynchronizedMotion::kMostAxes);
     // Of a trajectory from a component of the loop, without allocation.
     static constexpr std::size_t kReservedPoints = 128;
-    // Periods by which a late cycle moves on at most.
-    static constexpr std::int64_t kLongestStep = 10;
     // Rounding errors of positions and velocities that are compared with their limits, relative.
     static constexpr double kLimitTolerance = 1e-9;
 

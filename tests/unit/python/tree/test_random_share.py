@@ -2,12 +2,11 @@
 
 import os
 import re
-import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
-from pages import TREE
+from empty_tree import make_empty_tree
 
 TESTS = """
 import time
@@ -47,11 +46,7 @@ def test_wrong(x):
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a source tree with these tests."""
-    folder = tmp_path_factory.mktemp("tree")
-    (folder / "tests" / "support").mkdir(parents=True)
-    for name in ("conftest.py", "support/random_share.py", "support/time_table.py"):
-        shutil.copy(TREE / "tests" / name, folder / "tests" / name)
-    shutil.copy(TREE / "pyproject.toml", folder)
+    folder = make_empty_tree(tmp_path_factory.mktemp("tree"))
     (folder / "tests" / "test_it.py").write_text(TESTS)
     return folder
 

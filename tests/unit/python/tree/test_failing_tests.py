@@ -1,11 +1,11 @@
-"""tests/run with property tests: a counterexample fails the run, and is kept."""
+"""tests/run with tests that fail by chance, find a counterexample, or hang."""
 
 import re
-import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
+from empty_tree import make_empty_tree
 from pages import TREE
 
 # The first run fails, each later one passes; a file tells the process which run it is.
@@ -30,11 +30,7 @@ def test_property(x):
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """Return a source tree without tests."""
-    (tmp_path / "tests" / "support").mkdir(parents=True)
-    for name in ("conftest.py", "support/random_share.py", "support/time_table.py"):
-        shutil.copy(TREE / "tests" / name, tmp_path / "tests" / name)
-    shutil.copy(TREE / "pyproject.toml", tmp_path)
-    return tmp_path
+    return make_empty_tree(tmp_path)
 
 
 def run_tests(folder: Path, text: str) -> subprocess.CompletedProcess[str]:
@@ -43,6 +39,7 @@ def run_tests(folder: Path, text: str) -> subprocess.CompletedProcess[str]:
     functions = "/^most_by_chance=/p; /^once_more() {/,/^}/p; /^with_pytest() {/,/^}/p"
     script = f"""
         long_marker='not long'
+        hang=(--timeout 3)
         eval "$(sed -n '{functions}' {TREE}/tests/run)"
         with_pytest /usr/bin/python3 -m pytest tests
     """
@@ -87,3 +84,13 @@ def test_property(x):
     done = run_tests(folder, HEAD + once)
     assert done.returncode == 0, done.stdout
     assert "make test: once more: tests/test_it.py::test_property\n" in done.stdout
+
+
+def test_a_test_that_hangs_fails_at_once_with_its_stack(folder: Path) -> None:
+    hangs = "import threading\n\n\ndef test_hangs():\n    threading.Event().wait()\n"
+    done = run_tests(folder, hangs + "\n\ndef test_later():\n    print('later')\n")
+    assert done.returncode == 1
+    before, failure, _ = done.stdout.partition("tests/test_it.py::test_hangs: failed in call\n")
+    assert failure and "FAILURES" not in before
+    assert "Failed: Timeout >3.0s" in done.stdout
+    assert "1 failed, 1 passed" in done.stdout
