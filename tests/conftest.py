@@ -1,4 +1,5 @@
 """Property tests: no time limits, one budget, and no repetition of a test with a counterexample.
+Signals: programs that tests start end by Ctrl-C, also where pytest ignores it.
 
 A counterexample is kept in build/hypothesis/; the next run tries it first. Its test is also listed
 in build/test/counterexamples: tests/run does not repeat it, since other draws may pass.
@@ -8,7 +9,9 @@ The times of all tests are in build/test/times.tsv.
 
 import gc
 import os
+import signal
 from pathlib import Path
+from types import FrameType
 
 import pytest
 from failures_at_once import FailuresAtOnce
@@ -34,6 +37,11 @@ _RANDOM_S = float(os.environ.get("RTCF_RANDOM_S", "60"))
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    # A process in the background or under nohup ignores these, and so do the programs it starts. A
+    # handler is not passed to them.
+    for number in (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT):
+        if signal.getsignal(number) is signal.SIG_IGN:
+            signal.signal(number, _ignore)
     # As in rtcf-compile, which many tests run in this process.
     gc.set_threshold(100_000, 20, 20)
     config.pluginmanager.register(RandomShares(_RANDOM_S))
@@ -43,6 +51,10 @@ def pytest_configure(config: pytest.Config) -> None:
     # Not in the process that starts those of pytest-xdist.
     if is_worker or not config.getoption("numprocesses", None):
         config.pluginmanager.register(TimeTable(_BUILD / "test" / "times.tsv"))
+
+
+def _ignore(number: int, frame: FrameType | None) -> None:
+    """Ignore a signal in this process only."""
 
 
 def pytest_exception_interact(

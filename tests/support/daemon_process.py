@@ -14,9 +14,6 @@ from warm_start import WarmProcess, WarmStart
 
 BUILD_TREE = Path(str(rtcf.__file__)).parents[2]
 WARM = WarmStart(BUILD_TREE)
-# Starts a program that ends by Ctrl-C, also where tests run in the background or under nohup, which
-# ignore it. Not preexec_fn: a fork beside an open client hangs on Debian 13.
-MINDS_CTRL_C = ("env", "--default-signal=INT,HUP")
 DEADLINE_S = 60.0
 _BETWEEN_S = 0.005
 _POLL_S = 0.01

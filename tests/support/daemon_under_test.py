@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import rtcf
-from daemon_process import BUILD_TREE, DEADLINE_S, MINDS_CTRL_C, WARM, wait_for
+from daemon_process import BUILD_TREE, DEADLINE_S, WARM, wait_for
 from warm_start import WarmProcess
 
 
@@ -95,7 +95,7 @@ class DaemonUnderTest:
     def ctl_process(self, *arguments: str) -> subprocess.Popen[str]:
         """Start a call of rtcfctl."""
         return subprocess.Popen(
-            [*MINDS_CTRL_C, str(BUILD_TREE / "bin" / "rtcfctl"), *arguments],
+            [str(BUILD_TREE / "bin" / "rtcfctl"), *arguments],
             env={**os.environ, "RTCF_SOCKET": str(self.socket)},
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

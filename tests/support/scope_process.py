@@ -13,7 +13,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import rtcf
-from daemon_process import BUILD_TREE, DEADLINE_S, MINDS_CTRL_C, Daemon, wait_for
+from daemon_process import BUILD_TREE, DEADLINE_S, Daemon, wait_for
 from rtcf.connection import Closing
 from rtcf.v1 import graph_pb2, runner_pb2
 
@@ -50,7 +50,7 @@ class ScopeProcess(Closing):
         environment |= display or {}
         with log.open("wb") as to:
             self.process = subprocess.Popen(
-                [*MINDS_CTRL_C, str(BUILD_TREE / "bin" / "rtcfctl"), "scope", *arguments],
+                [str(BUILD_TREE / "bin" / "rtcfctl"), "scope", *arguments],
                 env=environment, stdin=subprocess.DEVNULL, stdout=to, stderr=to,
             )  # fmt: skip
 

@@ -9,7 +9,7 @@ import subprocess
 import termios
 import time
 
-from daemon_process import BUILD_TREE, DEADLINE_S, MINDS_CTRL_C, Daemon
+from daemon_process import BUILD_TREE, DEADLINE_S, Daemon
 
 _PIECE = re.compile(
     r"\x1b\[(?P<parameters>[0-9;?]*)(?P<final>[A-Za-z])|(?P<control>[\r\n])|(?P<text>[^\x1b\r\n]+)"
@@ -87,7 +87,7 @@ class Terminal:
         self.before = termios.tcgetattr(self.theirs)
         self.process = subprocess.Popen(
             # As the leader of a session with this terminal: a signal reports a new size.
-            ["setsid", "--ctty", *MINDS_CTRL_C, BUILD_TREE / "bin" / "rtcfctl", *words],
+            ["setsid", "--ctty", BUILD_TREE / "bin" / "rtcfctl", *words],
             env=daemon.environment() | {"NO_COLOR": "1"},
             stdin=self.theirs, stdout=self.theirs, stderr=self.theirs,
         )  # fmt: skip

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import pytest
 import rtcf
-from daemon_process import BUILD_TREE, MINDS_CTRL_C, Daemon, clean_environment, wait_for
+from daemon_process import BUILD_TREE, Daemon, clean_environment, wait_for
 from pages import TREE
 from rtcf.testing import Bench
 from rtcf_shared.graph_reader import read_graphs
@@ -269,7 +269,7 @@ def test_the_arm_is_shown_until_its_time_is_over() -> None:
 
 def test_the_arm_is_shown_after_a_fault_with_its_incident() -> None:
     with subprocess.Popen(
-        [*MINDS_CTRL_C, TREE / "components" / "rtcf_arm" / "show", "--no-browser"],
+        [TREE / "components" / "rtcf_arm" / "show", "--no-browser"],
         env=clean_environment(), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL, text=True,
     ) as process:  # fmt: skip
@@ -298,7 +298,7 @@ def test_the_arm_is_shown_after_a_fault_with_its_incident() -> None:
 
 def test_ctrl_c_ends_everything() -> None:
     with subprocess.Popen(
-        [*MINDS_CTRL_C, TREE / "components" / "rtcf_arm" / "show", "--no-browser"],
+        [TREE / "components" / "rtcf_arm" / "show", "--no-browser"],
         env=clean_environment(), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
         stderr=subprocess.PIPE, text=True,
     ) as process:  # fmt: skip

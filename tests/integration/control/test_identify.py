@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 import rtcf
 import yaml
-from daemon_process import BUILD_TREE, MINDS_CTRL_C, Daemon, wait_for, wait_until_it_is
+from daemon_process import BUILD_TREE, Daemon, wait_for, wait_until_it_is
 from motors import LAG, gains, load
 from values import iteration
 
@@ -285,7 +285,7 @@ def begin(daemon: Daemon, client: rtcf.Client) -> subprocess.Popen[bytes]:
     client.write("motor.command", 0.0125)
     client.start()
     process = subprocess.Popen(
-        [*MINDS_CTRL_C, BUILD_TREE / "bin" / "rtcfctl", "identify", "motor.command",
+        [BUILD_TREE / "bin" / "rtcfctl", "identify", "motor.command",
          "motor.velocity", *LIMITS, "--duration", "60", "--shape", "step"],
         env=daemon.environment(), stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,

@@ -8,7 +8,7 @@ import subprocess
 
 import pytest
 import rtcf
-from daemon_process import DEADLINE_S, MINDS_CTRL_C, Daemon, wait_for, wait_until_it_is
+from daemon_process import DEADLINE_S, Daemon, wait_for, wait_until_it_is
 from motors import LAG, gains, load
 
 TUNE = ("tune", "pid", "--lower", "0", "--upper", "50", "--size", "5", "--duration", "2", "--step")
@@ -99,7 +99,7 @@ def test_the_gains_are_set_back_if_it_ends_early(
     client.start()
     words = (*TUNE[:-1], "--param", "kp:=0.01", "--duration", "4")
     with subprocess.Popen(
-        [*MINDS_CTRL_C, "rtcfctl", *words],
+        ["rtcfctl", *words],
         env=controlled.environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     ) as process:  # fmt: skip
         wait_for(lambda: gains(client) != SLOW, "the new gains")

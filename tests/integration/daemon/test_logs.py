@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 import pytest
 import rtcf
-from daemon_process import BUILD_TREE, MINDS_CTRL_C, Daemon, clean_environment, wait_for
+from daemon_process import BUILD_TREE, Daemon, clean_environment, wait_for
 from rtcf.streams.numbered import Lost, NumberedStream, Place
 from rtcf.v1 import control_pb2, runner_pb2
 
@@ -122,7 +122,7 @@ def test_logs_are_printed_as_text_and_json(daemon: Daemon, client: rtcf.Client) 
 def test_following_continues_until_ctrl_c(daemon: Daemon, client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_examples", "Wave", name="wave"))
     process = subprocess.Popen(
-        [*MINDS_CTRL_C, BUILD_TREE / "bin" / "rtcfctl", "--socket", daemon.socket, "logs", "wave",
+        [BUILD_TREE / "bin" / "rtcfctl", "--socket", daemon.socket, "logs", "wave",
          "-f", "-o", "json"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=clean_environment(),
     )  # fmt: skip

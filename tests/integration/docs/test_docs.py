@@ -13,7 +13,7 @@ import pytest
 import rosbag
 import rospy
 import rtcf
-from daemon_process import BUILD_TREE, MINDS_CTRL_C, NO_ROS, Daemon, clean_environment, wait_for
+from daemon_process import BUILD_TREE, NO_ROS, Daemon, clean_environment, wait_for
 from documentation_commands import pages_typed, typed
 from launch_processes import build_tree_environment
 from pages import TREE, block
@@ -137,7 +137,7 @@ def _left_running(
     with (
         said.open("wb") as to,
         subprocess.Popen(
-            [*MINDS_CTRL_C, "bash", "-c", "exec " + line.replace("/tmp/", f"{folder}/")],
+            ["bash", "-c", "exec " + line.replace("/tmp/", f"{folder}/")],
             cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=to, stderr=to,
         ) as process,
     ):  # fmt: skip

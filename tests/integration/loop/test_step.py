@@ -12,7 +12,7 @@ from pathlib import Path
 import fig_1
 import pytest
 import rtcf
-from daemon_process import BUILD_TREE, MINDS_CTRL_C, Daemon, wait_for
+from daemon_process import BUILD_TREE, Daemon, wait_for
 from rtcf.v1 import runner_pb2
 from values import iteration, number, port_value, state, wait_until_after
 
@@ -162,7 +162,7 @@ def endless_step(daemon: Daemon, client: rtcf.Client) -> Iterator["subprocess.Po
     """Yield the client of a running step, and wait for its end."""
     client.load(rtcf.component("rtcf_test", "Counter", name="steady"))
     with subprocess.Popen(
-        [*MINDS_CTRL_C, BUILD_TREE / "bin" / "rtcfctl", "step", str(10**15)],
+        [BUILD_TREE / "bin" / "rtcfctl", "step", str(10**15)],
         env=daemon.environment(),
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,

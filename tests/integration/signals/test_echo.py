@@ -6,7 +6,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from daemon_process import BUILD_TREE, MINDS_CTRL_C, Daemon, clean_environment
+from daemon_process import BUILD_TREE, Daemon, clean_environment
 
 
 def test_json_has_a_line_per_cycle(running: Daemon) -> None:
@@ -48,7 +48,6 @@ def test_errors_are_one_line(running: Daemon, words: tuple[str, ...], code: int,
 def test_ctrl_c_ends_it(running: Daemon) -> None:
     process = subprocess.Popen(
         [
-            *MINDS_CTRL_C,
             BUILD_TREE / "bin" / "rtcfctl",
             "--socket",
             running.socket,
@@ -73,7 +72,7 @@ def test_a_note_says_that_the_loop_does_not_run(running: Daemon, tmp_path: Path,
     assert running.ctl("stop").returncode == 0
     words = ["-o", str(tmp_path / "run.mcap")] if verb == "record" else []
     process = subprocess.Popen(
-        [*MINDS_CTRL_C, BUILD_TREE / "bin" / "rtcfctl", "--socket", running.socket, verb, *words],
+        [BUILD_TREE / "bin" / "rtcfctl", "--socket", running.socket, verb, *words],
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,

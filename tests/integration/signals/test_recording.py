@@ -18,7 +18,6 @@ import pytest
 import rtcf
 from daemon_process import (
     BUILD_TREE,
-    MINDS_CTRL_C,
     Daemon,
     clean_environment,
     signal_twice,
@@ -77,7 +76,6 @@ def _begun(daemon: Daemon, file: Path) -> subprocess.Popen[bytes]:
     """Return a rtcfctl that records and has written some cycles."""
     process = subprocess.Popen(
         [
-            *MINDS_CTRL_C,
             BUILD_TREE / "bin" / "rtcfctl",
             "--socket",
             daemon.socket,
@@ -342,7 +340,7 @@ def test_consecutive_files_miss_no_cycle(
 ) -> None:
     files = [tmp_path / name for name in ("run.mcap", "run-1.mcap", "run-2.mcap")]
     process = subprocess.Popen(
-        [*MINDS_CTRL_C, BUILD_TREE / "bin" / "rtcfctl", "--socket", running.socket, "record", "-o",
+        [BUILD_TREE / "bin" / "rtcfctl", "--socket", running.socket, "record", "-o",
          files[0], *bound, "--split"],
         env=clean_environment(),
         stdout=subprocess.PIPE,
@@ -438,7 +436,7 @@ def test_a_signal_interrupts_no_write(
     reader = os.open(disk, os.O_RDONLY | os.O_NONBLOCK)
     fcntl.fcntl(reader, fcntl.F_SETPIPE_SZ, 4096)
     process = subprocess.Popen(
-        [*MINDS_CTRL_C, BUILD_TREE / "bin" / "rtcfctl", "--socket", running.socket, "record", "-o",
+        [BUILD_TREE / "bin" / "rtcfctl", "--socket", running.socket, "record", "-o",
          disk, "--force"],
         env=clean_environment(),
     )  # fmt: skip

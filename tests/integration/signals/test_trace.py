@@ -14,7 +14,6 @@ import pytest
 import rtcf
 from daemon_process import (
     BUILD_TREE,
-    MINDS_CTRL_C,
     Daemon,
     clean_environment,
     signal_twice,
@@ -49,7 +48,7 @@ def cycles(events: list[Event]) -> list[Event]:
 def tracing(daemon: Daemon, file: Path, expected: int = 0) -> Iterator[None]:
     """Trace during the block, until Ctrl-C."""
     process = subprocess.Popen(
-        [*MINDS_CTRL_C, BUILD_TREE / "bin" / "rtcfctl", "--socket", daemon.socket, "trace", "-o",
+        [BUILD_TREE / "bin" / "rtcfctl", "--socket", daemon.socket, "trace", "-o",
          file],
         stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, env=clean_environment(),
     )  # fmt: skip

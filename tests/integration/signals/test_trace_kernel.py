@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 import rtcf
-from daemon_process import BUILD_TREE, MINDS_CTRL_C, Daemon, clean_environment, wait_for
+from daemon_process import BUILD_TREE, Daemon, clean_environment, wait_for
 from realtime_thread import RealtimeThread
 
 MOUNT = "mountpoint -q /sys/kernel/tracing || mount -t tracefs tracefs /sys/kernel/tracing"
@@ -62,7 +62,7 @@ def test_a_thread_of_higher_priority_is_named(
         pytest.skip("the loop does not run in real time here: " + "; ".join(status.degraded))
     file = tmp_path / "trace.json"
     tracing = subprocess.Popen(
-        [*MINDS_CTRL_C, *mounted, *trace(running, "-o", file, "--kernel", "--output", "json")],
+        [*mounted, *trace(running, "-o", file, "--kernel", "--output", "json")],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=clean_environment(),
     )  # fmt: skip
 

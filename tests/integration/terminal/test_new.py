@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 import rtcf
-from daemon_process import BUILD_TREE, MINDS_CTRL_C, clean_environment, wait_for
+from daemon_process import BUILD_TREE, clean_environment, wait_for
 from launch_processes import build_tree_environment
 
 _DEADLINE_S = 600.0  # for compilers on a busy machine
@@ -42,7 +42,7 @@ def running(line: str, folder: Path, environment: dict[str, str]) -> Iterator[No
     with (
         said.open("wb") as to,
         subprocess.Popen(
-            [*MINDS_CTRL_C, "bash", "-c", f"exec {line}"], cwd=folder, env=environment,
+            ["bash", "-c", f"exec {line}"], cwd=folder, env=environment,
             stdout=to, stderr=to,
         ) as process,
     ):  # fmt: skip

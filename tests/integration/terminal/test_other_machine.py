@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 import rtcf
-from daemon_process import MINDS_CTRL_C, Daemon, wait_for
+from daemon_process import Daemon, wait_for
 from values import iteration
 
 Ctl = Callable[..., "subprocess.CompletedProcess[str]"]
@@ -102,7 +102,7 @@ def test_ctrl_c_ends_a_watch_and_leaves_nothing(
     folder = tmp_path / "temporary"
     folder.mkdir()
     with subprocess.Popen(
-        [*MINDS_CTRL_C, "rtcfctl", "-H", "robot", "--socket", str(daemon.socket), "echo",
+        ["rtcfctl", "-H", "robot", "--socket", str(daemon.socket), "echo",
          "/Counter.out"],
         env=elsewhere | {"TMPDIR": str(folder)}, stdout=subprocess.PIPE, text=True,
         # Like a terminal, which sends Ctrl-C to all foreground processes.

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 import rtcf
-from daemon_process import BUILD_TREE, MINDS_CTRL_C, NO_ROS, Daemon, clean_environment, wait_for
+from daemon_process import BUILD_TREE, NO_ROS, Daemon, clean_environment, wait_for
 from rtcf.v1 import runner_pb2
 
 _STRANGER = 54321  # an unused uid
@@ -68,7 +68,7 @@ def running(folder: Path, *words: str, at: Path | None = None) -> Iterator[Runni
     with (
         out.open("wb") as to,
         subprocess.Popen(
-            [*MINDS_CTRL_C, "rtcfctl", "--socket", str(socket), "run", *words],
+            ["rtcfctl", "--socket", str(socket), "run", *words],
             cwd=folder, env=environment, stdin=subprocess.DEVNULL, stdout=to, stderr=to,
             start_new_session=True,
         ) as process,

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from daemon_process import BUILD_TREE, MINDS_CTRL_C
+from daemon_process import BUILD_TREE
 from pages import TREE
 from rtcf_compile import main
 from rtcf_compile.comparison import inside, verify, watched
@@ -155,7 +155,7 @@ def test_ctrl_c_ends_it_silently(tmp_path: Path) -> None:
     file = tmp_path / "tried.py"
     file.write_text("import os, signal\n\nos.kill(os.getpid(), signal.SIGINT)\n")
     done = subprocess.run(
-        [*MINDS_CTRL_C, str(BUILD_TREE / "bin" / "rtcf-compile"), str(file), "--verify"],
+        [str(BUILD_TREE / "bin" / "rtcf-compile"), str(file), "--verify"],
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert (done.returncode, done.stdout, done.stderr) == (main.INTERRUPTED, "", "")

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 import rtcf
 import yaml
-from daemon_process import BUILD_TREE, MINDS_CTRL_C, signal_twice, wait_for
+from daemon_process import BUILD_TREE, signal_twice, wait_for
 from daemon_under_test import DaemonUnderTest
 from rtcf.v1 import graph_pb2, runner_pb2
 from rtcfctl.loop.runner import settings_of
@@ -110,7 +110,7 @@ def test_ctrl_c_is_exit_code_1_and_the_operation_continues(
 ) -> None:
     go_on = tmp_path / "go on"
     with subprocess.Popen(
-        [*MINDS_CTRL_C, str(BUILD_TREE / "bin" / "rtcfctl"), "-v", "load", "demo", "Slow",
+        [str(BUILD_TREE / "bin" / "rtcfctl"), "-v", "load", "demo", "Slow",
          "--param", f"until:={go_on}"],
         env={**os.environ, "RTCF_SOCKET": str(daemon.socket)}, stderr=subprocess.PIPE, text=True,
     ) as process:  # fmt: skip
@@ -218,13 +218,13 @@ def test_ctrl_c_during_imports_ends_it_silently(tmp_path: Path) -> None:
         file.parent.mkdir(parents=True)
     shutil.copy(BUILD_TREE / "bin" / "rtcfctl", script)
     module.write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\nmain = print\n")
-    done = subprocess.run([*MINDS_CTRL_C, str(script)], capture_output=True, text=True, check=False)
+    done = subprocess.run([str(script)], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (-signal.SIGINT, "", "")
 
 
 def test_ctrl_c_while_python_starts_ends_it_silently(tmp_path: Path) -> None:
     """Python handles the signal some time before it reads the script."""
-    command = [*MINDS_CTRL_C, str(BUILD_TREE / "bin" / "rtcfctl"), "--socket", str(tmp_path / "s")]
+    command = [str(BUILD_TREE / "bin" / "rtcfctl"), "--socket", str(tmp_path / "s")]
     for _ in range(50):
         with subprocess.Popen(
             [*command, "status"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
@@ -276,7 +276,7 @@ def test_ctrl_c_at_the_end_prints_no_traceback(tmp_path: Path, when: str) -> Non
         f"runpy.run_path({command!r}, run_name='__main__')\n"
     )
     done = subprocess.run(
-        [*MINDS_CTRL_C, sys.executable, "-c", program], capture_output=True, text=True, check=False
+        [sys.executable, "-c", program], capture_output=True, text=True, check=False
     )
     assert done.returncode == -signal.SIGINT
     assert "Traceback" not in done.stderr and "KeyboardInterrupt" not in done.stderr
@@ -308,7 +308,7 @@ def test_ctrl_c_in_an_import_takes_effect_after_the_import(tmp_path: Path) -> No
         f"runpy.run_path({command!r}, run_name='__main__')\n"
     )
     done = subprocess.run(
-        [*MINDS_CTRL_C, sys.executable, "-c", program], capture_output=True, text=True, check=False
+        [sys.executable, "-c", program], capture_output=True, text=True, check=False
     )
     assert "lost" not in done.stderr and "Traceback" not in done.stderr, done.stderr
     assert done.stderr.startswith("rtcfctl: ")
