@@ -230,8 +230,9 @@ class Clients:
     def kill(self) -> None:
         """Kill an executor: the next one has the same graph."""
         runner = self._runner()
-        self._kill_executor(runner)
-        self._wait_for_executor(runner)
+        pid = self._status(runner).pid
+        kill(pid)
+        self._wait_for_executor(runner, pid)
 
     def restart(self) -> None:
         """Restart rtcfd, mostly by a kill."""
@@ -382,9 +383,6 @@ class Clients:
         (found,) = self.client.get_status(runner).runners
         return found  # type: ignore[no-any-return]
 
-    def _kill_executor(self, runner: str) -> None:
-        kill(self._status(runner).pid)
-
     def _wait_for_executor(self, runner: str, killed: int = 0) -> None:
         """Wait until a runner has an executor with its whole graph; after many crashes, restart."""
 
@@ -421,7 +419,7 @@ class Clients:
         model = self.model[runner]
         stacks: dict[str, list[Change]] = {}
         at: dict[str, int] = {}
-        histories = [self.client.get_history(name, runner=runner) for name in sorted(NAMES)]
+        histories = [self._history(name, runner) for name in sorted(NAMES)]
         for each in itertools.chain.from_iterable(histories):
             if each.how == "set, unanswered":
                 continue
@@ -443,6 +441,12 @@ class Clients:
                 for each in expected
             ), f"{name}: {len(found)} changes {found[-2:]}, not {len(known)} {known[-2:]}"
         model.changes = {name: stack for name, stack in stacks.items() if stack}
+
+    def _history(self, name: str, runner: str) -> list[control_pb2.ParameterChange]:
+        try:
+            return self.client.get_history(name, runner=runner)
+        except rtcf.reasons.ComponentNotFoundError:
+            return []  # never loaded
 
     def _found(self, runner: str) -> Contents:
         return {
