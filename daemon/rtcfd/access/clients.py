@@ -396,6 +396,12 @@ class Clients:
                         self._warn("disconnecting a client of %s: it floods", client.peer)
                         return True
                     await asyncio.sleep(wait_s)
+                if frames.evades and not client.trusted:
+                    self._warn(
+                        "disconnecting a client of %s: it acknowledges no limit of calls",
+                        client.peer,
+                    )
+                    return True
                 if not delayed:
                     prompt = time.monotonic()
         return True

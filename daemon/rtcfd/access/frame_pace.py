@@ -5,6 +5,9 @@ answers pings and settings.  The limits of calls come too late: a client that op
 streams (rapid reset, CVE-2023-44487) exhausts the memory of rtcfd without a call.  The kernel
 buffers the bytes of a delayed client; when the buffer is full, the client waits.
 
+gRPC limits the calls that a client has at a time, but only after the client has acknowledged
+this limit (SETTINGS), so a client must do so before it makes many calls.
+
 Frames are described in RFC 9113, section 4.1.  Owned by the relay of one connection.
 """
 
@@ -14,7 +17,10 @@ from rtcfd.common.pace import Pace
 
 _PREFACE_BYTES = 24  # before the first frame
 _HEADER_BYTES = 9  # of a frame: length, type, flags, stream
-_KIND = 3  # the type's place among them
+_KIND, _FLAGS = 3, 4  # places of the type and the flags among them
+_HEADERS, _SETTINGS = 1, 4  # types
+_ACK = 1  # flag
+_MOST_EARLY = 16  # calls before the acknowledgement
 # Units of the pace by type of frame: DATA, PRIORITY and WINDOW_UPDATE only cost processor time.  A
 # call has HEADERS and DATA, and some of the others.
 _CHEAP = {0: 1.0, 2: 1.0, 8: 1.0}
@@ -33,9 +39,19 @@ class FramePace:
         self._pace = pace
         self._skipped = _PREFACE_BYTES  # bytes before the next header
         self._header = b""  # of the next frame, as far as it is known
+        self._acknowledged = False
+        self._early = 0  # calls before that
+
+    @property
+    def evades(self) -> bool:
+        """Whether the client makes many calls without accepting a limit."""
+        return self._early > _MOST_EARLY
 
     def cut(self, data: bytes, *, paced: bool) -> Iterator[tuple[bytes, float]]:
-        """Yield the parts of `data`, each with the seconds to wait after it; not `paced`: 0."""
+        """Yield the parts of `data`, each with the seconds to wait after it; not `paced`: 0.
+
+        Ends before a call by which a paced client evades the limit.
+        """
         begin = at = 0
         while at < len(data):
             step = min(self._skipped or _HEADER_BYTES - len(self._header), len(data) - at)
@@ -46,7 +62,13 @@ class FramePace:
             at += step
             if len(self._header) < _HEADER_BYTES:
                 continue
-            units = _CHEAP.get(self._header[_KIND], _OTHER)
+            kind, flags = self._header[_KIND], self._header[_FLAGS]
+            if kind == _SETTINGS and flags & _ACK:
+                self._acknowledged = True
+            self._early += kind == _HEADERS and not self._acknowledged
+            if paced and self.evades:
+                return
+            units = _CHEAP.get(kind, _OTHER)
             self._skipped = int.from_bytes(self._header[:_KIND], "big")
             self._header = b""
             if paced and (wait_s := self._pace.take(units)) > _SHORT_S:

@@ -13,9 +13,9 @@ from strangers import open_to_strangers, root_only, stranger
 PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
 
 
-def frame(kind: int, payload: bytes) -> bytes:
-    """Return a frame of stream 1, without flags."""
-    return len(payload).to_bytes(3, "big") + bytes([kind, 0, 0, 0, 0, 1]) + payload
+def frame(kind: int, payload: bytes, flags: int = 0) -> bytes:
+    """Return a frame of stream 1."""
+    return len(payload).to_bytes(3, "big") + bytes([kind, flags, 0, 0, 0, 1]) + payload
 
 
 class Recorded(Pace):
@@ -66,6 +66,27 @@ def test_frames_of_trusted_users_do_not_wait() -> None:
     assert [wait_s for _, wait_s in cutter.cut(frame(6, b"12345678"), paced=True)] == [9.0, 0.0]
 
 
+@pytest.mark.parametrize("size", [1, 7, 100_000])
+def test_many_calls_need_an_acknowledgement_of_the_limit(size: int) -> None:
+    headers, settings, ack = frame(1, b"call"), frame(4, b""), frame(4, b"", 1)
+
+    def passed_of(sent: bytes, paced: bool) -> tuple[bool, bytes]:
+        cutter = FramePace(Pace(1e9))
+        passed = b""
+        for begin in range(0, len(sent), size):
+            for part, _ in cutter.cut(sent[begin : begin + size], paced=paced):
+                passed += part
+        return cutter.evades, passed
+
+    few, many = settings + headers * 16, settings + headers * 17
+    assert passed_of(PREFACE + few, True) == (False, PREFACE + few)
+    evades, passed = passed_of(PREFACE + many, True)
+    assert evades and len(passed) < len(PREFACE + many) - len(b"call")
+    assert passed_of(PREFACE + ack + many, True) == (False, PREFACE + ack + many)
+    # Users who may stop loops have no limit.
+    assert passed_of(PREFACE + many, False)[1] == PREFACE + many
+
+
 # Sends frames of one kind for some seconds, on a new connection after each end.
 FLOOD = """
 import socket, sys, time
@@ -86,6 +107,7 @@ WORD = (8).to_bytes(4, "big")
 KINDS = {
     "reset": lambda n: frame(1, 4, n, AGAIN) + frame(3, 0, n, WORD),
     "open": lambda n: frame(1, 4, n, AGAIN),
+    "hold": lambda n: frame(1, 4, n, AGAIN),  # after the acknowledgement of the settings
     "call": lambda n: frame(1, 4, n, AGAIN) + frame(0, 1, n, bytes(5)),
     "rst": lambda n: frame(3, 0, 1, WORD),
     "data": lambda n: frame(0, 0, 1),
@@ -104,7 +126,8 @@ while time.monotonic() < end:
     try:
         peer.connect(path)
         begun = 0 if kind == "continuation" else 4
-        peer.sendall(b"PRI * HTTP/2.0\\r\\n\\r\\nSM\\r\\n\\r\\n" + frame(4, 0, 0)
+        accepted = frame(4, 1, 0) if kind != "open" else b""
+        peer.sendall(b"PRI * HTTP/2.0\\r\\n\\r\\nSM\\r\\n\\r\\n" + frame(4, 0, 0) + accepted
                      + frame(1, begun, 1, FIRST))
         peer.setblocking(False)
         left, number = b"", 3
@@ -128,8 +151,8 @@ while time.monotonic() < end:
 print("done", flush=True)
 """
 KINDS = (
-    *("reset", "open", "call", "rst", "data", "priority", "settings", "ping", "goaway", "window"),
-    *("continuation", "unknown"),
+    *("reset", "open", "hold", "call", "rst", "data", "priority", "settings", "ping", "goaway"),
+    *("window", "continuation", "unknown"),
 )
 MOST_KB = 10_000
 
