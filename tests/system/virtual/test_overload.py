@@ -46,7 +46,7 @@ def test_an_overloaded_loop_leaves_a_quarter_of_its_cpu_and_can_be_relieved(loop
         print(f"share of CPU {cpu} of {os.cpu_count()}: {share:.2f}")
         assert share > 0.2
         # Changes of every kind, while it is overloaded.
-        client.load(rtcf.component("rtcf_examples", "Identity", name="late"))
+        client.load(rtcf.component("rtcf_examples", "Identity", name="late", remaps=["out:=~out"]))
         client.set_breaks([rtcf.parse_port("late.in")], True)
         assert client.get_component("late").state == graph_pb2.COMPONENT_STATE_RUNNING
         assert loop.told().state == runner_pb2.RUNNER_STATE_RUNNING

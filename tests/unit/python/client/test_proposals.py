@@ -26,8 +26,9 @@ PERIOD = 1e-3
 CYCLES, BIT = 2000, 10
 CLASSES = ("first order", "two lags", "integrating", "double integrating", "lightly damped")
 DISTURBANCES = ("none", "noise", "quantisation", "friction")
-# With the identified models, the largest sensitivity is 2. The true plant differs by the noise.
-SENSITIVITY = 2.5
+# With the identified models, the largest sensitivity is 2. The true plant differs by the noise, and
+# by friction, which no linear model describes.
+SENSITIVITY = dict.fromkeys(DISTURBANCES, 2.05) | {"friction": 3.5}
 
 
 @dataclass(frozen=True)
@@ -217,7 +218,8 @@ def test_no_proposal_for_a_random_plant_is_unstable(count: int) -> None:
     print("\n".join(table(outcomes)))
     given = [(seed, o) for seed, o in enumerate(outcomes) if o.gains is not None]
     assert [seed for seed, o in given if not o.stable] == []
-    assert [seed for seed, o in given if o.margins[2] > SENSITIVITY] == []
+    assert [seed for seed, o in given if o.margins[2] > SENSITIVITY[o.disturbance]] == []
+    assert sum(o.margins[2] > 2.05 for _, o in given) < 0.01 * max(len(given), 100)
     assert len(given) > count / 2
 
 
