@@ -20,6 +20,7 @@ from rtcfd import VERSION, check_config, journal
 from rtcfd.access.admission import Admission
 from rtcfd.access.clients import Clients, GrpcSockets
 from rtcfd.access.endpoint import Endpoint
+from rtcfd.access.frame_pace import MOST_CALLS
 from rtcfd.catalog.catalog import Catalog
 from rtcfd.catalog.describe import Describer
 from rtcfd.common.background import WorkerThreads
@@ -48,9 +49,7 @@ log = logging.getLogger("rtcfd")
 REFUSED = 1
 _GRACE_S = 60.0  # for running calls; normally the end of their executors ends them earlier
 _LAST_WORDS_S = 0.1  # for the responses to them
-# For clients that may not stop loops: the largest message, and concurrent calls per connection.
-_OTHERS_MESSAGE_KB = 1024
-_OTHERS_STREAMS = 16
+_OTHERS_MESSAGE_KB = 1024  # largest message of clients that may not stop loops
 _LAST_ANSWERS_S = 1.0  # for clients to read the last responses
 _EXIT_S = 2.0  # for the process of an rtcfd to exit after its last message
 _LOOK_S = 0.05
@@ -116,7 +115,7 @@ class Daemon:
             self._sockets.others: grpc.aio.server(
                 options=[
                     *_server_options(min(given.limits.message_kb, _OTHERS_MESSAGE_KB)),
-                    ("grpc.max_concurrent_streams", _OTHERS_STREAMS),
+                    ("grpc.max_concurrent_streams", MOST_CALLS),
                 ],
                 interceptors=[admission],
             ),

@@ -2,6 +2,8 @@
 
 import pytest
 
+_LINES = 8
+
 
 class FailuresAtOnce:
     """Prints the name of a test that fails, and the last lines of its traceback."""
@@ -17,6 +19,3 @@ class FailuresAtOnce:
         terminal.write_line(f"{report.nodeid}: failed in {report.when}")
         for line in report.longreprtext.splitlines()[-_LINES:]:
             terminal.write_line(f"    {line}")
-
-
-_LINES = 8

@@ -396,7 +396,7 @@ class Clients:
                         self._warn("disconnecting a client of %s: it floods", client.peer)
                         return True
                     await asyncio.sleep(wait_s)
-                if frames.evades and not client.trusted:
+                if frames.evades:
                     self._warn(
                         "disconnecting a client of %s: it acknowledges no limit of calls",
                         client.peer,

@@ -20,12 +20,12 @@ _HEADER_BYTES = 9  # of a frame: length, type, flags, stream
 _KIND, _FLAGS = 3, 4  # places of the type and the flags among them
 _HEADERS, _SETTINGS = 1, 4  # types
 _ACK = 1  # flag
-_MOST_EARLY = 16  # calls before the acknowledgement
 # Units of the pace by type of frame: DATA, PRIORITY and WINDOW_UPDATE only cost processor time.  A
 # call has HEADERS and DATA, and some of the others.
 _CHEAP = {0: 1.0, 2: 1.0, 8: 1.0}
 _OTHER = 10.0
 UNITS_PER_S = 3000.0
+MOST_CALLS = 16  # at a time; also those before the acknowledgement
 _SHORT_S = 0.05  # waits up to this are put off, so that each frame does not need one of its own
 
 
@@ -41,16 +41,12 @@ class FramePace:
         self._header = b""  # of the next frame, as far as it is known
         self._acknowledged = False
         self._early = 0  # calls before that
-
-    @property
-    def evades(self) -> bool:
-        """Whether the client makes many calls without accepting a limit."""
-        return self._early > _MOST_EARLY
+        self.evades = False  # the client makes many calls without accepting the limit
 
     def cut(self, data: bytes, *, paced: bool) -> Iterator[tuple[bytes, float]]:
         """Yield the parts of `data`, each with the seconds to wait after it; not `paced`: 0.
 
-        Ends before a call by which a paced client evades the limit.
+        Ends early, and sets `evades`, before a call by which a paced client evades the limit.
         """
         begin = at = 0
         while at < len(data):
@@ -66,7 +62,8 @@ class FramePace:
             if kind == _SETTINGS and flags & _ACK:
                 self._acknowledged = True
             self._early += kind == _HEADERS and not self._acknowledged
-            if paced and self.evades:
+            if paced and self._early > MOST_CALLS:
+                self.evades = True
                 return
             units = _CHEAP.get(kind, _OTHER)
             self._skipped = int.from_bytes(self._header[:_KIND], "big")

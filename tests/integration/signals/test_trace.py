@@ -48,8 +48,7 @@ def cycles(events: list[Event]) -> list[Event]:
 def tracing(daemon: Daemon, file: Path, expected: int = 0) -> Iterator[None]:
     """Trace during the block, until Ctrl-C."""
     process = subprocess.Popen(
-        [BUILD_TREE / "bin" / "rtcfctl", "--socket", daemon.socket, "trace", "-o",
-         file],
+        [BUILD_TREE / "bin" / "rtcfctl", "--socket", daemon.socket, "trace", "-o", file],
         stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True, env=clean_environment(),
     )  # fmt: skip
 

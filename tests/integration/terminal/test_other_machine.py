@@ -102,8 +102,7 @@ def test_ctrl_c_ends_a_watch_and_leaves_nothing(
     folder = tmp_path / "temporary"
     folder.mkdir()
     with subprocess.Popen(
-        ["rtcfctl", "-H", "robot", "--socket", str(daemon.socket), "echo",
-         "/Counter.out"],
+        ["rtcfctl", "-H", "robot", "--socket", str(daemon.socket), "echo", "/Counter.out"],
         env=elsewhere | {"TMPDIR": str(folder)}, stdout=subprocess.PIPE, text=True,
         # Like a terminal, which sends Ctrl-C to all foreground processes.
         start_new_session=True,
