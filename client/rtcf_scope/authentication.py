@@ -16,6 +16,7 @@ import hmac
 import secrets
 from collections import OrderedDict
 from collections.abc import Awaitable, Callable, Iterable
+from functools import partial
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -61,7 +62,6 @@ class Authentication:
         self._most = most_connections
         self._sessions: OrderedDict[bytes, None] = OrderedDict()  # by hash, last used last
         self._tickets: dict[bytes, Callable[[], None]] = {}  # by hash
-        self._new: set[Any] = set()  # connections that the server has not counted yet
         self._authenticated: set[Any] = set()  # authenticated connections
         self._recent: dict[Any, str] = {}  # users of the connections of the last _LOGIN_S, in order
 
@@ -98,26 +98,21 @@ class Authentication:
     def open(self, server: web.Server) -> Callable[[], asyncio.Protocol]:
         """Return the factory of connections; above the limit, connections answer 503 and close."""
         loop = asyncio.get_running_loop()
+        opened = partial(self._opened, server)
+        return lambda: Connection(server, loop, opened)
 
-        def connection() -> asyncio.Protocol:
-            there = {*server.connections}
-            self._authenticated &= there
-            # The server counts a connection only in connection_made().
-            if len(there | self._new) >= self._most:
-                return _Rejection()
-            protocol = Connection(server, loop, self._counted)
-            self._new.add(protocol)
-            loop.call_later(_LOGIN_S, self._drop_unauthenticated, protocol)
-            return protocol
+    def _opened(self, server: web.Server, protocol: Connection) -> None:
+        """Make room for a new connection, or reject it.
 
-        return connection
-
-    def _counted(self, protocol: Connection) -> None:
-        """Close the oldest unauthenticated connection of a user with too many."""
-        self._new.discard(protocol)
+        A user's oldest unauthenticated connection is closed for another one of the user.
+        """
         assert protocol.transport is not None
+        there = {*server.connections}
+        self._authenticated &= there
+        self._recent = {each: user for each, user in self._recent.items() if each in there}
         user = user_of(protocol.transport.get_extra_info("socket"))
         self._recent[protocol] = user
+        asyncio.get_running_loop().call_later(_LOGIN_S, self._drop_unauthenticated, protocol)
         unauthenticated = [
             each
             for each, its_user in self._recent.items()
@@ -125,6 +120,10 @@ class Authentication:
         ]
         if len(unauthenticated) > _MOST_UNAUTHENTICATED:
             self._drop_unauthenticated(unauthenticated[0])
+        # Not all that are there: the server still has dropped ones for a moment.
+        if len(self._authenticated | self._recent.keys()) > self._most:
+            protocol.transport.write(_CROWDED)
+            self._drop_unauthenticated(protocol)
 
     def _drop_unauthenticated(self, protocol: Connection) -> None:
         self._recent.pop(protocol, None)
@@ -181,13 +180,6 @@ class Authentication:
 
     def _is_token(self, given: str) -> bool:
         return hmac.compare_digest(_bytes(given), self._token)
-
-
-class _Rejection(asyncio.Protocol):
-    def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        assert isinstance(transport, asyncio.Transport)
-        transport.write(_CROWDED)
-        transport.close()
 
 
 def is_public(path: str) -> bool:

@@ -54,24 +54,24 @@ def logger() -> logging.Logger:
 class Connection(web.RequestHandler):
     """One client's connection to a server."""
 
-    __slots__ = ("_counted",)
+    __slots__ = ("_opened",)
 
     def __init__(
         self,
         server: web.Server,
         loop: asyncio.AbstractEventLoop,
-        counted: Callable[["Connection"], None],
+        opened: Callable[["Connection"], None],
     ) -> None:
-        """Call `counted` when the server has counted the connection."""
+        """Call `opened` when the connection is one of the server's."""
         # No access log: a request line can contain the token.
         no_log: Any = None
         super().__init__(server, loop=loop, logger=logger(), access_log=no_log)
-        self._counted = counted
+        self._opened = opened
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Register with the server, then report it."""
         super().connection_made(transport)
-        self._counted(self)
+        self._opened(self)
 
     def data_received(self, data: bytes) -> None:
         """Process received bytes; close the connection if the parser fails."""

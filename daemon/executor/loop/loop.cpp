@@ -13,6 +13,7 @@
 
 #include "common/c_locale.hpp"
 #include "common/error.hpp"
+#include "common/patience.hpp"
 #include "common/time_units.hpp"
 #include "faults/crash_handler.hpp"
 #include "logging/log.hpp"
@@ -141,11 +142,9 @@ RealtimeProblems Loop::start(const LoopSettings& settings, std::uint64_t stops_k
 bool Loop::join(std::int64_t timeout_ns) {
     if (!joinable()) return true;
     if (timeout_ns != INT64_MAX) {
-        const std::int64_t until = monotonicNow() + timeout_ns;
+        Patience patience(timeout_ns);
         while (running()) {
-            if (monotonicNow() > until) return false;
-            const timespec pause{0, 100'000};
-            nanosleep(&pause, nullptr);
+            if (!patience.wait()) return false;
         }
     }
     // The thread ends right after it clears running_, so this join does not wait.
@@ -162,7 +161,7 @@ bool Loop::join(std::int64_t timeout_ns) {
 bool Loop::perform(BoundaryWork& work, std::int64_t timeout_ns) {
     Boundary& boundary = cycle_.boundary();
     boundary.offer(work);
-    const std::int64_t until = monotonicNow() + timeout_ns;
+    Patience patience(timeout_ns);
     while (boundary.pending()) {
         if (!running()) {
             if (!join(timeout_ns)) break;
@@ -171,9 +170,7 @@ bool Loop::perform(BoundaryWork& work, std::int64_t timeout_ns) {
             while (boundary.pending()) cycle_.atBoundary(nextStep());
             return true;
         }
-        if (monotonicNow() > until) break;
-        const timespec pause{0, 100'000};
-        nanosleep(&pause, nullptr);
+        if (!patience.wait()) break;
     }
     return !boundary.withdraw(work);
 }

@@ -26,13 +26,13 @@ void LoopBoundary::adopt(Adoption& adoption) {
     if (loop_.adopt(adoption, timeout())) return;
     throw Error(ErrorKind::Unavailable,
                 fmt::format("the loop of {} reaches no cycle boundary: {}; nothing has changed",
-                            runner_, whatDoesNotReturn()));
+                            runner_, whatHoldsIt()));
 }
 
 void LoopBoundary::capture(Capture& capture) {
     if (loop_.capture(capture, timeout())) return;
     throw Error(ErrorKind::Unavailable, fmt::format("the loop of {} reaches no cycle boundary: {}",
-                                                    runner_, whatDoesNotReturn()));
+                                                    runner_, whatHoldsIt()));
 }
 
 std::size_t LoopBoundary::mostBytes() const {
@@ -55,9 +55,10 @@ std::int64_t LoopBoundary::timeout() const noexcept {
     return kSecond + 10 * settings_.loop.period_ns;
 }
 
-std::string LoopBoundary::whatDoesNotReturn() const {
+std::string LoopBoundary::whatHoldsIt() const {
     const std::string activity = recorder_.realtimeActivity();
-    return (activity.empty() ? "a component" : activity + "()") + " does not return";
+    return activity.empty() ? "its thread gets too little processor time"
+                            : activity + "() does not return";
 }
 
 }  // namespace rtcf::executor

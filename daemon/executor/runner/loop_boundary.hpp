@@ -35,8 +35,8 @@ class LoopBoundary {
 
     /// Longest wait for the boundary, ns.
     std::int64_t timeout() const noexcept;
-    /// "COMPONENT.HOOK() does not return"
-    std::string whatDoesNotReturn() const;
+    /// Why the boundary does not come, e.g. "COMPONENT.HOOK() does not return".
+    std::string whatHoldsIt() const;
 
    private:
     const std::string runner_;

@@ -133,7 +133,7 @@ void LoopControl::stop(const Progress& progress) {
     if (!loop_.join(boundary_.timeout())) {
         throw Error(ErrorKind::Unavailable,
                     fmt::format("the loop of {} does not reach the end of its cycle: {}", runner_,
-                                boundary_.whatDoesNotReturn()));
+                                boundary_.whatHoldsIt()));
     }
     loopEnded();
 }
