@@ -13,10 +13,10 @@
 
 #include "common/c_locale.hpp"
 #include "common/error.hpp"
-#include "common/patience.hpp"
 #include "common/time_units.hpp"
 #include "faults/crash_handler.hpp"
 #include "logging/log.hpp"
+#include "loop/patience.hpp"
 #include "loop/simulated_clock.hpp"
 #include "realtime/floating_point.hpp"
 

@@ -1,4 +1,4 @@
-#include "common/patience.hpp"
+#include "loop/patience.hpp"
 
 #include <gtest/gtest.h>
 
