@@ -66,25 +66,68 @@ def test_frames_of_trusted_users_do_not_wait() -> None:
     assert [wait_s for _, wait_s in cutter.cut(frame(6, b"12345678"), paced=True)] == [9.0, 0.0]
 
 
+def call(stream: int, kind: int = 1, flags: int = 4) -> bytes:
+    """Return a frame of a stream."""
+    return frame(kind, b"call", flags)[:5] + stream.to_bytes(4, "big") + b"call"
+
+
+def passed_of(cutter: FramePace, sent: bytes, size: int, *, paced: bool) -> bytes:
+    passed = b""
+    for begin in range(0, len(sent), size):
+        for part, _ in cutter.cut(sent[begin : begin + size], paced=paced):
+            passed += part
+        if cutter.evades:
+            break
+    return passed
+
+
 @pytest.mark.parametrize("size", [1, 7, 100_000])
-def test_many_calls_need_an_acknowledgement_of_the_limit(size: int) -> None:
-    headers, settings, ack = frame(1, b"call"), frame(4, b""), frame(4, b"", 1)
-
-    def passed_of(sent: bytes, paced: bool) -> tuple[bool, bytes]:
-        cutter = FramePace(Pace(1e9))
-        passed = b""
-        for begin in range(0, len(sent), size):
-            for part, _ in cutter.cut(sent[begin : begin + size], paced=paced):
-                passed += part
-        return cutter.evades, passed
-
-    few, many = settings + headers * 16, settings + headers * 17
-    assert passed_of(PREFACE + few, True) == (False, PREFACE + few)
-    evades, passed = passed_of(PREFACE + many, True)
-    assert evades and len(passed) < len(PREFACE + many) - len(b"call")
-    assert passed_of(PREFACE + ack + many, True) == (False, PREFACE + ack + many)
+def test_more_calls_at_a_time_than_the_limit_do_not_pass(size: int) -> None:
+    few, next_one = b"".join(call(2 * k + 1) for k in range(16)), call(33)
+    more_of_the_first = call(1, 0) + call(1, 1, 5)  # a message; the end of the call's request
+    cutter = FramePace(Pace(1e9))
+    sent = PREFACE + few + more_of_the_first
+    assert passed_of(cutter, sent, size, paced=True) == sent and not cutter.evades
+    passed = passed_of(cutter, next_one, size, paced=True)
+    assert cutter.evades and len(passed) < len(next_one) - len(b"call")
     # Users with the right `operate` have no limit.
-    assert passed_of(PREFACE + many, False) == (False, PREFACE + many)
+    cutter = FramePace(Pace(1e9))
+    sent = PREFACE + few + next_one
+    assert passed_of(cutter, sent, size, paced=False) == sent and not cutter.evades
+
+
+@pytest.mark.parametrize("size", [1, 7, 100_000])
+def test_calls_at_a_time_are_those_of_a_model(size: int) -> None:
+    seed = random.randrange(1 << 32)
+    print(f"seed {seed}")
+    draw = random.Random(seed)
+    cutter = FramePace(Pace(1e9))
+    passed_of(cutter, PREFACE, size, paced=True)
+    running: set[int] = set()
+    for stream in range(1, 4001, 2):
+        sent = call(stream | 1 << 31 if draw.random() < 0.1 else stream)
+        running.add(stream)
+        while len(running) == 16 or (running and draw.random() < 0.5):
+            ended = draw.choice(sorted(running))
+            running.remove(ended)
+            way = draw.randrange(4)
+            if way == 0:
+                sent += call(ended, 3, 0)  # RST_STREAM of the client
+                passed_of(cutter, sent, size, paced=True)
+                sent = b""
+                continue
+            passed_of(cutter, sent, size, paced=True)
+            sent = b""
+            answer = call(ended, 0, 0) + call(ended, *((1, 5), (0, 1), (3, 0))[way - 1])
+            for begin in range(0, len(answer), size):
+                cutter.answer(answer[begin : begin + size])
+        passed_of(cutter, sent, size, paced=True)
+        assert not cutter.evades
+    extra = 17 - len(running)
+    for k in range(extra):
+        assert not cutter.evades
+        passed_of(cutter, call(5001 + 2 * k), size, paced=True)
+    assert cutter.evades
 
 
 # Sends frames of one kind for some seconds, on a new connection after each end.
@@ -107,7 +150,8 @@ WORD = (8).to_bytes(4, "big")
 KINDS = {
     "reset": lambda n: frame(1, 4, n, AGAIN) + frame(3, 0, n, WORD),
     "open": lambda n: frame(1, 4, n, AGAIN),
-    "hold": lambda n: frame(1, 4, n, AGAIN),  # after the acknowledgement of the settings
+    "hold": lambda n: frame(1, 4, n, AGAIN),  # after the acknowledgement of gRPC's limit
+    "leave": lambda n: frame(1, 4, n, AGAIN) if n < 32 else b"",  # many connections
     "call": lambda n: frame(1, 4, n, AGAIN) + frame(0, 1, n, bytes(5)),
     "rst": lambda n: frame(3, 0, 1, WORD),
     "data": lambda n: frame(0, 0, 1),
@@ -139,6 +183,8 @@ while time.monotonic() < end:
                 left = left[peer.send(left):]
             except BlockingIOError:
                 time.sleep(0.002)
+            if kind == "leave" and not left:
+                break
             try:
                 while True:
                     if not peer.recv(65536):
@@ -151,7 +197,19 @@ while time.monotonic() < end:
 print("done", flush=True)
 """
 KINDS = (
-    *("reset", "open", "hold", "call", "rst", "data", "priority", "settings", "ping", "goaway"),
+    *(
+        "reset",
+        "open",
+        "hold",
+        "leave",
+        "call",
+        "rst",
+        "data",
+        "priority",
+        "settings",
+        "ping",
+        "goaway",
+    ),
     *("window", "continuation", "unknown"),
 )
 MOST_KB = 10_000
