@@ -9,6 +9,11 @@ from rtcf_service import Service
 
 
 @pytest.fixture(scope="module")
+def revision(machine: Machine) -> str:
+    return versions.make_revision(machine, "/debs", "/revision")
+
+
+@pytest.fixture(scope="module")
 def higher(machine: Machine) -> str:
     return versions.make_higher(machine, "/debs", "/upgrade")
 
@@ -97,6 +102,23 @@ def test_an_rtcfd_of_a_foreign_protocol_keeps_the_loop_and_reports_it(
 
 def version(service: Service) -> str:
     return service.ctl("--version").stdout.split()[1]
+
+
+def test_another_build_of_the_same_version_awaits_a_restart_of_the_loop(
+    service: Service, revision: str
+) -> None:
+    before, daemon, installed = service.load_and_start(), service.pid, version(service)
+    service.machine.shell(f"apt-get install --yes --quiet {revision}")
+    runs_on(service, before, daemon)
+    assert version(service) == installed
+    assert "restart pending: rtcfd was upgraded" in service.ctl("status").stdout
+    service.systemctl("restart", "rtcfd.service")
+    runs_on(service, before, service.pid)
+    said = service.ctl("status").stdout
+    assert "rtcfd was upgraded" not in said
+    assert f"restart pending: its executor is of another build of rtcf {installed}" in said
+    service.ctl("runner", "restart", "rt_runner")
+    assert "restart pending" not in service.ctl("status").stdout
 
 
 def test_an_upgrade_leaves_the_loop_alone_until_the_restart(service: Service, higher: str) -> None:
