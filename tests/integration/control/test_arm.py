@@ -180,11 +180,12 @@ def limits_of_the_trajectory() -> dict[str, Any]:
 
 @pytest.mark.parametrize("stops", [6, pytest.param(1000, marks=pytest.mark.long)])
 def test_a_halt_at_any_instant_keeps_all_limits(bench: Bench, stops: int) -> None:
-    # Goals of the whole range: the arm also meets the table and the block.
+    # Goals of the whole range: the arm also meets the table and the block, and some goals push it
+    # against them.  There, the commanded motion still ends, and the arm slides.
     limits = limits_of_the_trajectory()
     draw = np.random.default_rng(49)
     operate(bench.client, mode="goal")
-    contacts = 0.0
+    free = 0
     for _ in range(-(-stops // 20)):
         count = min(stops, 20)
         steps = 1500 * count
@@ -194,7 +195,8 @@ def test_a_halt_at_any_instant_keeps_all_limits(bench: Bench, stops: int) -> Non
             at = begin + int(draw.integers(10, 700))
             halt[at], halt[begin + 1495] = True, False
         found = bench.run({"/operator.goal.position": goals, "/trajectory.halt": halt}, steps)
-        contacts = max(contacts, found["/robot.contacts"].max())
+        contacts = found["/robot.contacts"]
+        speeds, errors = np.zeros((6, count)), np.zeros((6, count))
         for i, joint in enumerate(JOINTS):
             wanted: Any = found[f"/setpoints.velocity{i + 1}"]
             angle: Any = found[f"/setpoints.position{i + 1}"]
@@ -204,10 +206,15 @@ def test_a_halt_at_any_instant_keeps_all_limits(bench: Bench, stops: int) -> Non
                 assert np.nanmax(each) <= limits["upper"][i] + most, joint
                 assert np.nanmin(each) >= limits["lower"][i] - most, joint
             assert (wanted[1490::1500] == 0.0).all(), joint
-            speed: Any = found[f"/robot.{joint}_velocity"]
-            assert np.abs(speed[1490::1500]).max() < 0.05, joint
+            speeds[i] = np.abs(found[f"/robot.{joint}_velocity"][1490::1500])
+            errors[i] = np.abs(measured - angle)[1490::1500]
+        pushed = errors.max(axis=0) > TRACKING
+        touched = contacts.reshape(count, 1500).max(axis=1) > contacts[0]
+        assert (touched | ~pushed).all()
+        assert speeds[:, ~pushed].max() < 0.05
+        free += count - int(pushed.sum())
     operate(bench.client, mode="stand")
-    assert stops < 100 or contacts > found["/robot.contacts"][0], "it met the table"
+    assert stops * 0.9 < free and (stops < 100 or free < stops)
 
 
 def test_a_fault_of_any_component_stops_the_arm_and_names_it(arm: rtcf.Client) -> None:
