@@ -180,8 +180,8 @@ def limits_of_the_trajectory() -> dict[str, Any]:
 
 @pytest.mark.parametrize("stops", [6, pytest.param(1000, marks=pytest.mark.long)])
 def test_a_halt_at_any_instant_keeps_all_limits(bench: Bench, stops: int) -> None:
-    # Goals of the whole range: the arm also meets the table and the block, and some goals push it
-    # against them.  There, the commanded motion still ends, and the arm slides.
+    # Goals of the whole range: in some, the arm meets the table and the block. Then the commanded
+    # motion still ends within its limits, but the arm is pushed away from it, and slides.
     limits = limits_of_the_trajectory()
     draw = np.random.default_rng(49)
     operate(bench.client, mode="goal")
@@ -195,26 +195,27 @@ def test_a_halt_at_any_instant_keeps_all_limits(bench: Bench, stops: int) -> Non
             at = begin + int(draw.integers(10, 700))
             halt[at], halt[begin + 1495] = True, False
         found = bench.run({"/operator.goal.position": goals, "/trajectory.halt": halt}, steps)
-        contacts = found["/robot.contacts"]
-        speeds, errors = np.zeros((6, count)), np.zeros((6, count))
+        contacts = found["/robot.contacts"].reshape(count, 1500)
+        alone = (contacts == contacts[0, 0]).all(axis=1)  # only the block touches the table
+        free += int(alone.sum())
         for i, joint in enumerate(JOINTS):
-            wanted: Any = found[f"/setpoints.velocity{i + 1}"]
-            angle: Any = found[f"/setpoints.position{i + 1}"]
-            measured: Any = found[f"/robot.{joint}_position"]
+            wanted, angle, measured, speed = (
+                np.asarray(found[name]).reshape(count, 1500)
+                for name in (
+                    f"/setpoints.velocity{i + 1}",
+                    f"/setpoints.position{i + 1}",
+                    f"/robot.{joint}_position",
+                    f"/robot.{joint}_velocity",
+                )
+            )
             assert np.nanmax(np.abs(wanted)) <= limits["velocity"][i] + 1e-9, joint
-            for each, most in ((angle, 1e-9), (measured, TRACKING)):
+            assert (wanted[:, 1490] == 0.0).all(), joint
+            for each, most in ((angle, 1e-9), (measured[alone], TRACKING)):
                 assert np.nanmax(each) <= limits["upper"][i] + most, joint
                 assert np.nanmin(each) >= limits["lower"][i] - most, joint
-            assert (wanted[1490::1500] == 0.0).all(), joint
-            speeds[i] = np.abs(found[f"/robot.{joint}_velocity"][1490::1500])
-            errors[i] = np.abs(measured - angle)[1490::1500]
-        pushed = errors.max(axis=0) > TRACKING
-        touched = contacts.reshape(count, 1500).max(axis=1) > contacts[0]
-        assert (touched | ~pushed).all()
-        assert speeds[:, ~pushed].max() < 0.05
-        free += count - int(pushed.sum())
+            assert np.abs(speed[alone, 1490]).max() < 0.05, joint
     operate(bench.client, mode="stand")
-    assert stops * 0.9 < free and (stops < 100 or free < stops)
+    assert stops * 0.7 < free and (stops < 100 or free < stops)
 
 
 def test_a_fault_of_any_component_stops_the_arm_and_names_it(arm: rtcf.Client) -> None:
