@@ -106,29 +106,37 @@ class Authentication:
 
         A user's oldest unauthenticated connection is closed for another one of the user.
         """
-        assert protocol.transport is not None
         there = {*server.connections}
         self._authenticated &= there
         self._recent = {each: user for each, user in self._recent.items() if each in there}
-        user = user_of(protocol.transport.get_extra_info("socket"))
+        user = user_of(protocol.wire.get_extra_info("socket"))
         self._recent[protocol] = user
-        asyncio.get_running_loop().call_later(_LOGIN_S, self._drop_unauthenticated, protocol)
+        asyncio.get_running_loop().call_later(_LOGIN_S, self._expire, protocol)
         unauthenticated = [
             each
             for each, its_user in self._recent.items()
             if its_user == user and each not in self._authenticated
         ]
         if len(unauthenticated) > _MOST_UNAUTHENTICATED:
-            self._drop_unauthenticated(unauthenticated[0])
-        # Not all that are there: the server still has dropped ones for a moment.
+            self._drop(unauthenticated[0])
+        # Not all that are there: the server has those being closed, too.
         if len(self._authenticated | self._recent.keys()) > self._most:
-            protocol.transport.write(_CROWDED)
-            self._drop_unauthenticated(protocol)
+            self._recent.pop(protocol)
+            protocol.wire.write(_CROWDED)
+            protocol.wire.close()
 
-    def _drop_unauthenticated(self, protocol: Connection) -> None:
+    def _expire(self, protocol: Connection) -> None:
+        """Close a connection that is still unauthenticated."""
         self._recent.pop(protocol, None)
         if protocol not in self._authenticated:
-            protocol.force_close()
+            protocol.wire.close()
+            # The client may still be reading the page, or it may read nothing.
+            asyncio.get_running_loop().call_later(_LOGIN_S, protocol.wire.abort)
+
+    def _drop(self, protocol: Connection) -> None:
+        """Close a connection at once."""
+        self._recent.pop(protocol)
+        protocol.wire.abort()
 
     async def _middleware(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         try:

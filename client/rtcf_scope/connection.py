@@ -54,7 +54,9 @@ def logger() -> logging.Logger:
 class Connection(web.RequestHandler):
     """One client's connection to a server."""
 
-    __slots__ = ("_opened",)
+    # aiohttp forgets its transport before that has sent everything.
+    __slots__ = ("_opened", "wire")
+    wire: asyncio.Transport
 
     def __init__(
         self,
@@ -71,6 +73,8 @@ class Connection(web.RequestHandler):
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """Register with the server, then report it."""
         super().connection_made(transport)
+        assert isinstance(transport, asyncio.Transport)
+        self.wire = transport
         self._opened(self)
 
     def data_received(self, data: bytes) -> None:

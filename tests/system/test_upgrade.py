@@ -113,6 +113,7 @@ def test_another_build_of_the_same_version_awaits_a_restart_of_the_loop(
     assert version(service) == installed
     assert "restart pending: rtcfd was upgraded" in service.ctl("status").stdout
     service.systemctl("restart", "rtcfd.service")
+    assert service.pid != daemon
     runs_on(service, before, service.pid)
     said = service.ctl("status").stdout
     assert "rtcfd was upgraded" not in said

@@ -14,7 +14,7 @@
 namespace rtcf::executor {
 
 /// Time left for a wait that looks for its end again and again. A freeze of the machine, however
-/// long, uses up a hundredth of a second: the other thread was frozen, too, and may run later.
+/// long, uses up a tenth of a second: the other thread was frozen, too, and may run later.
 /// Not real-time.
 class Patience {
    public:
@@ -31,7 +31,7 @@ class Patience {
     }
 
    private:
-    static constexpr std::int64_t kMostCounted = kSecond / 100;
+    static constexpr std::int64_t kMostCounted = kSecond / 10;
 
     std::int64_t left_ns_;
     std::int64_t last_ns_ = monotonicNow();

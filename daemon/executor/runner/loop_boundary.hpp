@@ -1,7 +1,6 @@
 /// @file
 /// Changes and copies at the loop's next cycle boundary: waits for the boundary, limits the work of
-/// one boundary, and names the component that keeps the loop from reaching it. Owned by the runner;
-/// graph thread.
+/// one boundary, and tells why the loop does not reach it. Owned by the runner; graph thread.
 #pragma once
 
 #include <cstddef>

@@ -11,6 +11,7 @@ call and between calls.  Some connections are reserved for clients that may stop
 import asyncio
 import contextlib
 import logging
+import math
 import secrets
 import socket
 import time
@@ -23,7 +24,7 @@ from pathlib import Path
 from rtcf.v1 import errors_pb2
 
 from rtcfd.access.calls import Level
-from rtcfd.access.frame_pace import UNITS_PER_S, FramePace
+from rtcfd.access.frame_pace import MOST_CALLS, UNITS_PER_S, FramePace
 from rtcfd.access.peer import Credentials, Directory, Peer, credentials, user_of
 from rtcfd.common.budget import Budget
 from rtcfd.common.errors import RequestError, ResourceExhausted
@@ -57,9 +58,6 @@ _BYTES_PER_S = 1024 * 1024.0
 # A client whose frames were delayed for so long, and that still sends more than the relay reads at
 # a time, does not wait for answers.
 _FLOOD_S = 5.0
-# From the end of a client to the end of its connection to gRPC.  grpcio (1.51) loses the memory of
-# calls, 9 kB each, whose connection ends while it accepts them.
-_SETTLE_S = 0.1
 
 
 @dataclass(frozen=True)
@@ -351,7 +349,8 @@ class Clients:
             inner.bind("\0" + client.name)
             await asyncio.get_running_loop().sock_connect(inner, str(server))
             # When one side closes, close the other too: gRPC never closes a single direction.
-            frames = FramePace(client.usage.frames)
+            most_calls = math.inf if client.trusted else MOST_CALLS
+            frames = FramePace(client.usage.frames, most_calls)
             there = asyncio.create_task(self._pump_paced(client, inner, frames))
             back = asyncio.create_task(_pump(inner, client.connection, frames.answer))
             ways = {there, back}
@@ -366,8 +365,6 @@ class Clients:
                     # gRPC has closed the connection of a client that still sends: relay gRPC's
                     # last responses first.
                     await asyncio.wait({back}, timeout=_LINGER_S)
-                elif there.done() and not client.trusted:
-                    await asyncio.sleep(_SETTLE_S)
             finally:
                 hung_up = back.done()
                 for way in ways:

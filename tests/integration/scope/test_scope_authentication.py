@@ -511,6 +511,35 @@ sys.stdin.read()
 """
 
 
+# Requests much and reads nothing, on many connections.
+UNREAD = """\
+import socket, sys
+unread = []
+for _ in range(300):
+    unread.append(socket.socket())
+    unread[-1].setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
+    unread[-1].connect(("127.0.0.1", int(sys.argv[1])))
+    unread[-1].sendall(b"GET /page/three/three.module.js HTTP/1.1\\r\\nHost: 127.0.0.1\\r\\n\\r\\n" * 12)
+print("connected", flush=True)
+sys.stdin.read()
+"""
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="requires root to act as another user")
+def test_a_user_who_reads_no_responses_holds_few_connections(scope: ScopeProcess) -> None:
+    descriptors = Path(f"/proc/{scope.process.pid}/fd")
+    before = len(list(descriptors.iterdir()))
+    with subprocess.Popen(
+        ["/usr/bin/python3", "-c", UNREAD, str(scope.port)],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, user=NOBODY, group=NOBODY,
+    ) as other:  # fmt: skip
+        assert other.stdout is not None and other.stdout.readline() == "connected\n"
+        assert scope.ask("/api/about")[0] == 200
+        # At most 16 are served, and 16 closed after the time to log in.
+        wait_for(lambda: len(list(descriptors.iterdir())) <= before + 33, "the end of the others")
+        other.communicate()
+
+
 @pytest.mark.skipif(os.geteuid() != 0, reason="requires root to act as another user")
 @pytest.mark.parametrize("number", [140, 600])
 def test_idle_connections_of_another_user_do_not_keep_others_away(

@@ -17,12 +17,12 @@ TEST(Patience, EndsAfterItsTime) {
 }
 
 TEST(Patience, CountsAFreezeAsAMoment) {
-    Patience patience(kSecond / 25);
+    Patience patience(4 * kSecond / 10);
     for (int i = 0; i < 3; ++i) {
-        std::this_thread::sleep_for(std::chrono::milliseconds(100));
+        std::this_thread::sleep_for(std::chrono::milliseconds(200));
         EXPECT_TRUE(patience.wait());
     }
-    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
     EXPECT_FALSE(patience.wait());
 }
 

@@ -1,5 +1,6 @@
 """HTTP/2 frames of a user without rights: paced one by one, and no flood of them costs memory."""
 
+import math
 import random
 import time
 from pathlib import Path
@@ -90,10 +91,15 @@ def test_more_calls_at_a_time_than_the_limit_do_not_pass(size: int) -> None:
     assert passed_of(cutter, sent, size, paced=True) == sent and not cutter.evades
     passed = passed_of(cutter, next_one, size, paced=True)
     assert cutter.evades and len(passed) < len(next_one) - len(b"call")
-    # Users with the right `operate` have no limit.
+    # gRPC skips streams of even numbers.
     cutter = FramePace(Pace(1e9))
-    sent = PREFACE + few + next_one
-    assert passed_of(cutter, sent, size, paced=False) == sent and not cutter.evades
+    passed_of(cutter, PREFACE + call(0x7FFFFFFE) + few + next_one, size, paced=True)
+    assert cutter.evades
+    # Users with the right `operate` have no limit.
+    for limit, paced in ((16, False), (math.inf, True)):
+        cutter = FramePace(Pace(1e9), limit)
+        sent = PREFACE + few + next_one
+        assert passed_of(cutter, sent, size, paced=paced) == sent and not cutter.evades
 
 
 @pytest.mark.parametrize("size", [1, 7, 100_000])
@@ -104,24 +110,26 @@ def test_calls_at_a_time_are_those_of_a_model(size: int) -> None:
     cutter = FramePace(Pace(1e9))
     passed_of(cutter, PREFACE, size, paced=True)
     running: set[int] = set()
+
+    def answer(stream: int, kind: int, flags: int) -> None:
+        sent = call(stream, kind, flags)
+        for begin in range(0, len(sent), size):
+            cutter.answer(sent[begin : begin + size])
+
     for stream in range(1, 4001, 2):
-        sent = call(stream | 1 << 31 if draw.random() < 0.1 else stream)
+        passed_of(cutter, call(stream | (draw.random() < 0.1) << 31), size, paced=True)
         running.add(stream)
         while len(running) == 16 or (running and draw.random() < 0.5):
             ended = draw.choice(sorted(running))
+            answer(draw.choice(sorted(running)), draw.randrange(2), draw.choice((0, 4)))
             running.remove(ended)
-            way = draw.randrange(4)
-            if way == 0:
-                sent += call(ended, 3, 0)  # RST_STREAM of the client
-                passed_of(cutter, sent, size, paced=True)
-                sent = b""
-                continue
-            passed_of(cutter, sent, size, paced=True)
-            sent = b""
-            answer = call(ended, 0, 0) + call(ended, *((1, 5), (0, 1), (3, 0))[way - 1])
-            for begin in range(0, len(answer), size):
-                cutter.answer(answer[begin : begin + size])
-        passed_of(cutter, sent, size, paced=True)
+            if draw.random() < 0.3:
+                passed_of(cutter, call(ended, 3, 0), size, paced=True)  # RST_STREAM of the client
+            else:
+                answer(ended, *draw.choice(((1, 5), (0, 1), (3, 0))))
+            # The client's own end of the call, later.
+            late = draw.choice((b"", call(ended, 1, 5), call(ended, 0, 1)))
+            passed_of(cutter, late, size, paced=True)
         assert not cutter.evades
     extra = 17 - len(running)
     for k in range(extra):
@@ -130,8 +138,7 @@ def test_calls_at_a_time_are_those_of_a_model(size: int) -> None:
     assert cutter.evades
 
 
-# Sends frames of one kind for some seconds, on a new connection after each end.
-FLOOD = """
+WORDS = """
 import socket, sys, time
 
 def frame(kind, flags, stream, payload=b""):
@@ -147,6 +154,13 @@ PAIRS = [(b":method", b"POST"), (b":scheme", b"http"), (b":path", b"/rtcf.v1.Con
 FIRST = b"".join(literal(*pair) for pair in PAIRS)
 AGAIN = bytes(0x80 | (67 - place) for place in range(6))  # indexed, as of the dynamic table
 WORD = (8).to_bytes(4, "big")
+START = b"PRI * HTTP/2.0\\r\\n\\r\\nSM\\r\\n\\r\\n" + frame(4, 0, 0)
+"""
+
+# Sends frames of one kind for some seconds, on a new connection after each end.
+FLOOD = (
+    WORDS
+    + """
 KINDS = {
     "reset": lambda n: frame(1, 4, n, AGAIN) + frame(3, 0, n, WORD),
     "open": lambda n: frame(1, 4, n, AGAIN),
@@ -171,8 +185,7 @@ while time.monotonic() < end:
         peer.connect(path)
         begun = 0 if kind == "continuation" else 4
         accepted = frame(4, 1, 0) if kind != "open" else b""
-        peer.sendall(b"PRI * HTTP/2.0\\r\\n\\r\\nSM\\r\\n\\r\\n" + frame(4, 0, 0) + accepted
-                     + frame(1, begun, 1, FIRST))
+        peer.sendall(START + accepted + frame(1, begun, 1, FIRST))
         peer.setblocking(False)
         left, number = b"", 3
         while time.monotonic() < end:
@@ -196,6 +209,28 @@ while time.monotonic() < end:
     peer.close()
 print("done", flush=True)
 """
+)
+# Begins calls without a message, then asks for an answer (PING).
+CALLS = (
+    WORDS
+    + """
+peer = socket.socket(socket.AF_UNIX)
+peer.connect(sys.argv[1])
+peer.sendall(START + frame(1, 4, 1, FIRST)
+             + b"".join(frame(1, 4, 2 * k + 1, AGAIN) for k in range(1, int(sys.argv[2])))
+             + frame(6, 0, 0, bytes(8)))
+received = b""
+try:
+    while frame(6, 1, 0, bytes(8)) not in received:
+        more = peer.recv(65536)
+        if not more:
+            raise ConnectionError
+        received += more
+    print("answered")
+except ConnectionError:
+    print("ended")
+"""
+)
 KINDS = (
     *(
         "reset",
@@ -219,6 +254,17 @@ def resident_kb(daemon: DaemonUnderTest) -> int:
     assert daemon.process is not None
     lines = Path(f"/proc/{daemon.process.pid}/status").read_text().splitlines()
     return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS"))
+
+
+@root_only
+@pytest.mark.parametrize(("calls", "outcome"), [(16, "answered"), (17, "ended")])
+def test_a_connection_with_more_calls_than_the_limit_ends(calls: int, outcome: str) -> None:
+    with (
+        open_to_strangers("[access]\ndefault = 'none'\n") as daemon,
+        stranger(CALLS, str(daemon.socket), str(calls)) as client,
+    ):
+        assert client.stdout is not None
+        assert client.stdout.read() == f"{outcome}\n"
 
 
 @root_only
