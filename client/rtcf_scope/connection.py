@@ -87,8 +87,14 @@ class Connection(web.RequestHandler):
             self.force_close()
 
     def log_exception(self, *args: Any, **given: Any) -> None:
-        """Log an error of the server; not of a body that nobody reads after the response."""
-        if not isinstance(given.get("exc_info"), web.RequestPayloadError):
+        """Log an error of the server.
+
+        Not one of a body that nobody reads after the response, or of a connection that has ended
+        meanwhile, where aiohttp asserts that it has not.
+        """
+        error = given.get("exc_info")
+        ended = isinstance(error, AssertionError) and self.wire.is_closing()
+        if not ended and not isinstance(error, web.RequestPayloadError):
             super().log_exception(*args, **given)
 
     def handle_error(

@@ -519,7 +519,8 @@ for _ in range(300):
     unread.append(socket.socket())
     unread[-1].setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
     unread[-1].connect(("127.0.0.1", int(sys.argv[1])))
-    unread[-1].sendall(b"GET /page/three/three.module.js HTTP/1.1\\r\\nHost: 127.0.0.1\\r\\n\\r\\n" * 12)
+    get = b"GET /page/three/three.module.js HTTP/1.1\\r\\nHost: 127.0.0.1\\r\\n\\r\\n"
+    unread[-1].sendall(get * 12)
 print("connected", flush=True)
 sys.stdin.read()
 """
@@ -538,6 +539,7 @@ def test_a_user_who_reads_no_responses_holds_few_connections(scope: ScopeProcess
         # At most 16 are served, and 16 closed after the time to log in.
         wait_for(lambda: len(list(descriptors.iterdir())) <= before + 33, "the end of the others")
         other.communicate()
+    assert scope.news() == ""
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="requires root to act as another user")
