@@ -36,12 +36,15 @@ class Client(Closing):
 
     def __init__(self, socket: str | os.PathLike[str] | None = None) -> None:
         self._connection = Connection(socket)
-        self._stub = self._connection.stub
         self.socket = self._connection.socket
 
     def close(self) -> None:
         """Close the connection."""
         self._connection.close()
+
+    @property
+    def _stub(self) -> Any:
+        return self._connection.stub  # another one after KeyboardInterrupt
 
     def get_status(
         self, runner: str = "", timeout_s: float = QUERY_TIMEOUT_S

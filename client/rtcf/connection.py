@@ -5,6 +5,7 @@ import threading
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import TracebackType
 from typing import Any, Self
 
@@ -21,6 +22,7 @@ CHANGE_TIMEOUT_S = 120.0
 _CROWDED_S = 15.0  # for a place in the listen queue of rtcfd's socket
 _RETRY_S = 0.05
 _CLOSE_S = 2.0
+_MOST_CHANNELS = 8
 _LONGEST_PATH = 107  # unix(7)
 # The timeout of one attempt to connect: systemd accepts connections before rtcfd has started, and a
 # busy machine may schedule rtcfd late.
@@ -80,17 +82,40 @@ class Connection(Closing):
                 f"{self.socket} is longer than the {_LONGEST_PATH} characters of a unix socket's "
                 "path"
             )
+        self._channels: list[grpc.Channel] = []
+        self._open()
+
+    def _open(self) -> None:
         patience = _CONNECT_TO_STRANGER_MS if failures.stranger(self.socket) else _CONNECT_MS
         options = (*_OPTIONS, ("grpc.min_reconnect_backoff_ms", patience))
-        self._channel = grpc.insecure_channel(f"unix:{self.socket}", options=options)
-        self.stub: Any = control_pb2_grpc.ControlStub(self._channel)  # type: ignore[no-untyped-call]
+        channel = grpc.insecure_channel(f"unix:{self.socket}", options=options)
+        self._channels.append(channel)
+        self.stub: Any = control_pb2_grpc.ControlStub(channel)  # type: ignore[no-untyped-call]
 
     def close(self) -> None:
         """Close the connection."""
-        # gRPC would wait for ever for a call whose start was cut off by KeyboardInterrupt.
-        closing = threading.Thread(target=self._channel.close, daemon=True)
-        closing.start()
-        closing.join(_CLOSE_S)
+        closing = [_closing(each) for each in self._channels]
+        until = time.monotonic() + _CLOSE_S
+        for each in closing:
+            each.join(max(until - time.monotonic(), 0.0))
+
+    @contextmanager
+    def _interruptible(self) -> Iterator[None]:
+        """Use another channel after KeyboardInterrupt in a call.
+
+        It can leave a lock of gRPC locked, or a call half begun, and all later calls of that
+        channel would wait for ever.  Leases and streams of the last _MOST_CHANNELS go on.
+        """
+        try:
+            yield
+        except (KeyboardInterrupt, RuntimeError) as error:
+            self._open()
+            if len(self._channels) > _MOST_CHANNELS:
+                _closing(self._channels.pop(0))
+            # threading.Condition raises RuntimeError if it is interrupted while it is locked again.
+            if isinstance(error.__context__, KeyboardInterrupt):
+                raise KeyboardInterrupt from None
+            raise
 
     def ask(self, method: Any, request: Any, timeout_s: float | None = QUERY_TIMEOUT_S) -> Any:
         """Make a call with one response; return it."""
@@ -116,7 +141,8 @@ class Connection(Closing):
     def stream(self, method: Any, request: Any, timeout_s: float | None = None) -> Iterator[Any]:
         """Yield the responses of a call."""
         try:
-            yield from method(request, timeout=timeout_s)
+            with self._interruptible():
+                yield from method(request, timeout=timeout_s)
         except grpc.RpcError as error:
             raise failures.from_grpc(error, self.socket) from None
 
@@ -164,8 +190,16 @@ class Connection(Closing):
         until = time.monotonic() + patience_s
         while True:
             try:
-                return call()
+                with self._interruptible():
+                    return call()
             except grpc.RpcError as error:
                 if time.monotonic() > until or not failures.is_crowded(error, self.socket):
                     raise failures.from_grpc(error, self.socket) from None
             time.sleep(_RETRY_S)
+
+
+def _closing(channel: grpc.Channel) -> threading.Thread:
+    """Close a channel in another thread, because an interrupted one may wait for ever."""
+    thread = threading.Thread(target=channel.close, daemon=True)
+    thread.start()
+    return thread
