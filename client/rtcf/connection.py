@@ -22,7 +22,7 @@ CHANGE_TIMEOUT_S = 120.0
 _CROWDED_S = 15.0  # for a place in the listen queue of rtcfd's socket
 _RETRY_S = 0.05
 _CLOSE_S = 2.0
-_MOST_CHANNELS = 8
+_MOST_CHANNELS = 8  # the present one, and interrupted ones
 _LONGEST_PATH = 107  # unix(7)
 # The timeout of one attempt to connect: systemd accepts connections before rtcfd has started, and a
 # busy machine may schedule rtcfd late.

@@ -89,8 +89,8 @@ class Connection(web.RequestHandler):
     def log_exception(self, *args: Any, **given: Any) -> None:
         """Log an error of the server.
 
-        Not one of a body that nobody reads after the response, or of a connection that has ended
-        meanwhile, where aiohttp asserts that it has not.
+        Exceptions: a body that nobody reads after the response, and a connection that ends during
+        a request, of which aiohttp asserts that it is open.
         """
         error = given.get("exc_info")
         ended = isinstance(error, AssertionError) and self.wire.is_closing()

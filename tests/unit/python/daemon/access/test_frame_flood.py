@@ -14,9 +14,9 @@ from strangers import open_to_strangers, root_only, stranger
 PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
 
 
-def frame(kind: int, payload: bytes, flags: int = 0) -> bytes:
-    """Return a frame of stream 1."""
-    return len(payload).to_bytes(3, "big") + bytes([kind, flags, 0, 0, 0, 1]) + payload
+def frame(kind: int, payload: bytes, flags: int = 0, stream: int = 1) -> bytes:
+    head = len(payload).to_bytes(3, "big") + bytes([kind, flags]) + stream.to_bytes(4, "big")
+    return head + payload
 
 
 class Recorded(Pace):
@@ -69,7 +69,7 @@ def test_frames_of_trusted_users_do_not_wait() -> None:
 
 def call(stream: int, kind: int = 1, flags: int = 4) -> bytes:
     """Return a frame of a stream."""
-    return frame(kind, b"call", flags)[:5] + stream.to_bytes(4, "big") + b"call"
+    return frame(kind, b"call", flags, stream)
 
 
 def passed_of(cutter: FramePace, sent: bytes, size: int, *, paced: bool) -> bytes:
@@ -232,21 +232,8 @@ except ConnectionError:
 """
 )
 KINDS = (
-    *(
-        "reset",
-        "open",
-        "hold",
-        "leave",
-        "call",
-        "rst",
-        "data",
-        "priority",
-        "settings",
-        "ping",
-        "goaway",
-    ),
-    *("window", "continuation", "unknown"),
-)
+    "reset open hold leave call rst data priority settings ping goaway window continuation unknown"
+).split()
 MOST_KB = 10_000
 
 
