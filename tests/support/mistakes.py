@@ -13,6 +13,7 @@ import itertools
 import logging
 import math
 import random
+import threading
 import time
 from collections import deque, namedtuple
 from dataclasses import dataclass, field
@@ -62,6 +63,11 @@ FILTER = Filter(3.0)
 SHARED = Gains()
 
 
+@functools.lru_cache(maxsize=4)
+def cached(x):
+    return x
+
+
 def limited(x, low, high=1.0):
     return min(max(x, low), high)
 
@@ -84,6 +90,7 @@ class Faulty(Component):
     f: State[float]
     on: State[bool]
     z: State[np.float64, 2]
+    held: State[np.float64, 2]
     m: State[np.float64, 2, 2]
     c: State[np.int64, 3]
     o: State[float | None]
@@ -95,6 +102,49 @@ class Faulty(Component):
 
 # In update.
 UPDATE: dict[str, tuple[str, str]] = {
+    # Names.
+    "parameter without self": ("self.f = kp * 2.0", "write self.kp"),
+    "period without self": ("self.f = dt", "dt is not defined"),
+    "misspelt variable": ("total = 1.0\nself.f = totl  # here", "total"),
+    "output called": ("self.y(1.0)", "self.y.write(…)"),
+    "input called": ("self.f = self.u()", "self.u.value"),
+    "method of an enum": ("self.n = self.mode.bit_length()", "an enum"),
+    "seconds of a stamp": ("self.f = self.stamp.to_sec()", "1e-9"),
+    "sleep": ("time.sleep(0.1)", "blocks the cycle"),
+    "thread": ("threading.Thread(target=None)", "starts no threads"),
+    "port declared in a hook": ("a = Output(float)", "write `name: Output[float]`"),
+    "kind of sort": ("a = np.argsort(self.z, kind='mergesort')", 'kind="stable"'),
+    "cached function": ("self.f = cached(self.f)", "lru_cache"),
+    # Names of arrays.
+    "state set to another, then changed": (
+        "self.z = self.held\nself.z[0] = 1.0  # here",
+        "the same array",
+    ),
+    "state set to another, then increased": (
+        "self.z = self.held\nself.held += 1.0  # here",
+        "write self.z = self.held.copy()",
+    ),
+    "row kept in a state, then the matrix changed": (
+        "self.z = self.m[0]\nself.m[0, 0] = 1.0  # here",
+        "write self.z = self.m[0].copy()",
+    ),
+    "variable kept in a state, then changed": (
+        "a = np.zeros(2)\nself.z = a\na[0] = 1.0  # here",
+        "write self.z = a.copy()",
+    ),
+    "constant kept in a state, then changed": (
+        "self.m = A\nself.m[0, 0] = 2.0  # here",
+        "self.m = A.copy()",
+    ),
+    "parameter changed by a name": (
+        "a = self.gains\na[0] = 2.0  # here",
+        "write a = self.gains.copy()",
+    ),
+    "diagonal changed": ("a = np.diag(self.m)\na[0] = 1.0  # here", "read-only view"),
+    "pair of one array": (
+        "a, b = self.z, self.z\nself.z = 2.0 * self.z\na += 1.0  # here\nself.x.write(b)",
+        "the same array",
+    ),
     # Shapes.
     "vector of another size added": ("self.z[:] = self.z + np.zeros(3)", "(2,)"),
     "vector of another size assigned": ("self.z[:] = np.ones(3)", "(3,)"),
@@ -168,7 +218,7 @@ UPDATE: dict[str, tuple[str, str]] = {
     "element of ints divided": ("self.c[0] /= 2", "float"),
     "int to a bool": ("self.on = self.n", "int"),
     "text to a number": ("self.f = 'fast'", "text"),
-    "number from text": ("self.f = float('1.0')", "text"),
+    "number from a word": ("self.f = float('fast')", "text"),
     "text in arithmetic": ("self.f = self.f + '1'", "text"),
     "mode as text": ("self.mode = 'RUN'", "Mode"),
     "mode by its name in brackets": ("self.mode = Mode['RUN']", "Mode"),
@@ -345,7 +395,6 @@ UPDATE: dict[str, tuple[str, str]] = {
     "print": ("print(self.f)", "print"),
     "open": ("with open('log.txt', 'a') as file:  # here\n    file.write('x')", "open or lock"),
     "input": ("a = input()", "Input"),
-    "sleep": ("time.sleep(0.1)", "clock"),
     "time": ("a = time.monotonic()", "clock"),
     "random": ("a = random.gauss(0.0, 1.0)", "replay"),
     "try and except": (
@@ -645,7 +694,7 @@ HEAD: dict[str, tuple[str, str]] = {
     "index of a constant": ("FIRST = TABLE[3]", "range"),
     "file that is not there": ("DATA = np.loadtxt('no_such_table.csv')", "no_such_table"),
     "unknown option": ("OPTION = State(0.0, units='m')", "units"),
-    "declaration without brackets": ("SPEED = Input(float)", "initial"),
+    "declaration without brackets": ("SPEED = Input(float)", "annotation"),
     "message that is not there": ("from geometry_msgs.msg import Twists", "Twists"),
     "attribute of NumPy": ("C = np.eyes(2)", "eyes"),
 }

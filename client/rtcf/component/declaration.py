@@ -66,6 +66,11 @@ class Declarable:
 
         Raises DeclarationError for an unknown option, or an initial value of a port or of Derived.
         """
+        if isinstance(initial, type):
+            own, of = _a(type(self)), getattr(initial, "__name__", "float")
+            raise DeclarationError(
+                f"{own} has its type in its annotation: write name: {type(self).__name__}[{of}]"
+            )
         for option in options:
             if option not in self.allowed:
                 has = ", ".join(self.allowed)

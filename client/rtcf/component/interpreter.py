@@ -1,6 +1,6 @@
-"""Component in the interpreter, for tests: its members are views of one record.
+"""Component in the interpreter, for tests: its members refer to arrays as in any NumPy program.
 
-Compiled code has the same record. Each call of `cycle()` runs one `update()`.
+Compiled code has one record of all members. Each call of `cycle()` runs one `update()`.
 """
 
 import enum
@@ -23,6 +23,7 @@ from rtcf.component.declaration import (
     describe,
     is_constant,
 )
+from rtcf.component.memory import Memory
 from rtcf.component.message_view import MessageView, checked, copy, named, put
 from rtcf.component.value_type import ValueType
 
@@ -32,10 +33,10 @@ class Fault(Exception):
 
 
 class _Value:
-    """A value in the record: a Python number, or a view of an array or a message."""
+    """A value: a Python number, an array or a message."""
 
-    def __init__(self, record: Any, member: Member) -> None:
-        self._record, self._member = record, member
+    def __init__(self, memory: Memory, member: Member) -> None:
+        self._memory, self._record, self._member = memory, memory.record, member
 
     @property
     def type(self) -> ValueType:
@@ -44,12 +45,16 @@ class _Value:
     def get(self) -> Any:
         if self._member.message:
             is_output = self._member.kind is Output
-            return MessageView(self._record, self._member.name, self._member.message, is_output)
+            return MessageView(self._memory, self._member.name, self._member.message, is_output)
         if self._member.type.optional and not self._record[self._member.known]:
             return None
         value = self._record[self._member.name]
-        if self._member.type.shape:
+        if self._member.type.shape and self._member.kind in (Input, Parameter):
+            value = value.copy()
+            value.flags.writeable = self._member.kind is Input
             return value
+        if self._member.type.shape:
+            return self._memory.array(self._member.name)
         plain = value.item()
         if plain.__class__ is int and plain >= 2**63:
             raise OverflowError(f"{self._member.name} does not fit int64")
@@ -65,7 +70,7 @@ class _Value:
 
     def set(self, value: Any) -> None:
         if self._member.message and isinstance(value, MessageView):
-            copy(self._record, self._member.name, self._member.message, (), value)
+            copy(self._memory, self._member.name, self._member.message, (), value)
             return
         if self._member.message:
             raise TypeError(
@@ -78,18 +83,25 @@ class _Value:
                 return
         if self._member.type.enumeration:
             value = self._member.type.enumeration(value)
-        self._record[self._member.name] = checked(value, self._member.type, self._member.name)
+        new = checked(value, self._member.type, self._member.name)
+        if self._member.kind is Output:
+            self._memory.set(self._member.name, new)
+        elif self._member.type.shape and self._member.kind in (State, Derived):
+            self._memory.bind(self._member.name, new)
+        else:
+            self._record[self._member.name] = new
 
 
 class InputPort:
     """An input in the interpreter."""
 
-    def __init__(self, record: Any, member: Member) -> None:
-        self._value, self._record, self._name = _Value(record, member), record, member.name
+    def __init__(self, memory: Memory, member: Member) -> None:
+        self._value, self._record = _Value(memory, member), memory.record
+        self._name = member.name
 
     @property
     def value(self) -> Any:
-        """Return the newest value; zero if none has been written."""
+        """Return a copy of the newest value; zero if none has been written."""
         return self._value.get()
 
     @property
@@ -141,7 +153,7 @@ class QueuePort:
         if self.size == 0:
             raise IndexError("front of an empty queue")
         value = self._record[self._name][self._record[f"{self._name}__oldest"]]
-        return value if self._member.type.shape else value.item()
+        return value.copy() if self._member.type.shape else value.item()
 
     @property
     def age(self) -> int:
@@ -185,9 +197,10 @@ class QueuePort:
 class OutputPort:
     """An output in the interpreter."""
 
-    def __init__(self, record: Any, member: Member, kept: Any = None) -> None:
-        """Create the port. `kept` is a record with the value that readers see, if it differs."""
-        self._value, self._record, self._name = _Value(record, member), record, member.name
+    def __init__(self, memory: Memory, member: Member, kept: Memory | None = None) -> None:
+        """Create the port. `kept` has the value that readers see, if it differs."""
+        self._value, self._record = _Value(memory, member), memory.record
+        self._name = member.name
         self._seen = self._value if kept is None else _Value(kept, member)
 
     def write(self, value: Any) -> None:
@@ -220,29 +233,39 @@ class _Attribute(MemberAttribute):
         if component is None:
             return self
         if self._member.kind is Input:
-            return InputPort(component._record, self._member)
+            return InputPort(component._memory, self._member)
         if self._member.kind is Output:
             kept = component._kept if self._member.name in component._not_finite else None
-            return OutputPort(component._record, self._member, kept)
+            return OutputPort(component._memory, self._member, kept)
         if self._member.kind is Queue:
-            return QueuePort(component._record, self._member)
-        return _Value(component._record, self._member).get()
+            return QueuePort(component._memory.record, self._member)
+        return _Value(component._memory, self._member).get()
 
     def __set__(self, component: Any, value: Any) -> None:
         if self._member.kind in (State, Derived):
-            _Value(component._record, self._member).set(value)
+            _Value(component._memory, self._member).set(value)
         elif self._member.kind is Parameter:
             raise AttributeError(f"{self._member.name} is a parameter, which hooks cannot set")
         else:
             raise AttributeError(f"{self._member.name} is a port: use .write(…)")
 
 
+def fresh_record(description: Description) -> Any:
+    """Return the record of a new component, whose loop runs at 1 kHz."""
+    record = np.zeros((), description.record)
+    for member in description.members.values():
+        if member.kind is not Queue and not member.message:
+            record[member.name] = member.initial
+    record["_period"], record["_dt"], record["_frequency"] = 1_000_000, 1e-3, 1e3
+    return record
+
+
 class Component:
     """Base class of components in Python. Derived classes declare members and implement hooks."""
 
-    _record: Any
+    _memory: Memory
     _finite: list[Member]
-    _kept: Any  # a record with the last finite values of these outputs
+    _kept: Memory  # the last finite values of these outputs
     _not_finite: set[str]  # names of the outputs whose readers see the value of _kept
     log: list[tuple[str, str]]
 
@@ -259,23 +282,24 @@ class Component:
         description: Description = describe(type(self))
         for name, member in description.members.items():
             setattr(type(self), name, _Attribute(member))
-        record = np.zeros((), description.record)
-        for member in description.members.values():
-            if member.kind is not Queue and not member.message:
-                record[member.name] = member.initial
+        record = fresh_record(description)
         for name in parameters:
             if name not in {member.name for member in description.of(Parameter)}:
                 raise TypeError(f"{type(self).__name__} has no parameter {name!r}")
             member = description.members[name]
-            _Value(record, member).set(named(parameters[name], member.type, name))
-        record["_period"], record["_dt"], record["_frequency"] = 1_000_000, 1e-3, 1e3
-        object.__setattr__(self, "_record", record)
+            _Value(Memory(record), member).set(named(parameters[name], member.type, name))
+        object.__setattr__(self, "_memory", Memory(record))
         finite = [each for each in description.of(Output) if each.options.get("finite")]
         object.__setattr__(self, "_finite", finite)
-        object.__setattr__(self, "_kept", record.copy())
+        object.__setattr__(self, "_kept", Memory(record.copy()))
         object.__setattr__(self, "_not_finite", set())
         object.__setattr__(self, "log", [])
         self.prepare()
+
+    @property
+    def _record(self) -> Any:
+        """The record, which may be changed from outside."""
+        return self._memory.whole()
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Set a state or a derived member; raise AttributeError for any other name."""
@@ -310,7 +334,7 @@ class Component:
 
     def cycle(self) -> None:
         """For tests: run `update()` once and advance the time by one period."""
-        record = self._record
+        record = self._memory.record
         for name in record.dtype.names:
             if name.endswith("__written"):
                 record[name] = False
@@ -328,21 +352,22 @@ class Component:
         for member in self._finite:
             name = member.name
             fields = [name + leaf.field for leaf in member.leaves]
-            values = [self._record[each] for each in fields]
-            written = self._record[f"{name}__written"]
+            record = self._memory.written()
+            values = [record[each] for each in fields]
+            written = record[f"{name}__written"]
             if not all(np.isfinite(each).all() for each in values):
                 self._not_finite.add(name)
                 if written:
                     text = f"output {name} is not finite: readers keep its last value"
                     self.log.append(("error", text))
-                    self._record[f"{name}__written"] = False
+                    record[f"{name}__written"] = False
             elif written:
                 for each, value in zip(fields, values, strict=True):
-                    self._kept[each] = value
+                    self._kept.set(each, value)
 
 
 def _time(name: str) -> property:
-    return property(lambda self: self._record[f"_{name}"].item(), doc=f"The loop's {name}.")
+    return property(lambda self: self._memory.record[f"_{name}"].item(), doc=f"The loop's {name}.")
 
 
 def _log(level: str) -> Any:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from rtcf.component.memory import Memory
 from rtcf.component.message_type import MessageType
 from rtcf.component.value_type import ValueType
 
@@ -12,14 +13,14 @@ from rtcf.component.value_type import ValueType
 class MessageView:
     """A message, or a part of one."""
 
-    __slots__ = ("_is_output", "_message", "_path", "_port", "_record")
+    __slots__ = ("_is_output", "_memory", "_message", "_path", "_port")
 
     def __init__(
-        self, record: Any, port: str, message: MessageType, is_output: bool, path: Any = ()
+        self, memory: Memory, port: str, message: MessageType, is_output: bool, path: Any = ()
     ) -> None:
         """Create a view of a port's message, or of the part at a path."""
         for name, value in (
-            ("_record", record),
+            ("_memory", memory),
             ("_port", port),
             ("_message", message),
             ("_is_output", is_output),
@@ -34,11 +35,13 @@ class MessageView:
         if leaf is None:
             if not self._message.below(path):
                 raise AttributeError(f"{self._message.name} has no number {'.'.join(path)}")
-            return MessageView(self._record, self._port, self._message, self._is_output, path)
-        value = self._record[self._port + leaf.field]
-        if leaf.is_variable and not self._is_output:
-            return value[: self._record[self._port + leaf.count]]
-        return value if leaf.type.shape else value.item()
+            return MessageView(self._memory, self._port, self._message, self._is_output, path)
+        if leaf.type.shape and self._is_output:
+            return self._memory.array(self._port + leaf.field)
+        value = self._memory.record[self._port + leaf.field]
+        if leaf.is_variable:
+            value = value[: self._memory.record[self._port + leaf.count]]
+        return value.copy() if leaf.type.shape else value.item()
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Set a number, an array or a nested message of an output."""
@@ -47,14 +50,14 @@ class MessageView:
         if not self._is_output:
             raise AttributeError(f"{self._port} is an input, which is read-only")
         if leaf is None and isinstance(value, MessageView):
-            copy(self._record, self._port, self._message, path, value)
+            copy(self._memory, self._port, self._message, path, value)
             return
         if leaf is None:
             raise AttributeError(f"{self._message.name} has no number {'.'.join(path)}")
-        self._record[self._port + leaf.field] = checked(value, leaf.type, ".".join(path))
+        self._memory.set(self._port + leaf.field, checked(value, leaf.type, ".".join(path)))
 
 
-def copy(record: Any, port: str, message: MessageType, path: Any, source: MessageView) -> None:
+def copy(memory: Memory, port: str, message: MessageType, path: Any, source: MessageView) -> None:
     """Copy a message to an output's message, or to a part of it.
 
     Raises TypeError as MessageType.pairs() does.
@@ -63,7 +66,7 @@ def copy(record: Any, port: str, message: MessageType, path: Any, source: Messag
         value: Any = source
         for name in theirs.path[len(source._path) :]:
             value = getattr(value, name)
-        record[port + leaf.field] = checked(value, leaf.type, ".".join(leaf.path))
+        memory.set(port + leaf.field, checked(value, leaf.type, ".".join(leaf.path)))
 
 
 def put(record: Any, port: str, message: MessageType, given: Any) -> bool:

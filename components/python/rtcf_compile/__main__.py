@@ -2,6 +2,6 @@
 
 import sys
 
-from rtcf_compile.main import main
+from rtcf_compile.guarded import guarded
 
-sys.exit(main())
+sys.exit(guarded())

@@ -2,6 +2,7 @@
 
 import argparse
 import gc
+import importlib.util
 import re
 import sys
 from collections.abc import Sequence
@@ -44,6 +45,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     try:
         classes = _classes(args.sources)
+        if importlib.util.find_spec("numba") is None:
+            print("rtcf-compile: needs numba: sudo apt install python3-numba", file=sys.stderr)
+            return REFUSED
         # Importing numba takes a second: import it only after the cheap checks.
         from rtcf_compile.library import build, log_text
         from rtcf_compile.machine_code import object_file
@@ -72,7 +76,7 @@ def _verified(classes: list[type], compiled: list[Any], args: argparse.Namespace
     amount = watched.Amount.parse(args.verify)
     found = watched.compare_all(classes, compiled, amount, args.seed)
     for each in found:
-        print(each)
+        print("\n".join([str(each), *each.conditions()]))
     problem = next((each.problem for each in found if each.problem), "")
     if problem:
         print(f"rtcf-compile: {' '.join(problem.split())}", file=sys.stderr)

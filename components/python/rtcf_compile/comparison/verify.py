@@ -1,20 +1,20 @@
-"""Compares compiled code with the interpreter on the same inputs, parameters and state.
+"""Compares compiled code with a plain class in the interpreter on the same inputs, parameters and
+state; see model.py.
 
-Inputs are random values from a seed, including special values. After each cycle, both continue from
-the interpreter's state, so that differences do not accumulate. In the interpreter, helpers replace
-`@` and np.linalg, for the same order of sums, and the division of single numbers, because division
-of NumPy numbers does not raise. Other NumPy functions may round differently. A difference no larger
-than the effect of the last place of the values that the hook reads does not count.
+Inputs are random values from a seed, including special values and numbers of the source. After each
+cycle, both continue from the interpreter's state, so that differences do not accumulate. In the
+interpreter, helpers replace `@` and np.linalg, for the same order of sums, and the division of
+single numbers, because division of NumPy numbers does not raise. Other NumPy functions may round
+differently. A difference no larger than the effect of the last place of the values that the hook
+reads does not count.
 
 A component whose update() raises in every cycle is rejected, too: it would end the loop.
 """
 
-import ast
 import warnings
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
-from types import CodeType, FunctionType
 from typing import Any, Protocol
 
 import numpy as np
@@ -24,22 +24,17 @@ from rtcf.component.declaration import (
     Derived,
     Input,
     Member,
-    MemberAttribute,
     Output,
     Parameter,
     Queue,
 )
-from rtcf.component.interpreter import QueuePort
+from rtcf.component.interpreter import QueuePort, fresh_record
 from rtcf.component.value_type import ValueType
 
 from rtcf_compile.comparison.inside import Inside
+from rtcf_compile.comparison.model import Branch, Model
 from rtcf_compile.machine_code.object_file import Compiled
-from rtcf_compile.rewriting import operators
-from rtcf_compile.rewriting.common_rewriting import CommonRewriting
-from rtcf_compile.rewriting.functions import HELPERS, drop_types, operator_functions
-from rtcf_compile.rewriting.functions import made as made_of
 from rtcf_compile.source.mistake import display, source_line
-from rtcf_compile.source.modules import Source, is_own, read
 from rtcf_compile.source.processor_time import HOOK_S, TimeLimitError, loop_line
 
 LARGEST_ULP = 4
@@ -65,6 +60,8 @@ class Comparison:
     largest_ulp: int = 0
     differences: list[str] = field(default_factory=list)
     problem: str = ""  # the first difference or the constant fault, with its file
+    # How often each condition was false and true.
+    branches: dict[Branch, list[int]] = field(default_factory=dict)
 
     def __str__(self) -> str:
         """Return the result in one line."""
@@ -78,6 +75,13 @@ class Comparison:
         if self.problem and not self.differences:
             verdict += ", BUT UPDATE ALWAYS RAISES"
         return f"{self.name}: {self.cycles} cycles, {self.largest_ulp} ulp{more}: {verdict}"
+
+    def conditions(self) -> list[str]:
+        """Return a line for each condition: how often it was true."""
+        return [
+            f"{display(file)}:{line}: `{text}`: true {counts[1]} times of {sum(counts)}"
+            for (file, line, text), counts in sorted(self.branches.items())
+        ]
 
     def differ(self, what: str, file: str, line: int = 0) -> None:
         """Record a difference."""
@@ -166,21 +170,30 @@ class _Comparing:
         self._updates_raised = 0
         self._last_raised = ""
         self._mine = bounds.record(compiled.description.record)
+        self._theirs = np.zeros((), compiled.description.record)
+        self._model = Model(cls, compiled.description, compiled.narrow)
+        # Without names that refer to arrays of earlier cycles.
+        self._other = Model(cls, compiled.description, compiled.narrow)
+        self.result.branches = self._model.branches
         self._draw = np.random.default_rng(1)  # separate, so that inputs do not depend on it
         self._prepared: dict[bytes, Any] = {}  # records by parameter values
 
     def run(self, enough: Callable[[int], bool], draw: Any, edges: float) -> None:
         """Run hooks in the order of the loop."""
-        self._component: Any = self._made()
         hooks, result = self._compiled.hooks, self.result
         description = self._compiled.description
-        fresh = self._component._record.copy()
-        self._record = record = fresh.copy()
+        self._record = record = fresh_record(description)
+        if "prepare" in hooks and self._raised("prepare", self._model, record) is not None:
+            # prepare() rejects the default parameters; loading reports it.
+            self.result.raised += 1
+            return
+        fresh = record.copy()
         writes = [f"{each.name}__written" for each in description.of(Output)]
         inputs: list[_Inputs | _Messages] = []
         while len(result.differences) < MOST_DIFFERENCES and not enough(self._cycle):
             if self._cycle % _ANEW == 0:
                 record[...] = fresh
+                self._model.load(record, anew=True)
                 if self._cycle:
                     _parameters(record, description.of(Parameter), draw)
                 if "prepare" in hooks:
@@ -189,8 +202,9 @@ class _Comparing:
                     self._both("start")
                 # Every other run has no special values: a NaN would stay in a filter's state.
                 share = edges if self._cycle // _ANEW % 2 else 0.0
-                inputs = [_Inputs(each, draw, share) for each in description.of(Input)]
-                inputs += [_Messages(each, draw, share) for each in description.of(Queue)]
+                values = _Values(draw, share, self._model.numbers)
+                inputs = [_Inputs(each, values) for each in description.of(Input)]
+                inputs += [_Messages(each, values) for each in description.of(Queue)]
             for each in inputs:
                 each.put(record, self._cycle % _ANEW)
             for name in writes:
@@ -215,24 +229,11 @@ class _Comparing:
         for derived in description.of(Derived):
             record[derived.name] = self._prepared[given][derived.name]
 
-    def _made(self) -> Any:
-        """Return the component for the interpreter."""
-        cls = _interpreted(self._cls, self._compiled.narrow)
-        try:
-            with self._bounds.python():
-                return cls()
-        except TimeLimitError as error:
-            self._endless("prepare", error)
-        except Exception:
-            # prepare() rejects the default parameters; loading reports it.
-            self.result.raised += 1
-        raise _EndError
-
     def _both(self, hook: str) -> None:
         """Run a hook both ways on copies of the record; continue with the interpreter's record."""
-        result, record, mine, component = self.result, self._record, self._mine, self._component
-        _bytes(component._record)[:] = _bytes(record)
-        error = self._raised(hook)
+        result, record, mine, theirs = self.result, self._record, self._mine, self._theirs
+        _bytes(theirs)[:] = _bytes(record)
+        error = self._raised(hook, self._model, theirs)
         _bytes(mine)[:] = _bytes(record)
         with self._bounds.machine_code(self._compiled.hooks.index(hook), self._cycle):
             said = self._inside.call(hook, mine)
@@ -249,15 +250,13 @@ class _Comparing:
                 self._updates_raised += 1
                 self._last_raised = said
             return
-        theirs = component._record
         mine["_line"] = theirs["_line"] = record["_line"]
         if not np.array_equal(_bytes(mine), _bytes(theirs)):
-            self._compare(hook, mine, theirs.copy())
-            theirs = component._record
+            self._compare(hook, mine, theirs)
         _bytes(record)[:] = _bytes(theirs)
 
     def _compare(self, hook: str, mine: Any, theirs: Any) -> None:
-        """Compare all members; keep the interpreter's record unchanged."""
+        """Compare all members."""
         result = self.result
         nearby: list[Any] = []
         for name in mine.dtype.names:
@@ -276,12 +275,11 @@ class _Comparing:
                 f"{name.replace('__', '.')}{element} is {ours} compiled, {pythons} in the "
                 f"interpreter{distance}",
             )
-        _bytes(self._component._record)[:] = _bytes(theirs)
 
     def _nearby(self, hook: str) -> list[Any]:
         """Return records of the interpreter for inputs changed by one unit in the last place."""
         found = []
-        theirs = self._component._record
+        theirs = self._record.copy()
         names = [
             name
             for name in theirs.dtype.names
@@ -294,7 +292,7 @@ class _Comparing:
                 # Try both directions: one of them may round to the same float32.
                 towards[name] = -towards[name] if number % 2 else self._towards(theirs[name])
                 theirs[name] = np.nextafter(theirs[name], towards[name])
-            if self._raised(hook) is None:
+            if self._raised(hook, self._other, theirs) is None:
                 found.append(theirs.copy())
         return found
 
@@ -302,15 +300,18 @@ class _Comparing:
         """Return an infinity of random sign for each value."""
         return self._draw.choice((-np.inf, np.inf), values.shape).astype(values.dtype)
 
-    def _raised(self, hook: str) -> Exception | None:
+    def _raised(self, hook: str, model: Model, record: Any) -> Exception | None:
+        """Run a hook of a model on a record; return what it raises."""
+        model.load(record)
         try:
             with self._bounds.python():
-                getattr(self._component, hook)()
+                model.run(hook)
         except TimeLimitError as error:
             self._endless(hook, error)
             raise _EndError from None
         except Exception as error:
             return error
+        model.store(record)
         return None
 
     def _differ(self, hook: str, what: str) -> None:
@@ -397,9 +398,9 @@ def ulp(a: Any, b: Any) -> int:
 class _Inputs:
     """The values of an input in the cycles up to the next restart."""
 
-    def __init__(self, member: Member, draw: Any, edges: float) -> None:
+    def __init__(self, member: Member, values: "_Values") -> None:
         """Draw all values at once: single calls of NumPy are slow."""
-        name = member.name
+        name, draw = member.name, values.draw
         self._flags = [f"{name}__{flag}" for flag in ("new", "valid", "connected")]
         self._age_name = f"{name}__age"
         self._new = (draw.random(_ANEW) < 0.8).tolist()
@@ -407,7 +408,7 @@ class _Inputs:
         self._values: dict[str, Any] = {}
         for leaf in member.leaves:
             shape = (_ANEW, *leaf.type.shape)
-            self._values[name + leaf.field] = _drawn(leaf.type, shape, draw, edges)
+            self._values[name + leaf.field] = values.of(leaf.type, shape)
             if leaf.is_variable:
                 counts = draw.integers(0, leaf.type.count, _ANEW, endpoint=True)
                 # Most messages have full length.
@@ -428,12 +429,12 @@ class _Inputs:
 class _Messages:
     """The messages of a queue: up to three per cycle, sometimes more than its size."""
 
-    def __init__(self, member: Member, draw: Any, edges: float) -> None:
+    def __init__(self, member: Member, values: "_Values") -> None:
         """Draw all messages at once."""
         self._member = member
-        self._counts = draw.choice((0, 0, 0, 1, 1, 2, 3, member.size + 1), _ANEW).tolist()
+        self._counts = values.draw.choice((0, 0, 0, 1, 1, 2, 3, member.size + 1), _ANEW).tolist()
         shape = (_ANEW, member.size + 3, *member.type.shape)
-        self._values = _drawn(member.type, shape, draw, edges)
+        self._values = values.of(member.type, shape)
 
     def put(self, record: Any, cycle: int) -> None:
         """Put the messages of a cycle."""
@@ -442,21 +443,37 @@ class _Messages:
             port.put(self._values[cycle][number])
 
 
-def _drawn(kind: ValueType, shape: tuple[int, ...], draw: Any, edges: float) -> Any:
-    """Draw values of a type, with a random scale for each index of the first dimension."""
-    if kind.is_bool:
-        values = draw.random(shape) < 0.5
-    elif kind.enumeration:
-        values = draw.choice([int(each) for each in kind.enumeration], shape)
-    elif kind.is_float:
-        scale = 10.0 ** draw.integers(-3, 4, (shape[0], *(1 for _ in shape[1:])))
-        values = draw.normal(0.0, 1.0, shape) * scale
-        values = np.where(draw.random(shape) < edges, draw.choice(_EDGES, shape), values)
-    else:
-        limits = np.iinfo(kind.scalar)
-        low, high = max(limits.min, -1000), min(limits.max, 1000)
-        values = draw.integers(low, high, shape, dtype=np.int64, endpoint=True)
-    return values.astype(kind.scalar)
+class _Values:
+    """Draws values of inputs."""
+
+    def __init__(self, draw: Any, edges: float, numbers: list[int]) -> None:
+        """`edges`: the share of special values; `numbers`: ints of the source.
+
+        In half of the runs most ints are of the source, such as the values of an enum.
+        """
+        self.draw, self._edges, self._numbers = draw, edges, numbers
+        self._share = float(draw.choice((0.2, 0.95)))
+
+    def of(self, kind: ValueType, shape: tuple[int, ...]) -> Any:
+        """Return values of a type, with a random scale for each index of the first dimension."""
+        draw = self.draw
+        if kind.is_bool:
+            values = draw.random(shape) < 0.5
+        elif kind.enumeration:
+            values = draw.choice([int(each) for each in kind.enumeration], shape)
+        elif kind.is_float:
+            scale = 10.0 ** draw.integers(-3, 4, (shape[0], *(1 for _ in shape[1:])))
+            values = draw.normal(0.0, 1.0, shape) * scale
+            values = np.where(draw.random(shape) < self._edges, draw.choice(_EDGES, shape), values)
+        else:
+            limits = np.iinfo(kind.scalar)
+            low, high = max(limits.min, -1000), min(limits.max, 1000)
+            values = draw.integers(low, high, shape, dtype=np.int64, endpoint=True)
+            numbers = [each for each in self._numbers if limits.min <= each <= limits.max]
+            if numbers:
+                is_known = draw.random(shape) < self._share
+                values = np.where(is_known, draw.choice(numbers, shape), values)
+        return values.astype(kind.scalar)
 
 
 def _parameters(record: Any, parameters: list[Member], draw: Any) -> None:
@@ -470,70 +487,3 @@ def _parameters(record: Any, parameters: list[Member], draw: Any) -> None:
             record[member.name] = draw.uniform(low, high, member.type.shape)
         elif low is not None and high is not None:
             record[member.name] = draw.integers(low, high, member.type.shape, endpoint=True)
-
-
-def _interpreted(cls: type[Component], narrow: Collection[CodeType]) -> type[Component]:
-    """Return a copy of the class and its bases in which helpers replace `@`, np.linalg, divisions
-    and other operations.
-    """
-    copies: dict[type, type] = {}
-    known: dict[FunctionType, FunctionType] = {}
-    for base in reversed(cls.__mro__):
-        if base is object or base.__module__.startswith(("rtcf.component", "typing")):
-            copies[base] = base
-            continue
-        members = {
-            name: value
-            for name, value in vars(base).items()
-            if name not in ("__dict__", "__weakref__") and not isinstance(value, MemberAttribute)
-        }
-        copy = type(base)(base.__name__, tuple(copies[each] for each in base.__bases__), members)
-        copies[base] = copy
-        for name, value in members.items():
-            if isinstance(value, FunctionType) and is_own(value):
-                setattr(copy, name, _with_helpers(value, known, narrow, copy, copies))
-            elif isinstance(value, staticmethod) and is_own(value.__func__):
-                own = _with_helpers(value.__func__, known, narrow, copy, copies)
-                setattr(copy, name, staticmethod(own))
-            elif isinstance(value, property) and is_own(value.fget):
-                own = _with_helpers(value.fget, known, narrow, copy, copies)
-                setattr(copy, name, property(own, value.fset))
-    return copies[cls]
-
-
-def _with_helpers(
-    function: Any,
-    known: dict[FunctionType, FunctionType],
-    narrow: Collection[CodeType],
-    owner: type | None = None,
-    copies: dict[type, type] | None = None,
-) -> FunctionType:
-    if function in known:
-        return known[function]
-    source = read(function)
-    rewriting = CommonRewriting(source, operator_functions(function, narrow) | operators.COMPARED)
-    tree = source.tree
-    tree.body = rewriting.statements(tree.body)
-    drop_types(tree)
-    scope = {**function.__globals__, **HELPERS, **rewriting.constants}
-    for name, value in scope.items():
-        if isinstance(value, type) and copies and value in copies:
-            scope[name] = copies[value]
-    known[function] = _in_class(tree, scope, source, owner)
-    for name in function.__code__.co_names:
-        value = scope.get(name)
-        if isinstance(value, FunctionType) and is_own(value) and name not in HELPERS:
-            scope[name] = _with_helpers(value, known, narrow)
-    return known[function]
-
-
-def _in_class(
-    tree: ast.FunctionDef, scope: dict[str, Any], source: Source, owner: type | None
-) -> FunctionType:
-    """Return a function of a rewritten tree whose super() refers to its class."""
-    place = ast.arguments([], [ast.arg("__class__")], None, [], [], None, [])
-    name = ast.Return(ast.Name(tree.name, ast.Load()))
-    outer = ast.FunctionDef("rtcf_in_class", place, [tree, name], [])
-    ast.copy_location(outer, tree)
-    made: FunctionType = made_of(outer, scope, source)(owner)
-    return made

@@ -61,6 +61,16 @@ _KNOWN: tuple[tuple[str, str, str], ...] = (
         "write it as arithmetic",
     ),
     (
+        r"Unknown attribute '(to_sec|to_nsec|secs|nsecs)' of type int",
+        "a time is an int, in ns, which has no {0}",
+        "write 1e-9 * … for seconds",
+    ),
+    (
+        r"Unknown attribute '(\w+)' of type (IntEnum[^\n]*)",
+        "methods of an enum are not compiled",
+        "write a function of the module, called with the enum",
+    ),
+    (
         r"Unknown attribute '(\w+)' of type ([^\n]*)",
         "{kind1} has no compiled attribute {0}",
         "use NumPy functions on numbers and arrays",

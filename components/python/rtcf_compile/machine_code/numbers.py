@@ -63,7 +63,13 @@ _PYTHONS = (
 _AS_ARGUMENTS = (
     *(abs, max, min, numpy_functions.rtcf_abs, numpy_functions.rtcf_whole_pow, helpers.rtcf_pow),
     *(helpers.rtcf_negative_pow, helpers.rtcf_maybe, helpers.rtcf_or_old, helpers.rtcf_equal),
-    *(helpers.rtcf_get, helpers.rtcf_items, operators.rtcf_negative, operators.rtcf_divmod),
+    *(
+        helpers.rtcf_get,
+        helpers.rtcf_items,
+        helpers.rtcf_copied,
+        operators.rtcf_negative,
+        operators.rtcf_divmod,
+    ),
     *operators.OF.values(),
     *operators.OF_ELEMENTS.values(),
     *helpers.IN_PLACE.values(),

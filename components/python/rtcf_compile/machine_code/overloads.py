@@ -248,6 +248,20 @@ def _view(array: Any) -> Any:
     return lambda array: array
 
 
+@overload(helpers.rtcf_copied, jit_options={**_OPTIONS, "forceinline": True})
+def _copied(value):  # type: ignore[no-untyped-def]
+    if isinstance(value, types.Array):
+        return lambda value: value.copy()
+    if isinstance(value, types.Optional) and isinstance(value.type, types.Array):
+        return lambda value: None if value is None else _some(value).copy()
+    if not isinstance(value, types.BaseTuple):
+        return lambda value: value
+    parts = "".join(f"copied(value[{number}])," for number in range(len(value)))
+    scope = {"copied": helpers.rtcf_copied}
+    exec(f"def each(value):\n    return ({parts})\n", scope)
+    return scope["each"]
+
+
 @compiled_as(helpers.rtcf_store, arrays=("value",))
 def _store(target: Any, value: Any) -> Any:
     if not isinstance(value, types.Array):

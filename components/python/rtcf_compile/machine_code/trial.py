@@ -57,6 +57,8 @@ def _draw(record: Any, member: Member, draw: Any, cycle: int) -> None:
 
 
 def _value(kind: ValueType, draw: Any, cycle: int) -> Any:
+    if kind.enumeration:
+        return draw.choice([int(each) for each in kind.enumeration])
     value = draw.normal(0.0, 10.0 ** (cycle % 4), kind.shape)
     if kind.is_bool:
         value = value > 0

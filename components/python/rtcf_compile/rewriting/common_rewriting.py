@@ -15,6 +15,7 @@ import numpy as np
 
 from rtcf_compile.rewriting import numpy_functions, operators
 from rtcf_compile.rewriting.helpers import IN_PLACE, INSTEAD, OF_LISTS, rtcf_round
+from rtcf_compile.rewriting.references import is_copied
 from rtcf_compile.source.checks import resolve
 from rtcf_compile.source.mistake import at
 from rtcf_compile.source.modules import Source, is_own
@@ -89,10 +90,14 @@ class CommonRewriting(ast.NodeTransformer):
         return False
 
     def visit(self, node: ast.AST) -> Any:
-        """Move `y := x` before the statement that contains it."""
+        """Move `y := x` before the statement that contains it; copy where references.py says so."""
         if isinstance(node, ast.stmt) and (before := self._before(node)):
             return self.statements(before)
-        return super().visit(node)
+        new = super().visit(node)
+        is_read = isinstance(getattr(node, "ctx", None), ast.Load | None)
+        if is_copied(node) and is_read and isinstance(new, ast.expr):
+            return like(node, call_of("rtcf_copied", new))
+        return new
 
     def visit_NamedExpr(self, node: ast.NamedExpr) -> ast.AST:
         """Reject `y := x` that is not always computed or follows a use of y."""
@@ -415,6 +420,8 @@ class CommonRewriting(ast.NodeTransformer):
             parts = [like(node, ast.Call(node.func, [each], [])) for each in node.args]
             quotient = like(node, ast.BinOp(parts[0], ast.Div(), parts[1]))
             return self.visit(quotient)  # type: ignore[no-any-return]
+        if target is float and (number := _number_in(node)) is not None:
+            return like(node, ast.Constant(number))
         instead = next((own for each, own in _STANDS_FOR if each is target), None)
         if instead is not None:
             return self._instead(node, instead, node.args)
@@ -539,13 +546,18 @@ class CommonRewriting(ast.NodeTransformer):
             elif name == "dtype":
                 given.append(self._dtype(value))
             else:
-                given.append(self._argument(value, parameter.default))
+                given.append(self._argument(name, value, parameter.default))
         return like(node, call_of(helper.__name__, *given))
 
-    def _argument(self, value: ast.expr, default: Any) -> ast.expr:
+    def _argument(self, name: str, value: ast.expr, default: Any) -> ast.expr:
         if isinstance(value, ast.Constant) and isinstance(value.value, str):
             if value.value not in numpy_functions.WORDS:
-                raise self.mistake(value, "a text has no meaning here", "give it a number")
+                what, remedy = "a text has no meaning here", "give it a number"
+                if name in ("kind", "side", "ord"):
+                    what, remedy = f"{name}={value.value!r} is not compiled", f"remove {name}"
+                if name == "kind":
+                    remedy = 'write kind="stable"'
+                raise self.mistake(value, what, remedy)
             return like(value, ast.Constant(numpy_functions.WORDS[value.value]))
         if default is None and isinstance(value, ast.Constant) and value.value is False:
             return like(value, ast.Constant(None))
@@ -689,8 +701,8 @@ class CommonRewriting(ast.NodeTransformer):
         before: list[ast.stmt] = []
         value = node.value
         reads_members = any(_reads_members(each) for each in parts)
-        if any(map(self._acts, parts)) or (reads_members and self._changes(value)):
-            # Python computes the value before the index.
+        if any(map(self._acts, (*parts, target.value))) or (reads_members and self._changes(value)):
+            # Python computes the value before the array and the index.
             name = f"rtcf_value_{node.lineno}_{node.col_offset}"
             before = [like(node, ast.Assign([ast.Name(name, ast.Store())], self.visit(value)))]
             value = like(node, ast.Name(name, ast.Load()))
@@ -845,6 +857,17 @@ class CommonRewriting(ast.NodeTransformer):
             and isinstance(node.value, ast.Name)
             and node.value.id == "self"
         )
+
+
+def _number_in(node: ast.Call) -> float | None:
+    """Return the value of `float("inf")`, or None."""
+    text = node.args[0] if len(node.args) == 1 and not node.keywords else None
+    if not isinstance(text, ast.Constant) or not isinstance(text.value, str):
+        return None
+    try:
+        return float(text.value)
+    except ValueError:
+        return None
 
 
 def _parts(node: ast.Subscript) -> list[ast.expr]:

@@ -16,7 +16,9 @@ from rtcf_compile.rewriting import helpers, numpy_functions, operators
 from rtcf_compile.rewriting.common_rewriting import ARENA, CommonRewriting
 from rtcf_compile.rewriting.logs import Logs
 from rtcf_compile.rewriting.methods import Method, Methods
+from rtcf_compile.rewriting.references import References
 from rtcf_compile.rewriting.rewrite import Hook
+from rtcf_compile.source import progress
 from rtcf_compile.source.checks import check, resolve
 from rtcf_compile.source.mistake import Mistake, at, written
 from rtcf_compile.source.modules import Source, is_own, read
@@ -74,6 +76,7 @@ class Functions:
                 "give members initial values, or set them in start",
             )
         found = {}
+        self._references = References(self.description, self._methods)
         for hook in HOOKS:
             method = self._methods.find(hook)
             if method is not None:
@@ -148,11 +151,13 @@ class Functions:
 
     def _method(self, source: Source, method: Method, is_hook: bool = False) -> FunctionType:
         function = source.function
+        progress.note(source.file, source.tree.lineno)
         check(source)
         self._begin(function, source)
         # Noted lines refer to one file: for a base's hook in another file, note the class's line.
         is_here = source.file == self.file()
         line = 0 if is_here or not is_hook else inspect.getsourcelines(self._cls)[1]
+        self._references.mark(source)
         hook = Hook(
             source, self.description, self._methods, method.owner, self.logs,
             operator_functions(function, self._narrow), is_here, line,
@@ -217,8 +222,10 @@ class Functions:
         if function in self._made:
             return self._made[function]
         source = read(function)
+        progress.note(source.file, source.tree.lineno)
         self._begin(function, source)
         check(source)
+        self._references.mark(source)
         rewriting = CommonRewriting(source, operator_functions(function, self._narrow))
         source.tree.body = rewriting.statements(source.tree.body)
         drop_types(source.tree)

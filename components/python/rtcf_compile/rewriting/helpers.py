@@ -247,6 +247,13 @@ def rtcf_view(array: Any) -> Any:
     return array
 
 
+def rtcf_copied(value: Any) -> Any:
+    """Return a value with its arrays copied; see references.py."""
+    if isinstance(value, tuple):
+        return tuple(map(rtcf_copied, value))
+    return value.copy() if isinstance(value, np.ndarray) else value
+
+
 def rtcf_store(target: Any, value: Any) -> None:
     """Set all elements of a member to a number or to an array of its shape."""
     if np.shape(value) not in (target.shape, ()):
@@ -391,6 +398,7 @@ BY_NAME = {
         *(
             rtcf_equal,
             rtcf_view,
+            rtcf_copied,
             rtcf_store,
             rtcf_maybe,
             rtcf_is_known,

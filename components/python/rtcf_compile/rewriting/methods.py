@@ -68,5 +68,6 @@ def _method(name: str, owner: type, place: int, value: Any) -> Method | None:
     if isinstance(value, staticmethod | classmethod | property | functools.cached_property):
         return Method(name, owner, place, type(value).__name__, None)
     if hasattr(value, "__wrapped__"):
-        return Method(name, owner, place, "decorated function", None)
+        decorator = type(value).__name__.strip("_").removesuffix("_wrapper")
+        return Method(name, owner, place, f"function with a decorator ({decorator})", None)
     return None

@@ -172,7 +172,8 @@ class Hook(Ports):
         """Rewrite `self.method(…)`, `self.x.write(…)`, `self.info(…)`, `self.fault(…)`."""
         called = node.func
         if isinstance(called, ast.Attribute) and self._is_self(called.value):
-            if called.attr in LOG_LEVELS:
+            is_log = called.attr in LOG_LEVELS and self._methods.find(called.attr) is None
+            if is_log:
                 arguments = [self.visit(each) for each in node.args[1:]]
                 number = self._logs.add(called.attr, node, self.source)
                 component = self._field("_component")
@@ -237,6 +238,8 @@ class Hook(Ports):
     def _named(self, node: ast.Expr, call: ast.Call) -> ast.stmt | None:
         """Return a log call of an enum's name as one call per name; None for other statements."""
         if not isinstance(call.func, ast.Attribute) or call.func.attr not in LOG_LEVELS:
+            return None
+        if self._methods.find(call.func.attr) is not None:
             return None
         for number, each in enumerate(call.args[1:]):
             if not isinstance(each, ast.Attribute) or each.attr != "name":
@@ -422,6 +425,9 @@ class Hook(Ports):
         member = self._description.members.get(name)
         if member is not None or name in self._description.constants:
             remedy = f"write self.{name}[0] for an element, * to multiply"
+            if member is not None and member.kind in PORTS:
+                of = {Output: "write(…)", Queue: "front"}.get(member.kind, "value")
+                remedy = f"write self.{name}.{of}"
             raise self.mistake(node, f"self.{name} is not a function", remedy)
         if name in HOOKS:
             remedy = "call a method that both hooks use"

@@ -4,15 +4,17 @@ The checks read syntax trees only; types are not known here.
 """
 
 import ast
+import difflib
 import enum
 import inspect
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import suppress
 from types import BuiltinFunctionType, FunctionType, ModuleType
 from typing import Any
 
 import numpy as np
+from rtcf.component.declaration import Declarable
 
 from rtcf_compile.source.assigned import check_assigned
 from rtcf_compile.source.mistake import Mistake, at
@@ -113,12 +115,20 @@ _MODULES = {
     "json": ("is not compiled", "read files at module level, at compile time"),
     "copy": ("is not compiled", "copy an array with x.copy(), a message with ="),
     "scipy": ("is not compiled", "compute constants at module level, write the rest with NumPy"),
-    "threading": ("the cycle has one thread", "keep it in a State"),
+    "threading": ("a component starts no threads", "compute it in update, a part in each cycle"),
+    "multiprocessing": (
+        "a component starts no processes",
+        "compute it in update, a part in each cycle",
+    ),
+    "concurrent": ("a component starts no threads", "compute it in update, a part in each cycle"),
     "asyncio": ("the cycle cannot wait", "keep the progress in a State"),
     "socket": ("calls the system", "use an Input or an Output; write device access in C++"),
     "subprocess": ("calls the system", "do it outside the loop"),
     "logging": ("formats and writes text", 'log with self.info("x {}", x)'),
     "rospy": ("is not real-time", "use an Input or an Output, which rtcf connects to ROS"),
+}
+_FUNCTIONS = {
+    "time.sleep": ("blocks the cycle", "keep the time of the next step in a State"),
 }
 # Decorators that leave the body of a function as it is.
 _DECORATORS = ("property", "staticmethod", "override", "final")
@@ -127,8 +137,8 @@ _COMPILED = ("builtins", "math", "numpy", "operator", "rtcf", "_operator")
 _LARGEST, _SMALLEST = 2**63 - 1, -(2**63)
 
 
-def check(source: Source) -> None:
-    """Raise Mistake for the first error in a function."""
+def check(source: Source, members: Collection[str] = ()) -> None:
+    """Raise Mistake for the first error in a function; `members`: the names in self."""
     tree, file = source.tree, source.file
     for each in tree.decorator_list:
         if ast.unparse(each).rpartition(".")[2] not in _DECORATORS:
@@ -160,7 +170,7 @@ def check(source: Source) -> None:
         if isinstance(node, ast.Attribute):
             _module(node, source)
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load) and node.id not in known:
-            raise at(file, node, f"{node.id} is not defined", "define it, or correct its name")
+            raise _undefined(node, source, members, known)
         if isinstance(node, ast.Raise):
             _raised(node, file)
         if isinstance(node, ast.Slice):
@@ -174,6 +184,22 @@ def check(source: Source) -> None:
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod) and _is_text(node.left):
             raise at(file, node, *_REFUSED[ast.JoinedStr])
     check_assigned(source)
+
+
+def _undefined(
+    node: ast.Name, source: Source, members: Collection[str], known: Collection[str]
+) -> Mistake:
+    name, tree = node.id, source.tree
+    given = ", ".join(["self", *(each.arg for each in tree.args.args)])
+    if name == "self":
+        return at(source.file, node, f"{tree.name} has no self", f"write def {tree.name}({given}):")
+    remedy = "define it, or correct its name"
+    if name in members:
+        remedy = f"write self.{name}"
+    elif near := difflib.get_close_matches(name, [*members, *known], 1, 0.75):
+        found = f"self.{near[0]}" if near[0] in members else near[0]
+        remedy = f"correct its name ({found}), or define it"
+    return at(source.file, node, f"{name} is not defined", remedy)
 
 
 def resolve(node: ast.AST, source: Source) -> Any:
@@ -281,7 +307,14 @@ def _called(node: ast.Call, target: Any, source: Source) -> None:
     if is_own(target):
         check_arguments(node, target, source.file)
         return
+    inner = getattr(target, "__wrapped__", getattr(target, "py_func", None))
+    if is_own(inner):
+        what = f"{name} has a decorator ({_kind_of(target)}), which is not compiled"
+        raise at(file, node, what, f"remove it from def {inner.__name__}")
     if isinstance(target, type):
+        if issubclass(target, Declarable):
+            what = f"{name} declares a member, which a hook cannot do"
+            raise at(file, node, what, f"write `name: {name}[float]` in the class")
         if hasattr(target, "_md5sum"):
             remedy = "set the fields of an Output: self.port.value.x = 1.0"
             raise at(file, node, "only an Output makes messages", remedy)
@@ -293,6 +326,8 @@ def _called(node: ast.Call, target: Any, source: Source) -> None:
     if isinstance(target, BuiltinFunctionType) and root in ("math", "builtins"):
         with suppress(ValueError):  # some builtins have no signature
             check_arguments(node, target, source.file)
+    if (full := f"{root}.{getattr(target, '__name__', '')}") in _FUNCTIONS:
+        raise at(file, node, *_FUNCTIONS[full])
     if root in _MODULES:
         raise at(file, node, *_MODULES[root])
     if isinstance(target, type):
@@ -304,6 +339,12 @@ def _called(node: ast.Call, target: Any, source: Source) -> None:
         raise at(
             file, node, f"{name} is not compiled", "write it with NumPy, or call it at module level"
         )
+
+
+def _kind_of(target: Any) -> str:
+    """Return the name of the decorator that made an object, if its class has it."""
+    module, kind = type(target).__module__.partition(".")[0], type(target).__name__
+    return module if module == "numba" else kind.strip("_").removesuffix("_wrapper")
 
 
 def check_arguments(
@@ -330,6 +371,18 @@ def check_arguments(
             else each
             for each in signature.parameters.values()
         ][given:]
+        if given and next(iter(signature.parameters), "self") != "self":
+            own: Any = function
+            name, words = (
+                own.__name__,
+                ", ".join(map(str, ("self", *signature.parameters.values()))),
+            )
+            raise Mistake(
+                own.__code__.co_filename,
+                own.__code__.co_firstlineno,
+                f"the first parameter of {name} is not self",
+                f"write def {name}({words}):",
+            ) from None
         name, words = ast.unparse(node.func), ", ".join(map(str, takes))
         what = f"{name} takes {words}" if words else f"{name} takes no arguments"
         raise at(file, node, what, f"write {name}({words})") from None

@@ -13,7 +13,7 @@ from typing import Any
 
 from rtcf.component import Component, DeclarationError
 
-from rtcf_compile.source import numpy_errors
+from rtcf_compile.source import numpy_errors, progress
 from rtcf_compile.source.mistake import Mistake, source_line
 from rtcf_compile.source.prefix_map import mapped
 
@@ -34,6 +34,7 @@ def load(file: Path) -> ModuleType:
         path = mapped(str(file)).encode()
     except UnicodeEncodeError:
         raise Mistake(str(file), 0, "its path is not UTF-8", "rename the file") from None
+    progress.note(str(file), 0)
     name = f"rtcf_source_{hashlib.sha256(path).hexdigest()[:8]}_{file.stem}"
     linecache.checkcache(str(file))
     spec = importlib.util.spec_from_file_location(name, file)

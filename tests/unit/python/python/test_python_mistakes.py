@@ -143,7 +143,7 @@ IN_UPDATE = {
     "constant filled": ("A.fill(0.0)", "a constant of the module is set"),
     "constant changed in place": (
         "a = A\n        a += 1.0",
-        "a constant of the module is set",
+        "a constant of the module",
     ),
     "number among rows": ("a = np.array([self.z, 1.0])", "an array of arrays and numbers"),
     "new axis of a matrix": ("a = A[None]", "a new axis of a matrix"),

@@ -1,0 +1,44 @@
+"""Runs rtcf-compile in a child process, so that a crash of the compiler is an error in one line."""
+
+import mmap
+import os
+import signal
+import sys
+
+from rtcf_compile.main import REFUSED, main
+from rtcf_compile.source import progress
+from rtcf_compile.source.mistake import Mistake
+
+
+def guarded() -> int:
+    """Run the command; return its exit code."""
+    with mmap.mmap(-1, progress.BYTES) as shared:
+        child = os.fork()
+        if child == 0:
+            progress.note_in(shared)
+            status = REFUSED
+            try:
+                status = main()
+            except SystemExit as end:
+                status = end.code if isinstance(end.code, int) else REFUSED
+            finally:
+                sys.stdout.flush()
+                sys.stderr.flush()
+                os._exit(status)
+        status = _end_of(child)
+        if status >= 0:
+            return status
+        file, line = progress.noted(shared)
+        what = f"the compiler ended with {signal.Signals(-status).name}"
+        mistake = Mistake(file, line, what, "write it in another way, and report this")
+        print(f"rtcf-compile: {mistake}", file=sys.stderr)
+        return REFUSED
+
+
+def _end_of(child: int) -> int:
+    """Wait for a child, which a Ctrl-C ends, too; return its exit code."""
+    while True:
+        try:
+            return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+        except KeyboardInterrupt:
+            continue

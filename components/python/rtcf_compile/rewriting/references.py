@@ -1,0 +1,1155 @@
+"""Finds where compiled code must copy an array to give the results of NumPy.
+
+In NumPy, `self.a = value` binds the name to another array. Compiled, a member has one place in
+memory, and the assignment copies the value there. Both agree unless a reference to the old array is
+read afterwards, such as `old` in `old = self.a; self.a = 2 * self.a; self.a - old`.
+
+This follows references through the hooks of a class, as NumPy binds them and as compiled code
+places them: a reference is a pair of the array in NumPy (`thing`) and its memory in the component
+(`place`). It finds, until nothing changes, the expressions whose values must be copied, so that no
+reference that is read later has its place overwritten. It rejects a change of an array's elements
+if another reference means the same array in NumPy, but another place.
+
+The method is a points-to analysis with strong updates and recency (Balakrishnan and Reps, 2006):
+types are not known here, so that any value may be an array unless its declaration is known.
+"""
+
+import ast
+from collections.abc import Callable, Iterator, Sequence
+from types import CodeType
+from typing import Any, NamedTuple
+
+import numpy as np
+from rtcf.component.declaration import (
+    HOOKS,
+    PORTS,
+    Derived,
+    Description,
+    Member,
+    Output,
+    Parameter,
+    State,
+)
+
+from rtcf_compile.rewriting.live_names import LiveNames
+from rtcf_compile.rewriting.methods import Method, Methods
+from rtcf_compile.source.checks import check, resolve
+from rtcf_compile.source.mistake import at
+from rtcf_compile.source.modules import Source, is_own, read
+
+# The name of an array, or of a place: its kind and what tells it from others of the kind.
+Name = tuple[Any, ...]
+# The place of an expression in a function, or the name of a parameter of the function.
+Key = tuple[int, int, int, int] | str
+Site = tuple[CodeType, Key]
+
+
+class Ref(NamedTuple):
+    """A reference to an array or to a part of one."""
+
+    thing: Name  # the array in NumPy
+    place: Name  # its memory in the component
+    site: Site | None  # the expression that can be copied: a value, or an operand
+    is_whole: bool = True
+    dimensions: int | None = None
+    bound: Site | None = None  # the value to which a variable was bound
+    is_read_only: bool = False  # in NumPy
+
+
+Refs = frozenset[Ref]
+# What an expression may refer to. A tuple keeps its elements apart.
+Value = Refs | tuple["Value", ...]
+# A variable: a member, ("self", name); a local variable, (depth of calls, name); or a value that an
+# expression holds while the rest of it is computed, ("held", number).
+Cell = tuple[Any, Any]
+Bindings = dict[Cell, Value]
+
+NOTHING: Refs = frozenset()
+# A new array that compiled code may compute as late as the expression that contains it.
+_RESULT = ("result",)
+_UNCHANGED = ("input", "read-only")  # places that a hook does not change
+_MOST_STATES = 12  # different bindings at one place, before they are merged
+
+# Functions and methods whose result refers to their first argument, in NumPy.
+_SAME = (np.asarray, np.ascontiguousarray)
+_VIEWS = (np.reshape, np.ravel, np.transpose, np.flip, np.squeeze, np.flipud, np.fliplr)
+_VIEW_METHODS = ("reshape", "ravel", "transpose", "squeeze", "view", "swapaxes")
+_VIEW_ATTRIBUTES = ("T", "real", "flat")
+# Views in NumPy, copies in compiled code.
+_DIAGONALS, _DIAGONAL_METHODS = (np.diag, np.diagonal), ("diagonal",)
+_CHANGING_METHODS = ("fill", "sort", "partition", "put", "itemset")
+_ITERATORS = (enumerate, zip, reversed, iter)
+_TUPLES = (tuple, list)
+
+
+class References:
+    """The copies that the functions of a component need."""
+
+    def __init__(self, description: Description, methods: Methods) -> None:
+        """Follow the hooks of a class; raise Mistake for a change that would differ."""
+        self.copies: set[Site] = set()
+        found = -1
+        while len(self.copies) > found:
+            found = len(self.copies)
+            _Followed(description, methods, self.copies).hooks()
+
+    def mark(self, source: Source) -> None:
+        """Mark the expressions of a function that must be copied, see `is_copied`."""
+        code = source.function.__code__
+        keys = {key for owner, key in self.copies if owner is code}
+        if not keys:
+            return
+        for node in ast.walk(source.tree):
+            if isinstance(node, ast.expr) and key_of(node) in keys:
+                vars(node)["rtcf_is_copied"] = True
+        source.tree.body[:0] = [
+            ast.parse(f"{name} = rtcf_copied({name})").body[0]
+            for name in sorted(each for each in keys if isinstance(each, str))
+        ]
+        for each in source.tree.body:
+            if not hasattr(each, "end_lineno"):
+                ast.copy_location(each, source.tree)
+
+
+def is_copied(node: ast.AST) -> bool:
+    """Tell whether the value of an expression must be copied."""
+    return "rtcf_is_copied" in vars(node)
+
+
+def key_of(node: ast.expr) -> Key:
+    """Return the place of an expression in its function."""
+    end = (node.end_lineno or node.lineno, node.end_col_offset or 0)
+    return node.lineno, node.col_offset, *end
+
+
+def _flat(value: Value) -> Refs:
+    """Return all references of a value."""
+    if isinstance(value, frozenset):
+        return value
+    return frozenset(ref for each in value for ref in _flat(each))
+
+
+def _computed(value: Value) -> Value:
+    """Return a value without references that only its computation reads."""
+    if isinstance(value, frozenset):
+        return frozenset(each for each in value if each.thing != _RESULT)
+    return tuple(map(_computed, value))
+
+
+def _mapped(value: Value, change: Callable[[Ref], Ref]) -> Value:
+    """Return a value with changed references."""
+    if isinstance(value, frozenset):
+        return frozenset(map(change, value))
+    return tuple(_mapped(each, change) for each in value)
+
+
+def _either(one: Value, other: Value) -> Value:
+    """Return the references of one value or the other."""
+    if isinstance(one, tuple) and isinstance(other, tuple) and len(one) == len(other):
+        return tuple(_either(*pair) for pair in zip(one, other, strict=True))
+    return _flat(one) | _flat(other)
+
+
+def _merged(states: Sequence[Bindings]) -> Bindings:
+    """Return bindings that may be those of any of the states."""
+    result: Bindings = {}
+    for cell in {cell: None for state in states for cell in state}:
+        # A member without a binding refers to its array of the beginning.
+        missing = _begin(cell) if cell[0] == "self" else NOTHING
+        result[cell] = states[0].get(cell, missing)
+        for state in states[1:]:
+            result[cell] = _either(result[cell], state.get(cell, missing))
+    return result
+
+
+def _plain(state: Bindings) -> Bindings:
+    """Return bindings without those of members that share no array: they are as at the beginning.
+    Different ways to the same bindings become the same.
+    """
+    owners: dict[Name, set[Cell]] = {}
+    for cell, value in state.items():
+        for ref in _flat(value):
+            owners.setdefault(ref.thing, set()).add(cell)
+    result: Bindings = {}
+    for cell, value in state.items():
+        is_alone = cell[0] == "self" and all(
+            owners[ref.thing] == {cell} and ref.thing[0] != "read-only" and not ref.is_read_only
+            for ref in _flat(value)
+        )
+        if not is_alone:
+            result[cell] = value
+        elif owners.get(("begin", cell[1]), set()) - {cell}:
+            result[cell] = frozenset({Ref(("own", cell[1]), cell, None)})
+    return result
+
+
+def _begin(cell: Cell) -> Refs:
+    return frozenset({Ref(("begin", cell[1]), cell, None)})
+
+
+class _States:
+    """Different bindings at one place, merged if they become many."""
+
+    def __init__(self) -> None:
+        self._seen: set[frozenset[tuple[Cell, Value]]] = set()
+        self.all: list[Bindings] = []
+
+    def add(self, states: Sequence[Bindings]) -> list[Bindings]:
+        """Add bindings; return those that are new."""
+        new: list[Bindings] = []
+        for each in map(_plain, states):
+            frozen = frozenset(each.items())
+            if frozen not in self._seen:
+                self._seen.add(frozen)
+                new.append(each)
+                self.all.append(each)
+        if len(self.all) <= _MOST_STATES:
+            return new
+        merged = _merged(self.all)
+        self.all, frozen = [merged], frozenset(merged.items())
+        if frozen in self._seen and not new:
+            return []
+        self._seen.add(frozen)
+        return [merged]
+
+
+def _distinct(states: Sequence[Bindings]) -> list[Bindings]:
+    found = _States()
+    found.add(states)
+    return found.all
+
+
+class _Frame:
+    """A call of a function."""
+
+    def __init__(self, source: Source, own: str, depth: int) -> None:
+        """`own`: the name of self, or empty."""
+        self.source, self.own, self.depth = source, own, depth
+        self.names = LiveNames(source.tree)
+        self.live: frozenset[str] = frozenset()
+        self.returned: list[tuple[Bindings, Value]] = []
+        self.breaks: list[list[Bindings]] = []
+        self.continues: list[list[Bindings]] = []
+        # A call that is a statement, and the bindings at its ends.
+        self.statement: ast.expr | None = None
+        self.ends: list[Bindings] | None = None
+
+
+class _Followed:
+    """One pass through the hooks of a class."""
+
+    def __init__(self, description: Description, methods: Methods, copies: set[Site]) -> None:
+        self._members, self._constants = description.members, description.constants
+        self._methods, self._copies = methods, copies
+        self._names = {*description.members, *description.constants, *methods.names()}
+        self._frames: list[_Frame] = []
+        self._sources: dict[CodeType, Source] = {}
+        self._owners: list[type] = []
+        # How a binding is written: line, name and expression.
+        self._written: dict[Site, tuple[int, str, str]] = {}
+
+    def hooks(self) -> None:
+        """Follow prepare and start, then update and safe until their bindings repeat."""
+        begin: Bindings = {}
+        self._hook("prepare", [begin])
+        states = _States()
+        new = states.add([begin])
+        while new:
+            ends = [
+                self._between(each)
+                for hook in HOOKS
+                if hook != "prepare"
+                for each in self._hook(hook, new)
+            ]
+            new = states.add(ends)
+
+    def _hook(self, name: str, states: list[Bindings]) -> list[Bindings]:
+        method = self._methods.find(name)
+        if method is None or method.function is None:
+            return []
+        return [end for each in states for end, _ in self._call(method, [], {}, each)]
+
+    def _between(self, state: Bindings) -> Bindings:
+        """Return bindings of members after a hook, with names that do not grow from cycle to
+        cycle: an array is named after the members that it belongs to.
+        """
+        members = {cell: value for cell, value in state.items() if cell[0] == "self"}
+        owners: dict[Name, set[str]] = {}
+        for (_, name), value in members.items():
+            for ref in _flat(value):
+                owners.setdefault(ref.thing, set()).add(name)
+        return _plain(
+            {
+                cell: _mapped(value, lambda ref: _renamed_after(ref, owners[ref.thing]))
+                for cell, value in members.items()
+            }
+        )
+
+    # Calls.
+
+    def _source(self, function: Any) -> Source:
+        """Return the source of a function, read once: nodes are compared by identity."""
+        code = function.__code__
+        if code not in self._sources:
+            self._sources[code] = read(function)
+            check(self._sources[code], self._names)
+        return self._sources[code]
+
+    def _call(
+        self, method: Method, values: list[Value], named: dict[str, Value], state: Bindings
+    ) -> list[tuple[Bindings, Value]]:
+        """Follow a method; return the bindings at its ends and what it may return there."""
+        if method.function is None:
+            return []
+        self._owners.append(method.owner)
+        try:
+            has_self = method.kind != "static method"
+            return self._function(method.function, values, named, state, has_self)
+        finally:
+            self._owners.pop()
+
+    def _function(
+        self,
+        function: Any,
+        values: list[Value],
+        named: dict[str, Value],
+        state: Bindings,
+        has_self: bool = False,
+    ) -> list[tuple[Bindings, Value]]:
+        code = function.__code__
+        if any(each.source.function.__code__ is code for each in self._frames):
+            return []  # a function that calls itself is rejected
+        source = self._source(function)
+        given = [each.arg for each in (*source.tree.args.posonlyargs, *source.tree.args.args)]
+        if has_self and not given:
+            return []  # rejected
+        frame = _Frame(source, given[0] if has_self else "", len(self._frames))
+        self._frames.append(frame)
+        names = given[1:] if has_self else given
+        frame.live = frozenset(names)
+        state = dict(state)
+        for name, value in (*zip(names, values, strict=False), *named.items()):
+            self._bind((frame.depth, name), value, (code, name), state, f"{name}", None)
+        ends = self._statements(source.tree.body, [state])
+        self._frames.pop()
+        returned = [*frame.returned, *((each, NOTHING) for each in ends)]
+        return [(_outside(each, frame.depth), value) for each, value in returned]
+
+    @property
+    def _frame(self) -> _Frame:
+        return self._frames[-1]
+
+    # Statements.
+
+    def _statements(self, body: Sequence[ast.stmt], states: Sequence[Bindings]) -> list[Bindings]:
+        current = list(states)
+        for node in body:
+            after = [end for each in current for end in self._statement(node, dict(each))]
+            live = self._frame.names.after(node)
+            depth = self._frame.depth
+            current = _distinct(
+                [
+                    {
+                        cell: value
+                        for cell, value in each.items()
+                        if cell[0] != depth or cell[1] in live
+                    }
+                    for each in after
+                ]
+            )
+        return current
+
+    def _statement(self, node: ast.stmt, state: Bindings) -> list[Bindings]:
+        """Follow a statement; return the bindings after it, none if it never ends here."""
+        frame = self._frame
+        frame.live = frame.names.during(node)
+        if isinstance(node, ast.Assign):
+            self._assign(node, state)
+        elif isinstance(node, ast.AnnAssign):
+            if node.value is not None:
+                value = self._value(node.value, state)
+                frame.live = frame.names.after(node)
+                self._set(node.target, value, node.value, state)
+        elif isinstance(node, ast.AugAssign):
+            self._change(node, state)
+        elif isinstance(node, ast.Return):
+            value = self._value(node.value, state) if node.value is not None else NOTHING
+            frame.returned.append((state, _computed(value)))
+            return []
+        elif isinstance(node, ast.Raise):
+            return []
+        elif isinstance(node, ast.Break):
+            frame.breaks[-1].append(state)
+            return []
+        elif isinstance(node, ast.Continue):
+            frame.continues[-1].append(state)
+            return []
+        elif isinstance(node, ast.If):
+            self._value(node.test, state)
+            return [
+                *self._statements(node.body, [dict(state)]),
+                *self._statements(node.orelse, [state]),
+            ]
+        elif isinstance(node, ast.While):
+            return self._loop(node, state)
+        elif isinstance(node, ast.For):
+            return self._for(node, state)
+        elif isinstance(node, ast.Match):
+            return self._match(node, state)
+        elif isinstance(node, ast.Expr):
+            frame.statement, frame.ends = node.value, None
+            self._value(node.value, state)
+            return [state] if frame.ends is None else frame.ends
+        else:
+            for each in ast.iter_child_nodes(node):
+                if isinstance(each, ast.expr):
+                    self._value(each, state)
+        return [state]
+
+    def _loop(
+        self, node: ast.While | ast.For, state: Bindings, next_value: Value | None = None
+    ) -> list[Bindings]:
+        frame = self._frame
+        frame.breaks.append([])
+        frame.continues.append([])
+        states, ended = _States(), []
+        new = states.add([state])
+        while new:
+            begins = []
+            for each in [dict(state) for state in new]:
+                frame.live = frame.names.during(node)
+                if isinstance(node, ast.While):
+                    self._value(node.test, each)
+                ended.append(dict(each))
+                if isinstance(node, ast.For):
+                    assert next_value is not None
+                    self._set(node.target, next_value, node.iter, each, is_new=False)
+                begins.append(each)
+            ends = self._statements(node.body, begins)
+            new = states.add([*ends, *frame.continues[-1]])
+        frame.continues.pop()
+        left = frame.breaks.pop()
+        if isinstance(node, ast.While) and _is_true(node.test):
+            return left
+        return [*self._statements(node.orelse, _distinct(ended)), *left]
+
+    def _for(self, node: ast.For, state: Bindings) -> list[Bindings]:
+        iterated = self._value(node.iter, state)
+        held = self._hold(iterated, node.iter, state)
+        value = _elements(iterated)
+        ends = self._loop(node, state, value)
+        for each in ends:
+            each.pop(held, None)
+        return ends
+
+    def _match(self, node: ast.Match, state: Bindings) -> list[Bindings]:
+        subject = self._value(node.subject, state)
+        ends: list[Bindings] = []
+        for case in node.cases:
+            inside = dict(state)
+            for each in ast.walk(case.pattern):
+                if isinstance(each, ast.MatchAs | ast.MatchStar) and each.name:
+                    cell = (self._frame.depth, each.name)
+                    self._bind(cell, _flat(subject), self._site(node.subject), inside, each.name,
+                               node.subject)  # fmt: skip
+            if case.guard is not None:
+                self._frame.live = self._frame.names.during(node)
+                self._value(case.guard, inside)
+            ends += self._statements(case.body, [inside])
+        return [*ends, state]
+
+    def _assign(self, node: ast.Assign, state: Bindings) -> None:
+        frame, target = self._frame, node.targets[0]
+        lists = (ast.Tuple, ast.List)
+        if (
+            isinstance(node.value, lists)
+            and isinstance(target, lists)
+            and len(node.targets) == 1
+            and len(target.elts) == len(node.value.elts)
+        ):
+            # All values are computed before the first is set.
+            values, held = [], []
+            for each in node.value.elts:
+                values.append(self._value(each, state))
+                held.append(self._hold(values[-1], each, state))
+            frame.live = frame.names.after(node)
+            for part, each, cell in zip(target.elts, node.value.elts, held, strict=True):
+                value = state.pop(cell)
+                self._set(part, value, each, state)
+            return
+        value = self._value(node.value, state)
+        if len(node.targets) > 1 and not _flat(_computed(value)):
+            value = self._fresh(node.value, self._site(node.value), state)
+        frame.live = frame.names.after(node) | frozenset(
+            name for each in node.targets for name in _names(each)
+        )
+        cell = self._hold(value, node.value, state)
+        for each in node.targets:
+            self._set(each, state[cell], node.value, state)
+        del state[cell]
+
+    def _set(
+        self,
+        target: ast.expr,
+        value: Value,
+        given: ast.expr,
+        state: Bindings,
+        is_new: bool = True,
+    ) -> None:
+        """Follow the assignment of a value to a target; `given`: the expression of the value.
+
+        `is_new`: a value without references may be a new array.
+        """
+        frame = self._frame
+        if isinstance(target, ast.Name):
+            cell = (frame.depth, target.id)
+            self._bind(cell, value, self._site(given), state, target.id, given, is_new)
+        elif isinstance(target, ast.Tuple | ast.List):
+            parts: Sequence[Value] = [_elements(value)] * len(target.elts)
+            if isinstance(value, tuple) and len(value) == len(target.elts):
+                parts = value
+            for each, part in zip(target.elts, parts, strict=True):
+                self._set(each, part, given, state, is_new)
+        elif isinstance(target, ast.Subscript):
+            base = self._value(target.value, state)
+            held = self._hold(base, target.value, state, may_copy=False)
+            self._value(target.slice, state)
+            base = state.pop(held)
+            self._changed(_flat(base), self._cell(target.value, state), target, state)
+        elif isinstance(target, ast.Attribute):
+            if (name := self._member_name(target)) is not None:
+                self._store(name, value, given, ast.unparse(target), target, state)
+            elif (path := self._message_path(target, state)) is not None:
+                self._write_message(path, target, state)
+            else:
+                self._value(target.value, state)
+
+    def _change(self, node: ast.AugAssign, state: Bindings) -> None:
+        """Follow `target += value`."""
+        frame, target = self._frame, node.target
+        if isinstance(target, ast.Subscript):
+            base = self._value(target.value, state)
+            held = self._hold(base, target.value, state, may_copy=False)
+            self._value(target.slice, state)
+            self._value(node.value, state)
+            frame.live = frame.names.after(node)
+            self._changed(_flat(state.pop(held)), self._cell(target.value, state), target, state)
+            return
+        value = self._value(target, state)
+        held = self._hold(value, target, state)
+        self._value(node.value, state)
+        value = state.pop(held)
+        frame.live = frame.names.after(node)
+        if not _flat(value):
+            if isinstance(target, ast.Name):
+                state.pop((frame.depth, target.id), None)
+            return
+        self._changed(_flat(value), self._cell(target, state), target, state)
+        if (name := self._member_name(target)) is not None:
+            state["self", name] = self._placed(value, name)
+
+    # Bindings.
+
+    def _site(self, node: ast.expr) -> Site:
+        return self._frame.source.function.__code__, key_of(node)
+
+    def _hold(self, value: Value, node: ast.expr, state: Bindings, may_copy: bool = True) -> Cell:
+        """Hold the value of an operand while the rest of an expression is computed."""
+        others = (name[1] for kind, name in state if kind == "held")
+        cell = ("held", (self._frame.depth, max(others, default=0) + 1))
+        site = self._site(node) if may_copy else None
+        if site is not None:
+            self._written.setdefault(site, (node.lineno, "", ast.unparse(node)))
+        self._bound(cell, value, site, state)
+        return cell
+
+    def _bind(
+        self,
+        cell: Cell,
+        value: Value,
+        site: Site,
+        state: Bindings,
+        name: str,
+        given: ast.expr | None,
+        is_new: bool = True,
+    ) -> None:
+        """Bind a variable."""
+        value = _computed(value)
+        if given is not None:
+            self._written[site] = (given.lineno, name, ast.unparse(given))
+        elif site not in self._written:
+            self._written[site] = (self._frame.source.tree.lineno, name, name)
+        if value == NOTHING and given is not None and is_new:
+            value = self._fresh(given, site, state)
+        self._bound(cell, value, site, state)
+
+    def _bound(self, cell: Cell, value: Value, site: Site | None, state: Bindings) -> None:
+        is_variable = cell[0] != "held"
+        if site in self._copies:
+            copied = ("copy", site)
+            self._renamed(copied, ("old", copied), state)
+            value = _mapped(value, lambda ref: ref._replace(place=copied))
+        state[cell] = _mapped(
+            value,
+            lambda ref: ref._replace(site=site, bound=site if is_variable else ref.bound),
+        )
+
+    def _fresh(self, given: ast.expr, site: Site, state: Bindings) -> Refs:
+        """Return a reference to the new array that an expression may make."""
+        if isinstance(given, ast.Constant | ast.Compare | ast.BoolOp):
+            return NOTHING
+        new = ("new", site)
+        self._renamed(new, ("old", new), state)
+        return frozenset({Ref(new, new, site)})
+
+    def _renamed(self, name: Name, new: Name, state: Bindings) -> None:
+        """Rename the arrays and places that an expression made before."""
+
+        def change(ref: Ref) -> Ref:
+            if ref.thing == name:
+                ref = ref._replace(thing=new)
+            return ref._replace(place=new) if ref.place == name else ref
+
+        for cell, value in state.items():
+            if any(name in (ref.thing, ref.place) for ref in _flat(value)):
+                state[cell] = _mapped(value, change)
+
+    def _live(self, state: Bindings) -> Iterator[tuple[Cell, Ref]]:
+        """Yield the references that are read later, perhaps."""
+        for cell, value in state.items():
+            kind, name = cell
+            if isinstance(kind, int) and name not in self._frames[kind].live:
+                continue
+            for ref in _flat(value):
+                yield cell, ref
+
+    def _placed(self, value: Value, name: str) -> Refs:
+        """Return references to the same arrays in the place of a member."""
+        return frozenset(
+            each._replace(place=("self", name), dimensions=None) for each in _flat(value)
+        )
+
+    def _store(
+        self,
+        name: str,
+        value: Value,
+        given: ast.expr,
+        target: str,
+        node: ast.AST,
+        state: Bindings,
+        is_copy: bool = False,
+    ) -> None:
+        """Follow `self.name = value`. `is_copy`: it is a new array also in NumPy."""
+        if not self._is_array(name):
+            return
+        place, refs, site = ("self", name), _flat(_computed(value)), self._site(given)
+        self._written[site] = (given.lineno, target, ast.unparse(given))
+        now = self._of_member(name, state)
+        things = {ref.thing for ref in now}
+        if (
+            refs
+            and not is_copy
+            and all(ref.place == place and ref.is_whole and ref.thing in things for ref in refs)
+        ):
+            return  # the member itself
+        self._overwritten(place, node, state)
+        if isinstance(given, ast.Constant) and given.value is None:
+            state["self", name] = NOTHING
+            return
+        if is_copy or not refs:
+            new = ("new", site)
+            self._renamed(new, ("old", new), state)
+            refs = frozenset({Ref(new, place, site)})
+        refs = frozenset(ref._replace(site=site, bound=site) for ref in refs)
+        state["self", name] = self._placed(refs, name)
+
+    def _overwritten(self, place: Name, node: ast.AST, state: Bindings) -> None:
+        """Copy the references whose place gets another array."""
+        for cell, ref in self._live(state):
+            if ref.place == place and cell != place:
+                self._copy(ref, node)
+
+    def _copy(self, ref: Ref, node: ast.AST) -> None:
+        if ref.site is None:
+            raise at(
+                self._frame.source.file, node,
+                "the array is replaced while it is changed",
+                "call the method in a statement before",
+            )  # fmt: skip
+        self._copies.add(ref.site)
+
+    def _changed(self, refs: Refs, own: Cell | None, node: ast.AST, state: Bindings) -> None:
+        """Follow a change of elements; `own`: the variable through which they are changed."""
+        for ref in refs:
+            kind = ref.place[0]
+            if ref.thing[0] == "read-only" and ref.place != ref.thing:
+                self._reject(own, ref, None, ref, node, state)
+            # A direct change, such as `self.u.value[0] = 1`, is rejected elsewhere.
+            if kind == "input" and ref.bound is not None:
+                self._copies.add(ref.bound)
+            if ref.is_read_only:
+                what = f"{self._named(own)} is a read-only view in NumPy"
+                raise self._mistake(node, what, self._as_copy(*self._of(own, state), ref))
+            if kind == "read-only" and ref.bound is not None:
+                _, name, kind = ref.place
+                raise self._mistake(node, f"changes {name}, {kind}", self._as_copy(ref))
+            for cell, other in list(self._live(state)):
+                if cell == own:
+                    continue
+                if other.thing == ref.thing and other.place != ref.place:
+                    self._reject(own, ref, cell, other, node, state)
+                if other.place == ref.place and other.thing != ref.thing and cell[0] == "held":
+                    self._copy(other, node)
+
+    def _reject(
+        self,
+        own: Cell | None,
+        ref: Ref,
+        cell: Cell | None,
+        other: Ref,
+        node: ast.AST,
+        state: Bindings,
+    ) -> None:
+        one, two = self._named(own), self._named(cell)
+        if cell is None:
+            two = other.thing[1]
+        raise self._mistake(
+            node,
+            f"{one} and {two} are the same array in NumPy, and this changes both",
+            self._as_copy(other, *self._of(own, state), ref),
+        )
+
+    def _of(self, cell: Cell | None, state: Bindings) -> Refs:
+        return NOTHING if cell is None else _flat(state.get(cell, NOTHING))
+
+    def _as_copy(self, *refs: Ref) -> str:
+        """Return how to write one of the bindings as a copy."""
+        known = [self._written[each.bound] for each in refs if each.bound in self._written]
+        for line, name, text in known:
+            if name and name != text:
+                return f"write {name} = {text}.copy() in line {line}"
+        for line, _, text in known:
+            return f"write {text}.copy() in line {line}"
+        return "copy one of them: .copy()"
+
+    def _named(self, cell: Cell | None) -> str:
+        if cell is None or cell[0] == "held":
+            return "a value of this expression"
+        return f"self.{cell[1]}" if cell[0] == "self" else str(cell[1])
+
+    def _mistake(self, node: ast.AST, what: str, remedy: str) -> Exception:
+        return at(self._frame.source.file, node, what, remedy)
+
+    # Members.
+
+    def _is_self(self, node: ast.AST) -> bool:
+        return isinstance(node, ast.Name) and bool(node.id) and node.id == self._frame.own
+
+    def _member(self, node: ast.AST) -> Member | None:
+        if isinstance(node, ast.Attribute) and self._is_self(node.value):
+            return self._members.get(node.attr)
+        return None
+
+    def _member_name(self, node: ast.AST) -> str | None:
+        """Return the name of a State or Derived member that an expression is."""
+        member = self._member(node)
+        return member.name if member is not None and member.kind in (State, Derived) else None
+
+    def _message_path(self, node: ast.AST, state: Bindings) -> str | None:
+        """Return `port.value.path` of a part of a message."""
+        names: list[str] = []
+        while isinstance(node, ast.Attribute):
+            member = self._member(node)
+            if member is not None:
+                is_message = member.message and names and names[-1] == "value"
+                return ".".join((member.name, *reversed(names))) if is_message else None
+            names.append(node.attr)
+            node = node.value
+        if isinstance(node, ast.Name) and names:
+            for ref in _flat(state.get((self._frame.depth, node.id), NOTHING)):
+                if ref.thing[0] == "message":
+                    return ".".join((ref.thing[1], *reversed(names)))
+        return None
+
+    def _write_message(self, path: str, node: ast.AST, state: Bindings) -> None:
+        """Follow an assignment to a part of a message, which copies."""
+        for cell in [each for each in state if each[0] == "self"]:
+            if f"{cell[1]}.".startswith(f"{path}.") or f"{path}.".startswith(f"{cell[1]}."):
+                self._overwritten(cell, node, state)
+                del state[cell]
+        for cell, ref in self._live(state):
+            if ref.place[0] == "self":
+                name = str(ref.place[1])
+                if f"{name}.".startswith(f"{path}.") and cell != ref.place:
+                    self._copy(ref, node)
+
+    def _dimensions(self, name: str) -> int | None:
+        member = self._members.get(name)
+        return len(member.type.shape) if member is not None and not member.message else None
+
+    def _is_array(self, name: str) -> bool:
+        return self._dimensions(name) != 0
+
+    def _of_member(self, name: str, state: Bindings) -> Refs:
+        """Return the array that a member, or a part of an output's message, is bound to."""
+        if not self._is_array(name):
+            return NOTHING
+        cell = ("self", name)
+        if cell not in state:
+            state[cell] = _begin(cell)
+        dimensions = self._dimensions(name)
+        return frozenset(each._replace(dimensions=dimensions) for each in _flat(state[cell]))
+
+    def _cell(self, node: ast.expr, state: Bindings) -> Cell | None:
+        """Return the variable of the array that an element or a view belongs to."""
+        while isinstance(node, ast.Subscript):
+            node = node.value
+        if isinstance(node, ast.Name):
+            return self._frame.depth, node.id
+        if (name := self._member_name(node)) is not None:
+            return "self", name
+        if isinstance(node, ast.Attribute) and node.attr == "value":
+            port = self._member(node.value)
+            return ("self", port.name) if port is not None else None
+        path = self._message_path(node, state)
+        return None if path is None else ("self", path)
+
+    # Expressions.
+
+    def _value(self, node: ast.expr, state: Bindings) -> Value:
+        """Follow an expression; return what it may refer to."""
+        if isinstance(node, ast.Name):
+            if self._is_self(node):
+                return NOTHING
+            if node.id in self._frame.source.function.__code__.co_varnames:
+                return state.get((self._frame.depth, node.id), NOTHING)
+            return self._constant(resolve(node, self._frame.source), node)
+        if isinstance(node, ast.Constant):
+            return NOTHING
+        if isinstance(node, ast.Tuple | ast.List):
+            return self._operands(node.elts, state)
+        if isinstance(node, ast.NamedExpr):
+            value = self._value(node.value, state)
+            self._set(node.target, value, node.value, state)
+            return value
+        if isinstance(node, ast.IfExp):
+            self._value(node.test, state)
+            other = dict(state)
+            value = _either(self._value(node.body, state), self._value(node.orelse, other))
+            merged = _merged([state, other])
+            state.update(merged)
+            return value
+        if isinstance(node, ast.Attribute):
+            return self._attribute(node, state)
+        if isinstance(node, ast.Subscript):
+            return self._subscript(node, state)
+        if isinstance(node, ast.Call):
+            return self._called(node, state)
+        if isinstance(node, ast.BoolOp):
+            found = self._value(node.values[0], state)
+            for each in node.values[1:]:
+                before = dict(state)  # the operand may not be computed
+                found = _either(found, self._value(each, state))
+                state.update(_merged([state, before]))
+            return found
+        parts = [each for each in ast.iter_child_nodes(node) if isinstance(each, ast.expr)]
+        return self._lazy(self._operands(parts, state))
+
+    def _operands(self, nodes: Sequence[ast.expr], state: Bindings) -> Value:
+        """Follow operands in order; each is held until the last is computed."""
+        cells: list[Cell] = []
+        for each in nodes:
+            value = self._value(each, state)
+            cells.append(self._hold(value, each, state))
+        return tuple(state.pop(each) for each in cells)
+
+    def _lazy(self, value: Value) -> Value:
+        """Return the result of an operation: a new array, which compiled code may compute from its
+        operands as late as the whole expression.
+        """
+        return frozenset(
+            Ref(_RESULT, ref.place, None, False)
+            for ref in _flat(value)
+            if ref.place[0] not in _UNCHANGED
+        )
+
+    def _constant(self, value: Any, node: ast.expr) -> Refs:
+        if not isinstance(value, np.ndarray):
+            return NOTHING
+        place = ("read-only", ast.unparse(node), "a constant of the module")
+        return frozenset({Ref(place, place, None, True, value.ndim)})
+
+    def _attribute(self, node: ast.Attribute, state: Bindings) -> Value:
+        member = self._member(node)
+        if member is not None:
+            return self._read(member, state)
+        if self._is_self(node.value):
+            if node.attr in self._constants:
+                return self._constant(self._constants[node.attr], node)
+            method = self._methods.find(node.attr)
+            if method is not None and method.kind == "property":
+                return self._own_call(method, [], {}, node, state)
+            return NOTHING
+        if _is_super(node.value):
+            method = self._methods.find(node.attr, behind=self._owners[-1])
+            if method is not None and method.kind == "property":
+                return self._own_call(method, [], {}, node, state)
+            return NOTHING
+        port = self._member(node.value)
+        if port is not None and port.kind in PORTS:
+            return self._port(port, node, state)
+        if (path := self._message_path(node, state)) is not None:
+            return self._message(path, node, state)
+        resolved = resolve(node, self._frame.source)
+        if resolved is not None:
+            return self._constant(resolved, node)
+        value = self._value(node.value, state)
+        if node.attr not in _VIEW_ATTRIBUTES:
+            return NOTHING
+        return _mapped(_flat(value), _view)
+
+    def _read(self, member: Member, state: Bindings) -> Value:
+        if member.kind in PORTS or not member.type.shape:
+            return NOTHING
+        is_own = member.kind is State or (
+            member.kind is Derived and self._frames[0].source.tree.name == "prepare"
+        )
+        if is_own:
+            return self._of_member(member.name, state)
+        kind = "parameter" if member.kind is Parameter else "Derived member"
+        place = ("read-only", f"self.{member.name}", f"a {kind}")
+        return frozenset({Ref(place, place, None, True, len(member.type.shape))})
+
+    def _port(self, port: Member, node: ast.Attribute, state: Bindings) -> Value:
+        if port.message and node.attr == "value":
+            return frozenset({_message_ref(f"{port.name}.value")})
+        if port.message or node.attr not in ("value", "front") or not port.type.shape:
+            return NOTHING
+        if port.kind is Output:
+            return self._of_member(port.name, state)
+        return self._input(port.name, node, len(port.type.shape), state)
+
+    def _input(self, name: str, node: ast.expr, dimensions: int, state: Bindings) -> Refs:
+        """Return the value of an input: each read gives a new array."""
+        new = ("read", self._site(node))
+        self._renamed(new, ("old", new), state)
+        return frozenset({Ref(new, ("input", name), None, True, dimensions)})
+
+    def _message(self, path: str, node: ast.expr, state: Bindings) -> Value:
+        """Return a part of a message."""
+        port = self._members[path.partition(".")[0]]
+        assert port.message is not None
+        leaf = port.message.leaf(tuple(path.split(".")[2:]))
+        if leaf is None:
+            return frozenset({_message_ref(path)})
+        if not leaf.type.shape:
+            return NOTHING
+        if port.kind is Output:
+            return self._of_member(path, state)
+        return self._input(path, node, 1, state)
+
+    def _subscript(self, node: ast.Subscript, state: Bindings) -> Value:
+        base = self._value(node.value, state)
+        held = self._hold(base, node.value, state)
+        self._value(node.slice, state)
+        base = state.pop(held)
+        if isinstance(base, tuple):
+            index = node.slice.value if isinstance(node.slice, ast.Constant) else None
+            if isinstance(index, int) and -len(base) <= index < len(base):
+                return base[index]
+            return _elements(base)
+        parts = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
+        views = [each for each in parts if _keeps(each)]
+        found = set()
+        for ref in base:
+            left = None
+            if ref.dimensions is not None:
+                left = ref.dimensions - (len(parts) - len(views))
+                if left <= 0:
+                    continue  # a number, or a copy of selected elements
+            found.add(ref._replace(is_whole=False, dimensions=left))
+        return frozenset(found)
+
+    def _called(self, node: ast.Call, state: Bindings) -> Value:
+        called, source = node.func, self._frame.source
+        if isinstance(called, ast.Attribute):
+            found = self._method_call(node, called, state)
+            if found is not None:
+                return found
+        target = resolve(called, source)
+        if is_own(target):
+            values, named = self._arguments(node, state)
+            return self._own_call(target, values, named, node, state)
+        owner: Value = NOTHING
+        held = None
+        if isinstance(called, ast.Attribute) and target is None:
+            owner = self._value(called.value, state)
+            held = self._hold(owner, called.value, state)
+        values, named = self._arguments(node, state)
+        if held is not None:
+            owner = state.pop(held)
+        first: Value = values[0] if values else NOTHING
+        everything = _flat((owner, *values, *named.values()))
+        if any(target is each for each in (*_SAME, *_VIEWS, *_DIAGONALS)):
+            return self._viewed(target, _flat(first), node)
+        if any(target is each for each in _ITERATORS):
+            return (everything,)
+        if any(target is each for each in _TUPLES):
+            return first
+        if isinstance(called, ast.Attribute) and target is None:
+            if called.attr in _CHANGING_METHODS:
+                self._changed(_flat(owner), self._cell(called.value, state), node, state)
+                return NOTHING
+            if called.attr in _VIEW_METHODS:
+                return _mapped(_flat(owner), _view)
+            if called.attr in _DIAGONAL_METHODS:
+                return self._viewed(np.diagonal, _flat(owner), node)
+        return self._lazy(everything)
+
+    def _viewed(self, function: Any, refs: Refs, node: ast.expr) -> Refs:
+        if any(function is each for each in _DIAGONALS):
+            place = ("copy of diagonal", self._site(node))
+            return frozenset(
+                each._replace(place=place, is_whole=False, is_read_only=True) for each in refs
+            )
+        if any(function is each for each in _SAME):
+            return refs
+        return frozenset(map(_view, refs))
+
+    def _arguments(self, node: ast.Call, state: Bindings) -> tuple[list[Value], dict[str, Value]]:
+        """Follow arguments in order; each is held until the last is computed."""
+        given = [*node.args, *(each.value for each in node.keywords)]
+        values = self._operands(given, state)
+        assert isinstance(values, tuple)
+        count = len(node.args)
+        names = [each.arg or "" for each in node.keywords]
+        return list(values[:count]), dict(zip(names, values[count:], strict=True))
+
+    def _own_call(
+        self,
+        called: Any,
+        values: list[Value],
+        named: dict[str, Value],
+        node: ast.expr,
+        state: Bindings,
+    ) -> Value:
+        """Follow a call of a method or a function, while the rest of the statement waits."""
+        frame = self._frame
+        live = frame.live
+        frame.live = frame.names.outside(node)
+        if isinstance(called, Method):
+            ends = self._call(called, values, named, state)
+        else:
+            self._owners.append(object)
+            ends = self._function(called, values, named, state)
+            self._owners.pop()
+        frame.live = live
+        if not ends:
+            return NOTHING
+        if frame.statement is node:
+            frame.ends = _distinct([each for each, _ in ends])
+        result: Value = ends[0][1]
+        for _, value in ends[1:]:
+            result = _either(result, value)
+        merged = _merged([each for each, _ in ends])
+        state.clear()
+        state.update(merged)
+        return result
+
+    def _method_call(self, node: ast.Call, called: ast.Attribute, state: Bindings) -> Value | None:
+        """Follow `self.method(…)`, `self.x.write(…)`, `super().method(…)`; None for others."""
+        if self._is_self(called.value):
+            method = self._methods.find(called.attr)
+            if method is None or called.attr == "fault":
+                self._arguments(node, state)
+                return NOTHING
+            values, named = self._arguments(node, state)
+            return self._own_call(method, values, named, node, state)
+        if _is_super(called.value):
+            method = self._methods.find(called.attr, behind=self._owners[-1])
+            values, named = self._arguments(node, state)
+            if method is None:
+                return NOTHING
+            return self._own_call(method, values, named, node, state)
+        owner = resolve(called.value, self._frame.source)
+        method = self._methods.find_of(owner, called.attr) if isinstance(owner, type) else None
+        if method is not None:
+            values, named = self._arguments(node, state)
+            values = values if method.kind == "static method" else values[1:]
+            return self._own_call(method, values, named, node, state)
+        port = self._member(called.value)
+        if port is None or port.kind not in PORTS:
+            return None
+        values, _ = self._arguments(node, state)
+        if port.kind is Output and called.attr == "write" and node.args:
+            if port.message:
+                self._write_message(f"{port.name}.value", node, state)
+            else:
+                self._frame.live = self._frame.names.outside(node)
+                self._store(port.name, values[0], node.args[0], ast.unparse(called.value), node,
+                            state, is_copy=True)  # fmt: skip
+        return NOTHING
+
+
+def _outside(state: Bindings, depth: int) -> Bindings:
+    """Return the bindings that remain after a call at a depth."""
+    return {
+        (kind, name): value
+        for (kind, name), value in state.items()
+        if kind != depth and not (kind == "held" and name[0] == depth)
+    }
+
+
+def _renamed_after(ref: Ref, owners: set[str]) -> Ref:
+    """Return a reference whose array is named after the members that it belongs to."""
+    if ref.thing[0] == "read-only":
+        return ref
+    return ref._replace(thing=("shared", *sorted(owners)))
+
+
+def _message_ref(path: str) -> Ref:
+    return Ref(("message", path), ("message", path), None)
+
+
+def _view(ref: Ref) -> Ref:
+    return ref._replace(is_whole=False, dimensions=None)
+
+
+def _elements(value: Value) -> Refs:
+    """Return the references of the elements of what is iterated or unpacked."""
+    found = set()
+    for ref in _flat(value):
+        if isinstance(value, tuple):
+            found.add(ref)  # an element of a tuple, or an element of its element
+        elif ref.dimensions is None:
+            found.add(ref._replace(is_whole=False))
+        elif ref.dimensions > 1:
+            found.add(ref._replace(is_whole=False, dimensions=ref.dimensions - 1))
+    return frozenset(found)
+
+
+def _keeps(index: ast.expr) -> bool:
+    """Tell whether an index keeps its dimension."""
+    if isinstance(index, ast.Slice):
+        return True
+    return (isinstance(index, ast.Constant) and index.value in (..., None)) or (
+        ast.unparse(index) in ("np.newaxis", "numpy.newaxis")
+    )
+
+
+def _is_true(test: ast.expr) -> bool:
+    return isinstance(test, ast.Constant) and bool(test.value)
+
+
+def _names(node: ast.AST) -> set[str]:
+    return {
+        each.id
+        for each in ast.walk(node)
+        if isinstance(each, ast.Name) and isinstance(each.ctx, ast.Load)
+    }
+
+
+def _is_super(node: ast.AST) -> bool:
+    return (
+        isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "super"
+    )
