@@ -687,6 +687,7 @@ HEAD: dict[str, tuple[str, str]] = {
     "indent": ("def f():\nreturn 1.0  # here", "indent"),
     "equals in a condition": ("if TOTAL = 0.0:  # here\n    pass", "="),
     "module that is not there": ("import controll", "controll"),
+    "module that has another name": ("from rtcf.signal import c2d", "is now rtcf.linear"),
     "name that is not there": ("from rtcf.component import Inputs", "Inputs"),
     "name not imported": ("LIMIT = pi / 2.0", "pi"),
     "division by zero": ("GAIN = 1.0 / TOTAL", "division"),

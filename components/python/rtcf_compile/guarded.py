@@ -30,7 +30,7 @@ def guarded() -> int:
             return status
         file, line = progress.noted(shared)
         what = f"the compiler ended with {signal.Signals(-status).name}"
-        mistake = Mistake(file, line, what, "write it in another way, and report this")
+        mistake = Mistake(file, line, what, "write this function in another way")
         print(f"rtcf-compile: {mistake}", file=sys.stderr)
         return REFUSED
 

@@ -53,6 +53,9 @@ def load(file: Path) -> ModuleType:
         raise Mistake(str(file), _line_in(file, error), *_parts(str(error))) from None
     except Exception as error:
         line = _line_in(file, error)
+        if isinstance(error, ModuleNotFoundError) and error.name == "rtcf.signal":
+            remedy = "write from rtcf.linear import …"
+            raise Mistake(str(file), line, "rtcf.signal is now rtcf.linear", remedy) from None
         what = f"{type(error).__name__}: {error}"
         if found := numpy_errors.explained(error, source_line(str(file), line)):
             what = found[0]

@@ -50,6 +50,20 @@ class {name}(Component):
 """
 
 
+def test_a_crash_of_the_compiler_is_one_line(tmp_path: Path) -> None:
+    file = tmp_path / "crashing.py"
+    file.write_text("import os, signal\n\nos.kill(os.getpid(), signal.SIGSEGV)\n")
+    done = subprocess.run(
+        [COMMAND, "crashing.py", "--verify"],
+        cwd=tmp_path, capture_output=True, text=True, timeout=DEADLINE_S,
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert done.stderr == (
+        "rtcf-compile: crashing.py: the compiler ended with SIGSEGV: "
+        "write this function in another way\n"
+    )
+
+
 class Cache:
     """A user's cache, and a compiler that records its calls."""
 
