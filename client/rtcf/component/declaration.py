@@ -426,7 +426,9 @@ def _initial(declared: ValueType, given: Any) -> np.ndarray[Any, Any]:
         raise DeclarationError(
             f"has shape {declared.shape}, but its value has {value.shape}: make them equal"
         )
-    if not np.can_cast(value.dtype, declared.scalar, "same_kind"):
+    both = value.dtype.kind + declared.scalar.kind
+    # Ints of another type are checked below.
+    if not np.can_cast(value.dtype, declared.scalar, "same_kind") and set(both) - set("iu"):
         raise DeclarationError(
             f"is {_number(declared)}, but its value is {value.dtype.name}: use {_number(declared)}"
         )

@@ -118,7 +118,7 @@ class Selecting(Component):
 
     def update(self):
         u, i = self.u.value, self.i.value % 3
-        self.a = u
+        self.a[:] = u
         self.b = self.m.value
         self.a[self.a > 1.0] = 1.0
         self.a[u < -1.0] *= 0.5

@@ -56,7 +56,14 @@ _MEETING: dict[Callable[..., Any], tuple[Callable[..., Any], tuple[tuple[int, in
 _PYTHONS = (
     *(len, bool, helpers.rtcf_to_int, helpers.rtcf_to_float, helpers.rtcf_floor, helpers.rtcf_ceil),
     *(helpers.rtcf_round, helpers.rtcf_index, helpers.rtcf_front, helpers.rtcf_age),
-    *(helpers.rtcf_math_fmod, helpers.rtcf_math_pow, helpers.rtcf_is, helpers.rtcf_is_known),
+    *(
+        helpers.rtcf_math_fmod,
+        helpers.rtcf_math_remainder,
+        helpers.rtcf_round_to,
+        helpers.rtcf_math_pow,
+        helpers.rtcf_is,
+        helpers.rtcf_is_known,
+    ),
     *(operators.rtcf_plain, numpy_functions.rtcf_math_hypot, numpy_functions.rtcf_math_isclose),
     *helpers.MATH.values(),
 )

@@ -561,6 +561,75 @@ def _flip(m: Any) -> Any:
     return lambda m: m[::-1, ::-1]
 
 
+@compiled_as(own.rtcf_append, arrays=("arr", "values"))
+def _append(arr: Any, values: Any) -> Any:
+    _needs(arr, "np.append", (1,))
+    dtype = np.result_type(_dtype(arr), _dtype(values))
+    if not isinstance(values, types.Array):
+
+        def appended(arr: Any, values: Any) -> Any:
+            n = arr.shape[0]
+            result = np.empty(n + 1, dtype)
+            for i in range(n):
+                result[i] = arr[i]
+            result[n] = values
+            return result
+
+        return appended
+    _needs(values, "np.append", (1,))
+    return lambda arr, values: own.rtcf_concatenate((arr, values), 0)
+
+
+@compiled_as(own.rtcf_tile, arrays=("A",))
+def _tile(A: Any, reps: Any) -> Any:
+    _needs(A, "np.tile", (1,))
+    if not isinstance(reps, types.Integer):
+        raise TypingError(f"RTCF:np.tile by {words(reps)}:give it an int")
+
+    def tile(A: Any, reps: Any) -> Any:
+        n = A.shape[0]
+        result = np.empty(n * max(reps, 0), A.dtype)
+        for i in range(result.shape[0]):
+            result[i] = A[i % n]
+        return result
+
+    return tile
+
+
+@compiled_as(own.rtcf_repeat, arrays=("a",))
+def _repeat(a: Any, repeats: Any) -> Any:
+    _needs(a, "np.repeat", (1,))
+    if not isinstance(repeats, types.Integer):
+        raise TypingError(f"RTCF:np.repeat by {words(repeats)}:give it an int")
+
+    def repeat(a: Any, repeats: Any) -> Any:
+        if repeats < 0:
+            raise ValueError("repeats may not contain negative values.")
+        result = np.empty(a.shape[0] * repeats, a.dtype)
+        for i in range(result.shape[0]):
+            result[i] = a[i // repeats]
+        return result
+
+    return repeat
+
+
+@compiled_as(own.rtcf_kron, arrays=("a", "b"))
+def _kron(a: Any, b: Any) -> Any:
+    _needs(a, "np.kron", (2,))
+    _needs(b, "np.kron", (2,))
+    dtype = np.result_type(_dtype(a), _dtype(b))
+
+    def kron(a: Any, b: Any) -> Any:
+        rows, columns = b.shape
+        result = np.empty((a.shape[0] * rows, a.shape[1] * columns), dtype)
+        for i in range(result.shape[0]):
+            for j in range(result.shape[1]):
+                result[i, j] = a[i // rows, j // columns] * b[i % rows, j % columns]
+        return result
+
+    return kron
+
+
 @compiled_as(own.rtcf_diff, arrays=("a",))
 def _diff(a: Any) -> Any:
     _needs(a, "np.diff")

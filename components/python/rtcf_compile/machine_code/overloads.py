@@ -262,6 +262,21 @@ def _copied(value):  # type: ignore[no-untyped-def]
     return scope["each"]
 
 
+@compiled_as(helpers.rtcf_looked_up)
+def _looked_up(keys: Any, values: Any, key: Any) -> Any:
+    if not isinstance(key, types.Integer | types.Boolean | types.IntEnumMember):
+        raise TypingError(f"RTCF:a key of a dict is {words(key)}:give it an int or an enum")
+
+    def look(keys: Any, values: Any, key: Any) -> Any:
+        number = helpers.rtcf_int(key)
+        for place in range(len(keys)):
+            if keys[place] == number:
+                return values[place]
+        raise KeyError("no such key")
+
+    return look
+
+
 @compiled_as(helpers.rtcf_store, arrays=("value",))
 def _store(target: Any, value: Any) -> Any:
     if not isinstance(value, types.Array):
@@ -1207,6 +1222,68 @@ def _fmod(x: Any, y: Any) -> Any:
         return result
 
     return fmod
+
+
+@compiled_as(helpers.rtcf_math_remainder)
+def _remainder(x: Any, y: Any) -> Any:
+    def remainder(x: Any, y: Any) -> Any:
+        # As in CPython: all differences are exact.
+        x, y = np.float64(x), np.float64(y)
+        if math.isnan(x) or math.isnan(y):
+            return x + y
+        if math.isinf(x) or y == 0.0:
+            raise ValueError("math domain error")
+        if math.isinf(y):
+            return x
+        far, size = abs(x), abs(y)
+        rest = np.fmod(far, size)
+        other = size - rest
+        if rest < other:
+            result = rest
+        elif rest > other:
+            result = -other
+        else:
+            result = rest - 2.0 * np.fmod(0.5 * (far - rest), size)
+        return math.copysign(1.0, x) * result
+
+    return remainder
+
+
+@compiled_as(helpers.rtcf_round_to)
+def _round_to(value: Any, digits: Any) -> Any:
+    if not isinstance(value, types.Float):
+        raise TypingError(f"RTCF:round of {words(value)} to digits:give it a float")
+
+    def rounded(value: Any, digits: Any) -> Any:
+        x = np.float64(value)
+        scale = 10.0**digits
+        high = x * scale
+        # The nearest float to a decimal number is x itself from here on.
+        if not abs(high) < 2.0**53:
+            return x
+        # x * scale is high + low exactly (Dekker, 1971).
+        split = 134217729.0
+        a = x * split
+        a = a - (a - x)
+        b = scale * split
+        b = b - (b - scale)
+        low = ((a * b - high) + a * (scale - b) + (x - a) * b) + (x - a) * (scale - b)
+        whole = np.rint(high)
+        far = (high - whole) + low
+        if far > 0.5 or (far == 0.5 and whole % 2.0 != 0.0):
+            whole += 1.0
+        elif far < -0.5 or (far == -0.5 and whole % 2.0 != 0.0):
+            whole -= 1.0
+        return math.copysign(abs(whole / scale), x)
+
+    return rounded
+
+
+@overload(bool)
+def _bool_of_enum(value):  # type: ignore[no-untyped-def]
+    if isinstance(value, types.IntEnumMember):
+        return lambda value: value.value != 0
+    return None
 
 
 @compiled_as(helpers.rtcf_pow)

@@ -8,17 +8,19 @@ import dataclasses
 import enum
 import inspect
 import math
+import re
 from collections.abc import Callable, Sequence
+from types import ModuleType, SimpleNamespace
 from typing import Any, TypeVar
 
 import numpy as np
 
 from rtcf_compile.rewriting import numpy_functions, operators
-from rtcf_compile.rewriting.helpers import IN_PLACE, INSTEAD, OF_LISTS, rtcf_round
+from rtcf_compile.rewriting.helpers import IN_PLACE, INSTEAD, OF_LISTS, rtcf_round, rtcf_round_to
 from rtcf_compile.rewriting.references import is_copied
 from rtcf_compile.source.checks import resolve
 from rtcf_compile.source.mistake import at
-from rtcf_compile.source.modules import Source, is_own
+from rtcf_compile.source.modules import Source, is_of_user, is_own
 
 _Node = TypeVar("_Node", bound=ast.AST)
 _BY_NODE: tuple[Any, ...] = (operators.BINARY, operators.SHIFTS, operators.COMPARISONS)
@@ -71,12 +73,18 @@ class CommonRewriting(ast.NodeTransformer):
         if owner is not None and not isinstance(node.ctx, ast.Load):
             name = ast.unparse(node.value)
             raise self.mistake(node, f"{name} is a constant of the module", "declare a State")
-        if dataclasses.is_dataclass(owner) and not isinstance(owner, type):
-            name = f"constant_{ast.unparse(node).replace('.', '_')}"
-            self.constants[name] = getattr(owner, node.attr)
-            return like(node, ast.Name(name, ast.Load()))
+        value = resolve(node, self.source)
+        is_module = isinstance(owner, ModuleType)
+        if is_own(value) if is_module else _is_namespace(owner) and _is_constant(value):
+            return self._named_constant(node, value)
         self.generic_visit(node)
         return node
+
+    def _named_constant(self, node: ast.expr, value: Any) -> ast.expr:
+        """Return a constant, or a function of another module, by a name of its own."""
+        name = f"constant_{re.sub('[^a-zA-Z0-9]', '_', ast.unparse(node))}"
+        self.constants[name] = value
+        return like(node, ast.Name(name, ast.Load()))
 
     def _enum(self, cls: type[enum.IntEnum]) -> ast.expr:
         """Return an enum class as a constant."""
@@ -428,7 +436,12 @@ class CommonRewriting(ast.NodeTransformer):
         if target is round and len(node.args) == 1 and not node.keywords:
             return self._instead(node, rtcf_round, node.args)
         if target is round:
-            raise self.mistake(node, "round to digits is not compiled", "use np.round(x, digits)")
+            digits = self._constant(node.args[1]) if len(node.args) == 2 else None
+            if node.keywords or type(digits) is not int or not 0 <= digits <= 15:
+                what = "round to other than 0 to 15 digits is not compiled"
+                raise self.mistake(node, what, "use np.round(x, digits)")
+            given = [self.visit(node.args[0]), ast.Constant(digits)]
+            return like(node, call_of(rtcf_round_to.__name__, *given))
         if target is reversed and len(node.args) == 1 and not node.keywords:
             return self._reversed(node, node.args[0])
         if target is range and not node.keywords:
@@ -589,7 +602,10 @@ class CommonRewriting(ast.NodeTransformer):
             node.args[place] = self._dtype(node.args[place])
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
-        """Rewrite `x[i]`, where i may be an array."""
+        """Rewrite `x[i]`, where i may be an array, and `GAINS["kp"]` of a dict of constants."""
+        table = resolve(node.value, self.source)
+        if isinstance(table, dict) and table and isinstance(node.ctx, ast.Load):
+            return self._looked_up(node, table)
         node.slice = self._arrays(node.slice)
         parts = list(_parts(node))
         if isinstance(node.ctx, ast.Load) and any(_is_new(each) for each in parts):
@@ -599,6 +615,26 @@ class CommonRewriting(ast.NodeTransformer):
         if is_load and (of_tuple or any(self._may_select(each) for each in parts)):
             return like(node, call_of("rtcf_get", node.value, _index(node.slice)))
         return node
+
+    def _looked_up(self, node: ast.Subscript, table: dict[Any, Any]) -> ast.AST:
+        """Rewrite an element of a dict of the module, whose keys are texts, or ints and enums."""
+        name = ast.unparse(node.value)
+        if isinstance(node.slice, ast.Constant):
+            if node.slice.value not in table:
+                keys = ", ".join(map(repr, list(table)[:8]))
+                what = f"{name} has no {node.slice.value!r}"
+                raise self.mistake(node, what, f"use one of {keys}")
+            return self._named_constant(node, table[node.slice.value])
+        numbers = all(isinstance(each, int) for each in table)
+        if not numbers or not all(isinstance(each, int | float) for each in table.values()):
+            remedy = "use ints or enums as keys, and numbers as values"
+            raise self.mistake(node, f"{name} is a dict with other keys or values", remedy)
+        place = re.sub("[^a-zA-Z0-9]", "_", name)
+        self.constants[f"constant_{place}_keys"] = tuple(map(int, table))
+        kind = int if all(isinstance(each, int) for each in table.values()) else float
+        self.constants[f"constant_{place}_values"] = tuple(map(kind, table.values()))
+        parts = [ast.Name(f"constant_{place}_{each}", ast.Load()) for each in ("keys", "values")]
+        return like(node, call_of("rtcf_looked_up", *parts, self.visit(node.slice)))
 
     def _is_tuple(self, node: ast.Subscript) -> bool:
         """Tell whether a node is an element of a tuple or list with a variable index."""
@@ -857,6 +893,19 @@ class CommonRewriting(ast.NodeTransformer):
             and isinstance(node.value, ast.Name)
             and node.value.id == "self"
         )
+
+
+def _is_namespace(value: Any) -> bool:
+    """Tell whether a value is a class, or an object, of the user whose attributes are constants."""
+    if isinstance(value, type):
+        return not issubclass(value, enum.Enum | np.generic) and is_of_user(value)
+    return isinstance(value, SimpleNamespace) or (
+        dataclasses.is_dataclass(value) or (isinstance(value, tuple) and hasattr(value, "_fields"))
+    )
+
+
+def _is_constant(value: Any) -> bool:
+    return isinstance(value, bool | int | float | str | tuple | list | np.ndarray | np.generic)
 
 
 def _number_in(node: ast.Call) -> float | None:

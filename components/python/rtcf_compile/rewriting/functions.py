@@ -22,6 +22,7 @@ from rtcf_compile.source import progress
 from rtcf_compile.source.checks import check, resolve
 from rtcf_compile.source.mistake import Mistake, at, written
 from rtcf_compile.source.modules import Source, is_own, read
+from rtcf_compile.source.spelling import defaults_of
 
 # The helpers that rewritten functions call, by name.
 HELPERS = {**helpers.BY_NAME, **numpy_functions.BY_NAME}
@@ -309,7 +310,7 @@ def made(tree: ast.FunctionDef, scope: dict[str, Any], source: Source) -> Functi
     module = ast.fix_missing_locations(ast.Module([tree], []))
     code = compile(module, source.file, "exec", dont_inherit=True)
     inner = next(each for each in code.co_consts if isinstance(each, CodeType))
-    defaults = source.function.__defaults__ if tree.name == source.tree.name else None
+    defaults = defaults_of(source.function) if tree.name == source.tree.name else None
     function = FunctionType(inner, scope, tree.name, defaults)
     vars(function)[WRITTEN_NAME] = source.function.__qualname__.rpartition("<locals>.")[2]
     vars(function)[WRITTEN_CODE] = source.function.__code__

@@ -159,6 +159,11 @@ def rtcf_math_fmod(x: Any, y: Any) -> float:
     return math.fmod(x, y)
 
 
+def rtcf_math_remainder(x: Any, y: Any) -> float:
+    """Return math.remainder(x, y), which raises outside its domain."""
+    return math.remainder(x, y)
+
+
 def rtcf_pow(base: Any, exponent: Any) -> Any:
     """Return base ** exponent; raise if the result is not a float, or not an int for two ints."""
     if isinstance(base, np.ndarray) or isinstance(exponent, np.ndarray):
@@ -214,6 +219,11 @@ def rtcf_round(value: Any) -> Any:
     return rtcf_to_int(round(float(value)) if isinstance(value, float) else round(value))
 
 
+def rtcf_round_to(value: Any, digits: Any) -> Any:
+    """Return round(value, digits) of a float: the nearest decimal number, halves to even."""
+    return round(float(value), digits)
+
+
 def rtcf_index(value: Any) -> Any:
     """Return an argument of range() as an int."""
     return operator.index(value)
@@ -252,6 +262,14 @@ def rtcf_copied(value: Any) -> Any:
     if isinstance(value, tuple):
         return tuple(map(rtcf_copied, value))
     return value.copy() if isinstance(value, np.ndarray) else value
+
+
+def rtcf_looked_up(keys: Any, values: Any, key: Any) -> Any:
+    """Return an element of a dict of numbers."""
+    for number in range(len(keys)):
+        if keys[number] == key:
+            return values[number]
+    raise KeyError("no such key")
 
 
 def rtcf_store(target: Any, value: Any) -> None:
@@ -381,6 +399,7 @@ INSTEAD: dict[Callable[..., Any], Callable[..., Any]] = {
     np.where: rtcf_where,
     math.fmod: rtcf_math_fmod,
     math.pow: rtcf_math_pow,
+    math.remainder: rtcf_math_remainder,
     math.floor: rtcf_floor,
     math.ceil: rtcf_ceil,
     math.trunc: rtcf_to_int,
@@ -399,6 +418,7 @@ BY_NAME = {
             rtcf_equal,
             rtcf_view,
             rtcf_copied,
+            rtcf_looked_up,
             rtcf_store,
             rtcf_maybe,
             rtcf_is_known,
@@ -408,6 +428,7 @@ BY_NAME = {
             rtcf_is,
         ),
         *(rtcf_items, rtcf_front, rtcf_age, rtcf_after, rtcf_pow, rtcf_round, rtcf_index),
+        rtcf_round_to,
         *(rtcf_negative_pow, rtcf_changed),
         *IN_PLACE.values(),
         *OF_LISTS.values(),

@@ -143,6 +143,36 @@ def rtcf_flip(m: Any) -> Any:
     return np.flip(m)
 
 
+@_stands_for(np.append)
+def rtcf_append(arr: Any, values: Any) -> Any:
+    """Return a new vector: the elements of the first, then those of the second."""
+    return np.append(arr, values)
+
+
+@_stands_for(np.tile)
+def rtcf_tile(A: Any, reps: Any) -> Any:
+    """Return a new vector: a vector, repeated."""
+    if np.ndim(A) != 1 or not isinstance(reps, int):
+        raise ValueError("tile of other than a vector and an int")
+    return np.tile(A, reps)
+
+
+@_stands_for(np.repeat, method="repeat")
+def rtcf_repeat(a: Any, repeats: Any) -> Any:
+    """Return a new vector: each element of a vector, repeated."""
+    if np.ndim(a) != 1 or not isinstance(repeats, int):
+        raise ValueError("repeat of other than a vector and an int")
+    return np.repeat(a, repeats)
+
+
+@_stands_for(np.kron)
+def rtcf_kron(a: Any, b: Any) -> Any:
+    """Return the Kronecker product of two matrices."""
+    if np.ndim(a) != 2 or np.ndim(b) != 2:
+        raise ValueError("kron of other than two matrices")
+    return np.kron(a, b)
+
+
 @_stands_for(np.diff)
 def rtcf_diff(a: Any) -> Any:
     """Return the differences of consecutive elements."""

@@ -85,7 +85,6 @@ _BUILTINS: dict[str, tuple[str, str]] = {
     "frozenset": ("a set allocates memory", "use an array of bools"),
 }
 _GROWS = {
-    "append": "use a State array and a count",
     "insert": "use a State array and a count",
     "delete": "use a State array and a count",
     "resize": "declare the largest size",
@@ -148,7 +147,7 @@ def check(source: Source, members: Collection[str] = ()) -> None:
         raise Mistake(file, tree.lineno, f"{tree.name} takes any number of arguments", "name each")
     if arguments.kwonlyargs:
         what = f"{tree.name} takes {arguments.kwonlyargs[0].arg} only as a keyword"
-        raise Mistake(file, tree.lineno, what, "remove the *")
+        raise Mistake(file, tree.lineno, what, "give it a default, or remove the *")
     for default in (*arguments.defaults, *arguments.kw_defaults):
         if isinstance(default, ast.List | ast.Dict | ast.Set):
             raise at(
@@ -360,8 +359,6 @@ def check_arguments(
     if None in named:
         return
     signature = inspect.signature(function)
-    if any(each.kind is each.KEYWORD_ONLY for each in signature.parameters.values()):
-        return  # rejected at its definition
     try:
         signature.bind(*[None] * (given + len(node.args)), **dict.fromkeys(map(str, named)))
     except TypeError:

@@ -13,7 +13,7 @@ from typing import Any
 
 from rtcf.component import Component, DeclarationError
 
-from rtcf_compile.source import numpy_errors, progress
+from rtcf_compile.source import numpy_errors, progress, spelling
 from rtcf_compile.source.mistake import Mistake, source_line
 from rtcf_compile.source.prefix_map import mapped
 
@@ -100,6 +100,7 @@ def read(function: FunctionType) -> Source:
     if not isinstance(tree, ast.FunctionDef):
         kind = "is async" if isinstance(tree, ast.AsyncFunctionDef) else "is a lambda"
         raise Mistake(file, begin, f"{function.__name__} {kind}", "write it with `def`")
+    spelling.normalise(tree)
     return Source(function, tree, file)
 
 
@@ -107,8 +108,11 @@ def is_own(value: Any) -> bool:
     """Tell whether a value is a Python function of the user, which must be compiled too."""
     if not isinstance(value, FunctionType):
         return False
-    if value.__module__ == "rtcf.linear":
-        return True
+    return value.__module__ == "rtcf.linear" or is_of_user(value)
+
+
+def is_of_user(value: Any) -> bool:
+    """Tell whether a function or a class is in a module of the user."""
     module = sys.modules.get(value.__module__ or "")
     file = getattr(module, "__file__", None) or ""
     packages = ("/dist-packages/", "/site-packages/", "/lib/python3")

@@ -13,7 +13,7 @@ import pytest
 from daemon_process import BUILD_TREE
 from pages import TREE
 from rtcf_compile import main
-from rtcf_compile.comparison import inside, verify, watched
+from rtcf_compile.comparison import inside, model, verify, watched
 from rtcf_compile.machine_code import object_file
 from rtcf_compile.rewriting.functions import HELPERS
 from rtcf_compile.source import modules as source
@@ -217,7 +217,7 @@ def test_different_rounding_of_a_sum_is_no_difference(
 ) -> None:
     # In another order than in compiled code.
     backwards = {name: lambda a, *_: np.sum(a[::-1]) for name in HELPERS if "sum" in name}
-    monkeypatch.setattr(verify, "HELPERS", HELPERS | backwards)
+    monkeypatch.setattr(model, "HELPERS", HELPERS | backwards)
     assert main.main([written(tmp_path, SUM, "np.float64, 64", "float"), "--verify", "1000"]) == 0
     said = capsys.readouterr().out
     assert re.search(r"1000 cycles, .*[1-9]\d* explained by rounding: the same", said)
