@@ -362,8 +362,27 @@ def _any_layout(typing: Any, array: Any) -> Any:
 def _ravel(a: Any) -> Any:
     _needs(a, "np.ravel")
     if a.ndim == 1:
+        return lambda a: own.rtcf_contiguous(a)
+    return lambda a: own.rtcf_reshape(own.rtcf_contiguous(a), (a.size,))
+
+
+@plain
+def _is_contiguous(a: Any) -> Any:
+    """Tell whether the elements lie in order, without gaps; axes of one element do not count."""
+    size = a.itemsize
+    for axis in range(a.ndim - 1, -1, -1):
+        if a.shape[axis] != 1 and a.strides[axis] != size:
+            return False
+        size *= a.shape[axis]
+    return True
+
+
+@compiled_as(own.rtcf_contiguous, arrays=("a",))
+def _contiguous(a: Any) -> Any:
+    _needs(a, "np.ascontiguousarray")
+    if a.layout == "C":
         return lambda a: a
-    return lambda a: own.rtcf_reshape(a, (a.size,))
+    return lambda a: _any_layout(a) if _is_contiguous(a) else _any_layout(a.copy())
 
 
 @compiled_as(own.rtcf_flatten, arrays=("a",))
@@ -1716,6 +1735,18 @@ def _matrix_power(a: Any, n: Any) -> Any:
     return power
 
 
+def _own_copy(value: Any) -> Any:
+    """Return a copy of an array, a number as it is. Compiled only."""
+    raise NotImplementedError
+
+
+@compiled_as(_own_copy)
+def _copy_of(value: Any) -> Any:
+    if isinstance(value, types.Array):
+        return lambda value: value.copy()
+    return lambda value: value
+
+
 @compiled_as(own.rtcf_whole_pow)
 def _whole_pow(base: Any, exponent: Any) -> Any:
     number = operand(base)
@@ -1728,7 +1759,7 @@ def _whole_pow(base: Any, exponent: Any) -> Any:
         while exponent % 2 == 0 and exponent > 0:
             square = square * square
             exponent //= 2
-        result = square
+        result = _own_copy(square) if exponent == 1 else square
         exponent //= 2
         while exponent > 0:
             square = square * square

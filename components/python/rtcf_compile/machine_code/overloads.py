@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from numba import types
-from numba.core import cgutils
+from numba.core import cgutils, imputils
 from numba.core.errors import TypingError
 from numba.extending import intrinsic, lower_builtin, lower_cast, overload, register_jitable
 from numba.np.numpy_support import as_dtype
@@ -98,7 +98,8 @@ def _unwrapped(typing, value):  # type: ignore[no-untyped-def]
     """Return the value of an optional that is not None."""
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        return context.cast(builder, arguments[0], value, value.type)
+        new = context.cast(builder, arguments[0], value, value.type)
+        return imputils.impl_ret_borrowed(context, builder, value.type, new)
 
     return value.type(value), generate
 

@@ -175,8 +175,8 @@ class CommonRewriting(ast.NodeTransformer):
             calls = isinstance(each, ast.Call) and any(
                 _is_before(each, other) and not _contains(each, other) for other in found
             )
-            # The expression reads a member before a method that may set it.
-            reads = isinstance(each, ast.Attribute) and any(
+            # The expression reads a member or an element before a method that may set it.
+            reads = isinstance(each, ast.Attribute | ast.Subscript) and any(
                 _is_before(each, other) and self._changes(other.value, True)  # type: ignore[attr-defined]
                 for other in found
             )
@@ -764,7 +764,9 @@ class CommonRewriting(ast.NodeTransformer):
         base: ast.expr = target
         while isinstance(base, ast.Subscript | ast.Attribute):
             base = base.value
-        if isinstance(base, ast.Name) and base.id not in self.source.function.__code__.co_varnames:
+        variables = self.source.function.__code__.co_varnames
+        is_other = isinstance(base, ast.Name) and base.id not in variables
+        if isinstance(base, ast.Name) and is_other and not base.id.startswith("rtcf_"):
             raise self.mistake(
                 target, f"{base.id} is a constant of the module", "declare a State, or copy it"
             )

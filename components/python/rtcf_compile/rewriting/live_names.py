@@ -113,7 +113,7 @@ def _read(node: ast.AST) -> Names:
 
 def _set(node: ast.stmt) -> Names:
     """Return the names that a statement surely sets, without reading them."""
-    if not isinstance(node, ast.Assign | ast.AnnAssign):
+    if not isinstance(node, ast.Assign | ast.AnnAssign) or node.value is None:
         return _NONE
     targets = node.targets if isinstance(node, ast.Assign) else [node.target]
     found = set()

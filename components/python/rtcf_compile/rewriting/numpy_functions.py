@@ -49,7 +49,13 @@ def rtcf_array(object: Any, dtype: Any = None) -> Any:
     return np.array(object, dtype)
 
 
-@_stands_for(np.asarray, np.ascontiguousarray)
+@_stands_for(np.ascontiguousarray)
+def rtcf_contiguous(a: Any) -> Any:
+    """Return an array as it is if its elements lie in order, else a copy."""
+    return np.ascontiguousarray(a)
+
+
+@_stands_for(np.asarray)
 def rtcf_asarray(a: Any, dtype: Any = None) -> Any:
     """Return an array as it is, or a list as a new array."""
     return np.asarray(a, dtype)
@@ -503,6 +509,8 @@ def rtcf_matrix_power(a: Any, n: Any) -> Any:
 
 def rtcf_whole_pow(base: Any, exponent: Any) -> Any:
     """Return base ** exponent for a constant int above 0, by repeated squaring."""
+    if exponent == 1:
+        return base.copy() if isinstance(base, np.ndarray) else base
     result = None
     while exponent > 0:
         if exponent % 2:

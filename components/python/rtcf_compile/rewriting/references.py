@@ -17,7 +17,7 @@ types are not known here, so that any value may be an array unless its declarati
 import ast
 from collections.abc import Callable, Iterator, Sequence
 from types import CodeType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeGuard
 
 import numpy as np
 from rtcf.component.declaration import (
@@ -36,6 +36,7 @@ from rtcf_compile.rewriting.methods import Method, Methods
 from rtcf_compile.source.checks import check, resolve
 from rtcf_compile.source.mistake import at
 from rtcf_compile.source.modules import Source, is_own, read
+from rtcf_compile.source.spelling import defaults_of
 
 # The name of an array, or of a place: its kind and what tells it from others of the kind.
 Name = tuple[Any, ...]
@@ -68,11 +69,18 @@ NOTHING: Refs = frozenset()
 # A new array that compiled code may compute as late as the expression that contains it.
 _RESULT = ("result",)
 _UNCHANGED = ("input", "read-only")  # places that a hook does not change
+# What surely is an array, not a number.
+_SURELY = ("begin", "own", "shared", "read", "read-only", "result")
+# One of the values that a condition selects: a number, or a new array.
+_NEW = ("selected",)
 _MOST_STATES = 12  # different bindings at one place, before they are merged
 
 # Functions and methods whose result refers to their first argument, in NumPy.
 _SAME = (np.asarray, np.ascontiguousarray)
-_VIEWS = (np.reshape, np.ravel, np.transpose, np.flip, np.squeeze, np.flipud, np.fliplr)
+_VIEWS = (
+    *(np.reshape, np.ravel, np.transpose, np.flip, np.squeeze, np.flipud, np.fliplr),
+    *(np.broadcast_to, np.expand_dims, np.atleast_1d, np.atleast_2d, np.atleast_3d),
+)
 _VIEW_METHODS = ("reshape", "ravel", "transpose", "squeeze", "view", "swapaxes")
 _VIEW_ATTRIBUTES = ("T", "real", "flat")
 # Views in NumPy, copies in compiled code.
@@ -126,14 +134,17 @@ def _flat(value: Value) -> Refs:
     """Return all references of a value."""
     if isinstance(value, frozenset):
         return value
-    return frozenset(ref for each in value for ref in _flat(each))
+    # Elements may have other dimensions than what contains them.
+    return frozenset(ref._replace(dimensions=None) for each in value for ref in _flat(each))
 
 
 def _computed(value: Value) -> Value:
     """Return a value without references that only its computation reads."""
-    if isinstance(value, frozenset):
-        return frozenset(each for each in value if each.thing != _RESULT)
-    return tuple(map(_computed, value))
+    if isinstance(value, tuple):
+        return tuple(map(_computed, value))
+    rest = frozenset(each for each in value if each.thing != _RESULT)
+    is_new = rest and len(rest) < len(value)
+    return rest | {Ref(_NEW, _NEW, None)} if is_new else rest
 
 
 def _mapped(value: Value, change: Callable[[Ref], Ref]) -> Value:
@@ -147,7 +158,11 @@ def _either(one: Value, other: Value) -> Value:
     """Return the references of one value or the other."""
     if isinstance(one, tuple) and isinstance(other, tuple) and len(one) == len(other):
         return tuple(_either(*pair) for pair in zip(one, other, strict=True))
-    return _flat(one) | _flat(other)
+    if one == other:
+        return one
+    found = _flat(one) | _flat(other)
+    is_new = NOTHING in (one, other) and found
+    return found | {Ref(_NEW, _NEW, None)} if is_new else found
 
 
 def _merged(states: Sequence[Bindings]) -> Bindings:
@@ -158,7 +173,10 @@ def _merged(states: Sequence[Bindings]) -> Bindings:
         missing = _begin(cell) if cell[0] == "self" else NOTHING
         result[cell] = states[0].get(cell, missing)
         for state in states[1:]:
-            result[cell] = _either(result[cell], state.get(cell, missing))
+            one, other = result[cell], state.get(cell, missing)
+            if one != other:
+                is_one = NOTHING in (one, other) and cell[0] != "self"
+                result[cell] = _flat(one) | _flat(other) if is_one else _either(one, other)
     return result
 
 
@@ -179,7 +197,10 @@ def _plain(state: Bindings) -> Bindings:
         if not is_alone:
             result[cell] = value
         elif owners.get(("begin", cell[1]), set()) - {cell}:
-            result[cell] = frozenset({Ref(("own", cell[1]), cell, None)})
+            number = 0
+            while owners.get(("own", cell[1], number), set()) - {cell}:
+                number += 1
+            result[cell] = frozenset({Ref(("own", cell[1], number), cell, None)})
     return result
 
 
@@ -245,6 +266,8 @@ class _Followed:
         self._frames: list[_Frame] = []
         self._sources: dict[CodeType, Source] = {}
         self._owners: list[type] = []
+        # Values that cannot be copied: zip(…) of a loop.
+        self._fixed: set[Site] = set()
         # How a binding is written: line, name and expression.
         self._written: dict[Site, tuple[int, str, str]] = {}
 
@@ -328,6 +351,9 @@ class _Followed:
         names = given[1:] if has_self else given
         frame.live = frozenset(names)
         state = dict(state)
+        defaults = defaults_of(function) or ()
+        for name, default in zip(reversed(names), reversed(defaults), strict=False):
+            state[frame.depth, name] = self._constant(default, f"the default of {name}")
         for name, value in (*zip(names, values, strict=False), *named.items()):
             self._bind((frame.depth, name), value, (code, name), state, f"{name}", None)
         ends = self._statements(source.tree.body, [state])
@@ -435,6 +461,9 @@ class _Followed:
 
     def _for(self, node: ast.For, state: Bindings) -> list[Bindings]:
         iterated = self._value(node.iter, state)
+        called = resolve(node.iter.func, self._frame.source) if _is_call(node.iter) else None
+        if any(called is each for each in _ITERATORS):
+            self._fixed.add(self._site(node.iter))
         held = self._hold(iterated, node.iter, state)
         value = _elements(iterated)
         ends = self._loop(node, state, value)
@@ -455,7 +484,10 @@ class _Followed:
             if case.guard is not None:
                 self._frame.live = self._frame.names.during(node)
                 self._value(case.guard, inside)
+                state = _merged([state, inside])
             ends += self._statements(case.body, [inside])
+            if case.guard is None and _matches_all(case.pattern):
+                return ends
         return [*ends, state]
 
     def _assign(self, node: ast.Assign, state: Bindings) -> None:
@@ -472,14 +504,14 @@ class _Followed:
             for each in node.value.elts:
                 values.append(self._value(each, state))
                 held.append(self._hold(values[-1], each, state))
-            frame.live = frame.names.after(node)
+            frame.live = frame.names.after(node) | _names(target)
             for part, each, cell in zip(target.elts, node.value.elts, held, strict=True):
                 value = state.pop(cell)
                 self._set(part, value, each, state)
             return
         value = self._value(node.value, state)
-        if len(node.targets) > 1 and not _flat(_computed(value)):
-            value = self._fresh(node.value, self._site(node.value), state)
+        if len(node.targets) > 1:
+            value = self._filled(_computed(value), self._site(node.value), state)
         frame.live = frame.names.after(node) | frozenset(
             name for each in node.targets for name in _names(each)
         )
@@ -540,9 +572,17 @@ class _Followed:
         self._value(node.value, state)
         value = state.pop(held)
         frame.live = frame.names.after(node)
+        if isinstance(node.op, ast.MatMult) and not isinstance(target, ast.Subscript):
+            name = ast.unparse(target)
+            raise self._mistake(
+                node, "@= depends on the version of NumPy", f"write {name} = {name} @ …"
+            )
+        if isinstance(target, ast.Name) and (
+            not _flat(value) or any(ref.thing == _NEW for ref in _flat(value))
+        ):
+            new = self._fresh(self._site(target), state)
+            state[frame.depth, target.id] = _flat(state.get((frame.depth, target.id), ())) | new
         if not _flat(value):
-            if isinstance(target, ast.Name):
-                state.pop((frame.depth, target.id), None)
             return
         self._changed(_flat(value), self._cell(target, state), target, state)
         if (name := self._member_name(target)) is not None:
@@ -579,28 +619,44 @@ class _Followed:
             self._written[site] = (given.lineno, name, ast.unparse(given))
         elif site not in self._written:
             self._written[site] = (self._frame.source.tree.lineno, name, name)
-        if value == NOTHING and given is not None and is_new:
-            value = self._fresh(given, site, state)
+        if not isinstance(given, ast.Constant):
+            value = self._filled(value, site, state)
         self._bound(cell, value, site, state)
 
     def _bound(self, cell: Cell, value: Value, site: Site | None, state: Bindings) -> None:
         is_variable = cell[0] != "held"
         if site in self._copies:
-            copied = ("copy", site)
-            self._renamed(copied, ("old", copied), state)
-            value = _mapped(value, lambda ref: ref._replace(place=copied))
+            value = self._copied(value, ("copy", site), state)
         state[cell] = _mapped(
             value,
             lambda ref: ref._replace(site=site, bound=site if is_variable else ref.bound),
         )
 
-    def _fresh(self, given: ast.expr, site: Site, state: Bindings) -> Refs:
-        """Return a reference to the new array that an expression may make."""
-        if isinstance(given, ast.Constant | ast.Compare | ast.BoolOp):
-            return NOTHING
-        new = ("new", site)
+    def _fresh(self, site: Site, state: Bindings, *path: int) -> Refs:
+        """Return a reference to the new array that an expression, or a part of it, may make."""
+        new = ("new", site, *path)
         self._renamed(new, ("old", new), state)
         return frozenset({Ref(new, new, site)})
+
+    def _copied(self, value: Value, place: Name, state: Bindings) -> Value:
+        """Return a value whose arrays are copied; those of a tuple one by one."""
+        if isinstance(value, tuple):
+            return tuple(
+                self._copied(each, (*place, number), state) for number, each in enumerate(value)
+            )
+        self._renamed(place, ("old", place), state)
+        return _mapped(value, lambda ref: ref._replace(place=place))
+
+    def _filled(self, value: Value, site: Site, state: Bindings, *path: int) -> Value:
+        """Return a value with a reference to a new array where it may be one."""
+        if isinstance(value, tuple):
+            return tuple(
+                self._filled(each, site, state, *path, number) for number, each in enumerate(value)
+            )
+        old = frozenset(each for each in value if each.thing != _NEW)
+        if old and old == value:
+            return value
+        return old | self._fresh(site, state, *path)
 
     def _renamed(self, name: Name, new: Name, state: Bindings) -> None:
         """Rename the arrays and places that an expression made before."""
@@ -676,7 +732,15 @@ class _Followed:
                 "the array is replaced while it is changed",
                 "call the method in a statement before",
             )  # fmt: skip
-        self._copies.add(ref.site)
+        self._copy_at(ref.site, node)
+
+    def _copy_at(self, site: Site, node: ast.AST) -> None:
+        if site in self._fixed:
+            _, _, text = self._written[site]
+            raise self._mistake(
+                node, f"changes what the loop goes through, {text}", "copy its arrays: x.copy()"
+            )
+        self._copies.add(site)
 
     def _changed(self, refs: Refs, own: Cell | None, node: ast.AST, state: Bindings) -> None:
         """Follow a change of elements; `own`: the variable through which they are changed."""
@@ -684,9 +748,11 @@ class _Followed:
             kind = ref.place[0]
             if ref.thing[0] == "read-only" and ref.place != ref.thing:
                 self._reject(own, ref, None, ref, node, state)
-            # A direct change, such as `self.u.value[0] = 1`, is rejected elsewhere.
-            if kind == "input" and ref.bound is not None:
-                self._copies.add(ref.bound)
+            if kind == "input" and (site := ref.bound or ref.site) is not None:
+                self._copy_at(site, node)
+            elif kind == "input":
+                what = f"{ast.unparse(node)} belongs to an Input, which is read-only"
+                raise self._mistake(node, what, "set an Output, or copy it to a variable first")
             if ref.is_read_only:
                 what = f"{self._named(own)} is a read-only view in NumPy"
                 raise self._mistake(node, what, self._as_copy(*self._of(own, state), ref))
@@ -694,7 +760,7 @@ class _Followed:
                 _, name, kind = ref.place
                 raise self._mistake(node, f"changes {name}, {kind}", self._as_copy(ref))
             for cell, other in list(self._live(state)):
-                if cell == own:
+                if cell == own and not isinstance(state[cell], tuple):
                     continue
                 if other.thing == ref.thing and other.place != ref.place:
                     self._reject(own, ref, cell, other, node, state)
@@ -725,11 +791,13 @@ class _Followed:
     def _as_copy(self, *refs: Ref) -> str:
         """Return how to write one of the bindings as a copy."""
         known = [self._written[each.bound] for each in refs if each.bound in self._written]
+        # A member that was bound to a variable is the place to copy.
+        known.sort(key=lambda each: (each[2].endswith(".copy()"), not each[1].startswith("self.")))
         for line, name, text in known:
             if name and name != text:
-                return f"write {name} = {text}.copy() in line {line}"
+                return f"write {name} = {_copy_of(text)} in line {line}"
         for line, _, text in known:
-            return f"write {text}.copy() in line {line}"
+            return f"write {_copy_of(text)} in line {line}"
         return "copy one of them: .copy()"
 
     def _named(self, cell: Cell | None) -> str:
@@ -823,7 +891,7 @@ class _Followed:
                 return NOTHING
             if node.id in self._frame.source.function.__code__.co_varnames:
                 return state.get((self._frame.depth, node.id), NOTHING)
-            return self._constant(resolve(node, self._frame.source), node)
+            return self._constant(resolve(node, self._frame.source), node.id)
         if isinstance(node, ast.Constant):
             return NOTHING
         if isinstance(node, ast.Tuple | ast.List):
@@ -853,7 +921,32 @@ class _Followed:
                 state.update(_merged([state, before]))
             return found
         parts = [each for each in ast.iter_child_nodes(node) if isinstance(each, ast.expr)]
-        return self._lazy(self._operands(parts, state))
+        values = self._operands(parts, state)
+        if isinstance(node, ast.BinOp) and any(isinstance(each, tuple) for each in values):
+            return self._of_tuples(node, values, state)
+        return self._lazy(values)
+
+    def _of_tuples(self, node: ast.BinOp, values: Value, state: Bindings) -> Value:
+        """Return the value of `(a, b) + (c,)` and `[a] * 3`; of other operators a new array."""
+        assert isinstance(values, tuple)
+        left, right = values
+        if isinstance(node.op, ast.Add) and isinstance(left, tuple) and isinstance(right, tuple):
+            return (*left, *right)
+        if not isinstance(node.op, ast.Mult):
+            return self._lazy(values)
+        of, times = (left, node.right) if isinstance(left, tuple) else (right, node.left)
+        if not isinstance(of, tuple) or not isinstance(times, ast.Constant):
+            return self._lazy(values)
+        site = self._site(node)
+        elements = self._filled(of, site, state)
+        assert isinstance(elements, tuple)
+        found: list[Value] = []
+        # Compiled, the elements are computed once more for each repetition.
+        for number in range(int(times.value)):
+            found += [
+                _mapped(each, lambda ref, n=number: _repeated(ref, site, n)) for each in elements
+            ]
+        return tuple(found)
 
     def _operands(self, nodes: Sequence[ast.expr], state: Bindings) -> Value:
         """Follow operands in order; each is held until the last is computed."""
@@ -873,10 +966,13 @@ class _Followed:
             if ref.place[0] not in _UNCHANGED
         )
 
-    def _constant(self, value: Any, node: ast.expr) -> Refs:
+    def _constant(self, value: Any, name: str) -> Value:
+        if isinstance(value, tuple | list):
+            parts = enumerate(value)
+            return tuple(self._constant(each, f"{name}[{number}]") for number, each in parts)
         if not isinstance(value, np.ndarray):
             return NOTHING
-        place = ("read-only", ast.unparse(node), "a constant of the module")
+        place = ("read-only", name, "a constant of the module")
         return frozenset({Ref(place, place, None, True, value.ndim)})
 
     def _attribute(self, node: ast.Attribute, state: Bindings) -> Value:
@@ -885,7 +981,7 @@ class _Followed:
             return self._read(member, state)
         if self._is_self(node.value):
             if node.attr in self._constants:
-                return self._constant(self._constants[node.attr], node)
+                return self._constant(self._constants[node.attr], ast.unparse(node))
             method = self._methods.find(node.attr)
             if method is not None and method.kind == "property":
                 return self._own_call(method, [], {}, node, state)
@@ -902,7 +998,7 @@ class _Followed:
             return self._message(path, node, state)
         resolved = resolve(node, self._frame.source)
         if resolved is not None:
-            return self._constant(resolved, node)
+            return self._constant(resolved, ast.unparse(node))
         value = self._value(node.value, state)
         if node.attr not in _VIEW_ATTRIBUTES:
             return NOTHING
@@ -951,20 +1047,28 @@ class _Followed:
     def _subscript(self, node: ast.Subscript, state: Bindings) -> Value:
         base = self._value(node.value, state)
         held = self._hold(base, node.value, state)
-        self._value(node.slice, state)
+        index = self._value(node.slice, state)
         base = state.pop(held)
         if isinstance(base, tuple):
-            index = node.slice.value if isinstance(node.slice, ast.Constant) else None
-            if isinstance(index, int) and -len(base) <= index < len(base):
-                return base[index]
-            return _elements(base)
+            return _element(base, node.slice)
+        table = resolve(node.value, self._frame.source)
+        if isinstance(table, dict) and isinstance(node.slice, ast.Constant):
+            return self._constant(table.get(node.slice.value), ast.unparse(node))
         parts = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
         views = [each for each in parts if _keeps(each)]
+        axes = sum(map(_is_axis, parts))
+        if len(parts) > 1 and any(map(_is_ellipsis, parts)) and _flat(base):
+            raise self._mistake(node, "... among other indices", "write : for each other index")
+        if any(isinstance(each, ast.List) for each in parts) or any(
+            ref.thing[0] in _SURELY and not (isinstance(index, tuple) and not index)
+            for ref in _flat(index)
+        ):
+            return NOTHING  # an array as an index: a copy of the selected elements
         found = set()
         for ref in base:
             left = None
             if ref.dimensions is not None:
-                left = ref.dimensions - (len(parts) - len(views))
+                left = ref.dimensions + axes - (len(parts) - len(views))
                 if left <= 0:
                     continue  # a number, or a copy of selected elements
             found.add(ref._replace(is_whole=False, dimensions=left))
@@ -990,10 +1094,19 @@ class _Followed:
             owner = state.pop(held)
         first: Value = values[0] if values else NOTHING
         everything = _flat((owner, *values, *named.values()))
-        if any(target is each for each in (*_SAME, *_VIEWS, *_DIAGONALS)):
+        is_array = not isinstance(first, tuple)
+        if is_array and any(target is each for each in (*_SAME, *_VIEWS, *_DIAGONALS)):
             return self._viewed(target, _flat(first), node)
+        if target is np.linalg.matrix_power and not _is_other_power(node):
+            # The first power is the matrix itself, compiled a copy.
+            place = ("copy of power", self._site(node))
+            return frozenset(each._replace(place=place, is_whole=False) for each in _flat(first))
+        if target is enumerate:
+            return ((NOTHING, _elements(first)),)
+        if target is zip:
+            return (tuple(map(_elements, values)),)
         if any(target is each for each in _ITERATORS):
-            return (everything,)
+            return (_elements(first),)
         if any(target is each for each in _TUPLES):
             return first
         if isinstance(called, ast.Attribute) and target is None:
@@ -1010,7 +1123,9 @@ class _Followed:
         if any(function is each for each in _DIAGONALS):
             place = ("copy of diagonal", self._site(node))
             return frozenset(
-                each._replace(place=place, is_whole=False, is_read_only=True) for each in refs
+                each._replace(place=place, is_whole=False, is_read_only=True, dimensions=1)
+                for each in refs
+                if function is np.diagonal or each.dimensions != 1
             )
         if any(function is each for each in _SAME):
             return refs
@@ -1107,6 +1222,12 @@ def _renamed_after(ref: Ref, owners: set[str]) -> Ref:
     return ref._replace(thing=("shared", *sorted(owners)))
 
 
+def _repeated(ref: Ref, site: Site, number: int) -> Ref:
+    """Return a reference of an element of a repeated list, in a place of its own if it is new."""
+    is_new = ref.place[:2] == ("new", site)
+    return ref._replace(place=(*ref.place, number)) if is_new else ref
+
+
 def _message_ref(path: str) -> Ref:
     return Ref(("message", path), ("message", path), None)
 
@@ -1115,17 +1236,47 @@ def _view(ref: Ref) -> Ref:
     return ref._replace(is_whole=False, dimensions=None)
 
 
-def _elements(value: Value) -> Refs:
+def _elements(value: Value) -> Value:
     """Return the references of the elements of what is iterated or unpacked."""
-    found = set()
-    for ref in _flat(value):
-        if isinstance(value, tuple):
-            found.add(ref)  # an element of a tuple, or an element of its element
-        elif ref.dimensions is None:
-            found.add(ref._replace(is_whole=False))
+    if isinstance(value, tuple):
+        found: Value = value[0] if value else NOTHING
+        for each in value[1:]:
+            found = _either(found, each)
+        return found
+    parts = set()
+    for ref in value:
+        if ref.dimensions is None:
+            parts.add(ref._replace(is_whole=False))
         elif ref.dimensions > 1:
-            found.add(ref._replace(is_whole=False, dimensions=ref.dimensions - 1))
-    return frozenset(found)
+            parts.add(ref._replace(is_whole=False, dimensions=ref.dimensions - 1))
+    return frozenset(parts)
+
+
+def _element(base: tuple[Value, ...], index: ast.expr) -> Value:
+    """Return the element, or the part, of a tuple."""
+    constant = ast.Expression(index)
+    try:
+        if not isinstance(index, ast.Slice):
+            return base[ast.literal_eval(constant)]
+        bounds = [None if each is None else ast.literal_eval(each)
+                  for each in (index.lower, index.upper, index.step)]  # fmt: skip
+        return base[slice(*bounds)]
+    except (ValueError, TypeError, IndexError):
+        return (_elements(base),) if isinstance(index, ast.Slice) else _elements(base)
+
+
+def _is_axis(index: ast.expr) -> bool:
+    return ast.unparse(index) in ("None", "np.newaxis", "numpy.newaxis")
+
+
+def _is_ellipsis(index: ast.expr) -> bool:
+    return isinstance(index, ast.Constant) and index.value is ...
+
+
+def _matches_all(pattern: ast.pattern) -> bool:
+    if isinstance(pattern, ast.MatchOr):
+        return any(map(_matches_all, pattern.patterns))
+    return isinstance(pattern, ast.MatchAs) and pattern.pattern is None
 
 
 def _keeps(index: ast.expr) -> bool:
@@ -1135,6 +1286,24 @@ def _keeps(index: ast.expr) -> bool:
     return (isinstance(index, ast.Constant) and index.value in (..., None)) or (
         ast.unparse(index) in ("np.newaxis", "numpy.newaxis")
     )
+
+
+def _is_other_power(node: ast.Call) -> bool:
+    exponent = node.args[1] if len(node.args) > 1 else None
+    return isinstance(exponent, ast.Constant) and exponent.value != 1
+
+
+def _is_call(node: ast.expr) -> TypeGuard[ast.Call]:
+    return isinstance(node, ast.Call)
+
+
+def _copy_of(text: str) -> str:
+    """Return an expression with .copy()."""
+    node = ast.parse(text, mode="eval").body
+    if isinstance(node, ast.Tuple | ast.List):
+        return f"({', '.join(_copy_of(ast.unparse(each)) for each in node.elts)})"
+    simple = (ast.Name, ast.Attribute, ast.Subscript, ast.Call)
+    return f"{text}.copy()" if isinstance(node, simple) else f"({text}).copy()"
 
 
 def _is_true(test: ast.expr) -> bool:

@@ -8,6 +8,7 @@ import difflib
 import enum
 import inspect
 import math
+import operator
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import suppress
 from types import BuiltinFunctionType, FunctionType, ModuleType
@@ -129,6 +130,15 @@ _MODULES = {
 _FUNCTIONS = {
     "time.sleep": ("blocks the cycle", "keep the time of the next step in a State"),
 }
+# Functions that change an array, or return one that is sometimes a view.
+_REJECTED = (
+    *(np.asfortranarray, np.real, np.imag, np.copyto, np.fill_diagonal, np.put, np.putmask),
+    *(np.place, np.put_along_axis, operator.setitem, operator.delitem),
+    *(getattr(operator, each) for each in dir(operator) if each.startswith("i") and each[1:] in (
+        *("add", "sub", "mul", "truediv", "floordiv", "mod", "pow", "matmul", "and", "or", "xor"),
+        *("lshift", "rshift", "concat"),
+    )),
+)  # fmt: skip
 # Decorators that leave the body of a function as it is.
 _DECORATORS = ("property", "staticmethod", "override", "final")
 # Packages whose functions are compiled, or rejected individually.
@@ -325,6 +335,8 @@ def _called(node: ast.Call, target: Any, source: Source) -> None:
     if isinstance(target, BuiltinFunctionType) and root in ("math", "builtins"):
         with suppress(ValueError):  # some builtins have no signature
             check_arguments(node, target, source.file)
+    if any(target is each for each in _REJECTED):
+        raise at(file, node, f"{name} is not compiled", "write it as an assignment: x[:] = …")
     if (full := f"{root}.{getattr(target, '__name__', '')}") in _FUNCTIONS:
         raise at(file, node, *_FUNCTIONS[full])
     if root in _MODULES:
