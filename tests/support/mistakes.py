@@ -141,6 +141,23 @@ UPDATE: dict[str, tuple[str, str]] = {
         "write a = self.gains.copy()",
     ),
     "diagonal changed": ("a = np.diag(self.m)\na[0] = 1.0  # here", "read-only view"),
+    "tuple with an array twice": (
+        "a = (self.z, self.z)\nself.z = 2.0 * self.z\na[0][0] = 1.0  # here\nself.x.write(a[1])",
+        "the same array",
+    ),
+    "matrix product in place": ("self.m @= self.m", "version of NumPy"),
+    "ellipsis among indices": ("self.z[:] = self.m[..., 0]", "among other indices"),
+    "input changed through a function": ("np.asarray(self.w.value)[0] = 1.0", "an Input"),
+    "array replaced in a loop over it": (
+        "for a, b in zip((self.z, self.held), (1.0, 2.0)):\n"
+        "    self.z = self.z + b  # here\n    self.f = a[0]",
+        "goes through",
+    ),
+    "power that is the matrix itself": (
+        "a = np.linalg.matrix_power(self.m, 1)\na[0, 0] = 1.0  # here",
+        "the same array",
+    ),
+    "real part": ("self.z[:] = np.real(self.z)", "np.real"),
     "pair of one array": (
         "a, b = self.z, self.z\nself.z = 2.0 * self.z\na += 1.0  # here\nself.x.write(b)",
         "the same array",

@@ -175,6 +175,8 @@ class _Comparing:
         # Without names that refer to arrays of earlier cycles.
         self._other = Model(cls, compiled.description, compiled.narrow)
         self.result.branches = self._model.branches
+        members = compiled.description.members.values()
+        self._optional = [each for each in members if each.type.optional]
         self._draw = np.random.default_rng(1)  # separate, so that inputs do not depend on it
         self._prepared: dict[bytes, Any] = {}  # records by parameter values
 
@@ -251,6 +253,9 @@ class _Comparing:
                 self._last_raised = said
             return
         mine["_line"] = theirs["_line"] = record["_line"]
+        for member in self._optional:
+            if not mine[member.known] and not theirs[member.known]:
+                mine[member.name] = theirs[member.name]  # None has no value
         if not np.array_equal(_bytes(mine), _bytes(theirs)):
             self._compare(hook, mine, theirs)
         _bytes(record)[:] = _bytes(theirs)

@@ -16,6 +16,7 @@ types are not known here, so that any value may be an array unless its declarati
 
 import ast
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from types import CodeType
 from typing import Any, NamedTuple, TypeGuard
 
@@ -572,10 +573,10 @@ class _Followed:
         self._value(node.value, state)
         value = state.pop(held)
         frame.live = frame.names.after(node)
-        if isinstance(node.op, ast.MatMult) and not isinstance(target, ast.Subscript):
-            name = ast.unparse(target)
+        if isinstance(node.op, ast.MatMult):
+            written = ast.unparse(target)
             raise self._mistake(
-                node, "@= depends on the version of NumPy", f"write {name} = {name} @ …"
+                node, "@= depends on the version of NumPy", f"write {written} = {written} @ …"
             )
         if isinstance(target, ast.Name) and (
             not _flat(value) or any(ref.thing == _NEW for ref in _flat(value))
@@ -943,9 +944,8 @@ class _Followed:
         found: list[Value] = []
         # Compiled, the elements are computed once more for each repetition.
         for number in range(int(times.value)):
-            found += [
-                _mapped(each, lambda ref, n=number: _repeated(ref, site, n)) for each in elements
-            ]
+            again = partial(_repeated, site=site, number=number)
+            found += [_mapped(each, again) for each in elements]
         return tuple(found)
 
     def _operands(self, nodes: Sequence[ast.expr], state: Bindings) -> Value:
@@ -1257,10 +1257,12 @@ def _element(base: tuple[Value, ...], index: ast.expr) -> Value:
     constant = ast.Expression(index)
     try:
         if not isinstance(index, ast.Slice):
-            return base[ast.literal_eval(constant)]
+            element: Value = base[ast.literal_eval(constant)]
+            return element
         bounds = [None if each is None else ast.literal_eval(each)
                   for each in (index.lower, index.upper, index.step)]  # fmt: skip
-        return base[slice(*bounds)]
+        part: Value = base[slice(*bounds)]
+        return part
     except (ValueError, TypeError, IndexError):
         return (_elements(base),) if isinstance(index, ast.Slice) else _elements(base)
 

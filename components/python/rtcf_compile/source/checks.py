@@ -316,7 +316,7 @@ def _called(node: ast.Call, target: Any, source: Source) -> None:
     if is_own(target):
         check_arguments(node, target, source.file)
         return
-    inner = getattr(target, "__wrapped__", getattr(target, "py_func", None))
+    inner: Any = getattr(target, "__wrapped__", getattr(target, "py_func", None))
     if is_own(inner):
         what = f"{name} has a decorator ({_kind_of(target)}), which is not compiled"
         raise at(file, node, what, f"remove it from def {inner.__name__}")

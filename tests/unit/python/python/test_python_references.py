@@ -17,6 +17,7 @@ from hypothesis import strategies as st
 from name_programs import Program, component, plain
 from rtcf.component import describe
 from rtcf.component.interpreter import fresh_record
+from rtcf_compile.comparison import verify
 from rtcf_compile.comparison.inside import Inside
 from rtcf_compile.machine_code import object_file
 from rtcf_compile.rewriting.functions import Functions
@@ -212,9 +213,36 @@ STATEMENTS = {
     "self.b = self.a - old",
     "helper": "old = same(self.a)\nself.a = self.a + self.v.value\nself.b = old",
     "shared, not changed": "self.b = self.a\nself.a = self.a + self.v.value",
+    "selected": "old = self.a\nself.a = self.a if self.v.value[0] > 0.0 else 2.0 * self.v.value\n"
+    "self.b = self.a - old",
+    "selected by a function": "old = self.a\nself.a = self.halved(self.a, self.v.value[0])\n"
+    "self.b = self.a - old",
+    "tuples joined": "t = (self.a,) + (self.b,)\nself.a = self.a + self.v.value\nself.b = t[0]",
+    "part of a tuple": "t = (self.a, self.b, self.c)[1:]\nself.b = self.b + self.v.value\n"
+    "self.c = t[0] - self.b",
+    "list repeated": "t = [self.a] * 2\nself.a = self.a + self.v.value\nself.b = t[1] - self.a",
+    "annotated again": "old = self.a\nself.a = self.a + self.v.value\nold: np.ndarray\n"
+    "self.b = self.a - old",
+    "element after its member": "x = self.a\nself.a, x[0] = self.v.value, 50.0",
+    "ravel of a column": "x = self.m[:, 0].ravel()\nx[0] += 4.0\nself.a = x + 1.0",
+    "ravel of a reversed vector": "x = self.a[::-1].ravel()\nx[0] += 4.0\nself.b = x + 1.0",
+    "contiguous": "x = np.ascontiguousarray(self.m.T)\nx[0, 0] += 4.0\nself.k = x + 1.0",
+    "first power": "x = self.a**1\nx[0] = 5.0\nself.b = x",
+    "new axis": "x = self.a[None, :]\nrow = x[0]\nself.a = self.a + self.v.value\nself.b = row",
+    "diagonal matrix": "x = np.diag(self.v.value)\nx[0, 1] = 3.0\nself.k = x",
+    "rows by a list": "self.k = self.m[[2, 0, 1, 3]]\nself.k[0, 0] += 1.0",
+    "input sorted": "self.v.value.sort()\nself.a = self.v.value",
+    "match": "match int(self.v.value[0]):\n    case 0:\n        x, y = self.a, self.b\n"
+    "    case _:\n        x, y = self.b, self.a\nself.a = self.a + self.v.value\nself.c = x - y",
     "view of a new array": "x = self.v.value + 1.0\nhead = x[:2]\nhead[0] = 9.0\nself.a = x",
 }
 METHODS = """\
+    @staticmethod
+    def halved(x, share):
+        if share > 0.0:
+            return 0.5 * x
+        return x
+
     @property
     def now(self):
         return self.a
@@ -246,7 +274,7 @@ def test_statements_mean_what_they_mean_in_numpy(tmp_path: Path, compiler: Any) 
         whole = METHODS + f"    def program(self):\n{body}"
         members = r"self\.([abcmksyz])\b(?!\()"
         whole = re.sub(members, rf"self.\g<1>{number}", whole)
-        names = r"\b(now|stepped|set_m|set_a|get_m|same|program)\b"
+        names = r"\b(now|halved|stepped|set_m|set_a|get_m|same|program)\b"
         programs[number] = Program(re.sub(names, rf"\g<1>_{number}", whole))
     found = Programs(programs, tmp_path, compiler)
     assert not found.rejected
@@ -274,3 +302,40 @@ def test_the_interpreter_binds_names_as_numpy_does(tmp_path: Path) -> None:
     assert component.a.tolist() == [1.0, 1.0]
     assert component.b.tolist() == [2.0, 3.0]
     assert component.y.value.tolist() == [1.0, 1.0]
+
+
+OPTIONAL = """\
+import numpy as np
+from rtcf.component import Component, Input, Output, State
+
+
+class Optional(Component):
+    n: Input[int]
+    v: Input[np.float64, 4]
+    y: Output[np.float64, 4]
+    o: State[np.float64 | None, 4]
+    p: State[np.float64 | None, 4]
+
+    def start(self):
+        self.o = np.ones(4) * 2.0
+        self.o, self.p = self.p, self.o
+
+    def update(self):
+        old = self.o
+        self.o = None if self.n.value == 0 else self.v.value * 2.0
+        x = None if self.n.value == 1 else self.v.value + 1.0
+        y = None if self.n.value == 2 else self.v.value + 2.0
+        if x is not None and y is not None:
+            self.y.write(y - x)
+        if old is not None:
+            self.p = old
+        self.o, self.p = self.p, self.o
+"""
+
+
+def test_temporary_arrays_that_may_be_none_keep_their_elements(tmp_path: Path) -> None:
+    file = tmp_path / "optional.py"
+    file.write_text(OPTIONAL)
+    (cls,) = modules.components(modules.load(file))
+    found = verify.compare(cls, object_file.compile_component(cls), 1000)
+    assert (found.differences, found.raised) == ([], 0)
