@@ -71,7 +71,7 @@ NOTHING: Refs = frozenset()
 _RESULT = ("result",)
 _UNCHANGED = ("input", "read-only")  # places that a hook does not change
 # What surely is an array, not a number.
-_SURELY = ("begin", "own", "shared", "read", "read-only", "result")
+_SURELY = ("begin", "own", "shared", "read", "read-only")
 # One of the values that a condition selects: a number, or a new array.
 _NEW = ("selected",)
 _MOST_STATES = 12  # different bindings at one place, before they are merged
@@ -450,7 +450,7 @@ class _Followed:
                 ended.append(dict(each))
                 if isinstance(node, ast.For):
                     assert next_value is not None
-                    self._set(node.target, next_value, node.iter, each, is_new=False)
+                    self._set(node.target, next_value, node.iter, each)
                 begins.append(each)
             ends = self._statements(node.body, begins)
             new = states.add([*ends, *frame.continues[-1]])
@@ -521,28 +521,18 @@ class _Followed:
             self._set(each, state[cell], node.value, state)
         del state[cell]
 
-    def _set(
-        self,
-        target: ast.expr,
-        value: Value,
-        given: ast.expr,
-        state: Bindings,
-        is_new: bool = True,
-    ) -> None:
-        """Follow the assignment of a value to a target; `given`: the expression of the value.
-
-        `is_new`: a value without references may be a new array.
-        """
+    def _set(self, target: ast.expr, value: Value, given: ast.expr, state: Bindings) -> None:
+        """Follow the assignment of a value to a target; `given`: the expression of the value."""
         frame = self._frame
         if isinstance(target, ast.Name):
             cell = (frame.depth, target.id)
-            self._bind(cell, value, self._site(given), state, target.id, given, is_new)
+            self._bind(cell, value, self._site(given), state, target.id, given)
         elif isinstance(target, ast.Tuple | ast.List):
             parts: Sequence[Value] = [_elements(value)] * len(target.elts)
             if isinstance(value, tuple) and len(value) == len(target.elts):
                 parts = value
             for each, part in zip(target.elts, parts, strict=True):
-                self._set(each, part, given, state, is_new)
+                self._set(each, part, given, state)
         elif isinstance(target, ast.Subscript):
             base = self._value(target.value, state)
             held = self._hold(base, target.value, state, may_copy=False)
@@ -612,7 +602,6 @@ class _Followed:
         state: Bindings,
         name: str,
         given: ast.expr | None,
-        is_new: bool = True,
     ) -> None:
         """Bind a variable."""
         value = _computed(value)
@@ -713,10 +702,7 @@ class _Followed:
         if isinstance(given, ast.Constant) and given.value is None:
             state["self", name] = NOTHING
             return
-        if is_copy or not refs:
-            new = ("new", site)
-            self._renamed(new, ("old", new), state)
-            refs = frozenset({Ref(new, place, site)})
+        refs = _flat(self._filled(NOTHING if is_copy else refs, site, state))
         refs = frozenset(ref._replace(site=site, bound=site) for ref in refs)
         state["self", name] = self._placed(refs, name)
 
@@ -1059,9 +1045,8 @@ class _Followed:
         axes = sum(map(_is_axis, parts))
         if len(parts) > 1 and any(map(_is_ellipsis, parts)) and _flat(base):
             raise self._mistake(node, "... among other indices", "write : for each other index")
-        if any(isinstance(each, ast.List) for each in parts) or any(
-            ref.thing[0] in _SURELY and not (isinstance(index, tuple) and not index)
-            for ref in _flat(index)
+        if any(isinstance(each, ast.List | ast.Compare) for each in parts) or any(
+            ref.thing[0] in _SURELY for ref in _flat(index)
         ):
             return NOTHING  # an array as an index: a copy of the selected elements
         found = set()

@@ -231,6 +231,11 @@ STATEMENTS = {
     "new axis": "x = self.a[None, :]\nrow = x[0]\nself.a = self.a + self.v.value\nself.b = row",
     "diagonal matrix": "x = np.diag(self.v.value)\nx[0, 1] = 3.0\nself.k = x",
     "rows by a list": "self.k = self.m[[2, 0, 1, 3]]\nself.k[0, 0] += 1.0",
+    "row by an int of a function": "row = self.m[np.argmax(self.a)]\n"
+    "self.m = self.m + self.v.value\nself.b = row",
+    "selected twice": "up = self.v.value[0] > 0.0\nself.a = self.a if up else self.v.value\n"
+    "self.b = self.b if up else self.v.value\nself.a[0] += 1.0",
+    "array of its own type": "x = np.asarray(self.a, dtype=float)\nx[0] += 5.0",
     "input sorted": "self.v.value.sort()\nself.a = self.v.value",
     "match": "match int(self.v.value[0]):\n    case 0:\n        x, y = self.a, self.b\n"
     "    case _:\n        x, y = self.b, self.a\nself.a = self.a + self.v.value\nself.c = x - y",
