@@ -22,14 +22,15 @@ _SIZES = {"string": 0, "bool": 1, "byte": 1, "char": 1, "time": 8, "duration": 8
 def pack(definition: str, columns: Mapping[str, npt.NDArray[np.generic]]) -> list[bytes]:
     """Return one serialised message per row of the columns; fields without a column are zero.
 
-    Columns are by the path of a field, or "" for the only value of a std_msgs message.  For an
-    array, the axes after the first one have its values.  Raises ValueError.
+    Columns are by the path of a field, or "" for the only value of a std_msgs message, or for all
+    numbers of a message that has only numbers, such as a vector.  For an array, the axes after the
+    first one have its values.  Raises ValueError.
     """
     steps = max(len(each) for each in columns.values())
     sample = _Zero(Definition(definition), columns).message("", "")
     leaves = {each.path: each for each in ros_layout.leaves(definition, sample)}
     rows = np.tile(np.frombuffer(sample, "u1"), (steps, 1))
-    for path, column in columns.items():
+    for path, column in _by_number(columns, list(leaves.values()), steps).items():
         leaf = leaves.get(path)
         if leaf is None:
             names = [each or "(the value itself)" for each in leaves]
@@ -68,6 +69,23 @@ def unpack(definition: str, messages: Sequence[bytes]) -> dict[str, npt.NDArray[
         values = np.ascontiguousarray(rows[:, leaf.offset : end]).view(leaf.format)
         columns[leaf.path] = values[:, 0] if leaf.count is None else values
     return columns
+
+
+def _by_number(
+    columns: Mapping[str, npt.NDArray[np.generic]], leaves: Sequence[ros_layout.Leaf], steps: int
+) -> Mapping[str, npt.NDArray[np.generic]]:
+    """Return the columns with that of a whole vector split into its numbers."""
+    if "" not in columns or any(each.count is not None or not each.path for each in leaves):
+        return columns
+    whole = columns[""].reshape(steps, -1)
+    paths = [each.path for each in leaves]
+    if whole.shape[1] != len(paths):
+        raise ValueError(
+            f"{whole.shape[1]} values per cycle instead of {len(paths)}: "
+            f"give a sequence of {len(paths)} numbers (fields: {listing(paths)})"
+        )
+    others = {path: column for path, column in columns.items() if path}
+    return {**dict(zip(paths, whole.T, strict=True)), **others}
 
 
 class _Zero:

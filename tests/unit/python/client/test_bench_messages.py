@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseStamped, Twist
+from geometry_msgs.msg import PoseStamped, Twist, Vector3
 from rtcf.testing.messages import pack, unpack
 from rtcf.testing.response import held
 from sensor_msgs.msg import JointState
@@ -72,6 +72,7 @@ def test_messages_written_by_ros_are_read() -> None:
         (Twist, {"linear.w": np.zeros(2)}, "no field linear.w; did you mean"),
         (Float64, {"x": np.zeros(2)}, "no field x (fields: (the value itself))"),
         (Float64, {"": np.zeros((2, 3))}, "3 values per cycle instead of 1"),
+        (Vector3, {"": np.zeros(2)}, "give a sequence of 3 numbers (fields: x, y, z)"),
         (Int32, {"": np.array([0.5, 1.0])}, "some values do not fit int32"),
         (Int32, {"": np.array([2.0**31, 1.0])}, "some values do not fit int32"),
         (Int32, {"": np.array([np.nan, 1.0])}, "some values do not fit int32"),
@@ -82,6 +83,12 @@ def test_unsuitable_columns_are_rejected(kind: Any, columns: dict[str, Any], sai
         pack(_text(kind), columns)
     assert said in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_a_vector_is_given_as_a_whole() -> None:
+    values = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
+    columns = unpack(_text(Vector3), pack(_text(Vector3), {"": values}))
+    assert np.array_equal(np.transpose([columns[each] for each in "xyz"]), values)
 
 
 def test_messages_of_different_lengths_are_rejected() -> None:
