@@ -1,5 +1,6 @@
 """Runs rtcf-compile in a child process, so that a crash of the compiler is an error in one line."""
 
+import ctypes
 import mmap
 import os
 import signal
@@ -9,12 +10,15 @@ from rtcf_compile.main import REFUSED, main
 from rtcf_compile.source import progress
 from rtcf_compile.source.mistake import Mistake
 
+_PR_SET_PDEATHSIG = 1
+
 
 def guarded() -> int:
     """Run the command; return its exit code."""
     with mmap.mmap(-1, progress.BYTES) as shared:
-        child = os.fork()
+        parent, child = os.getpid(), os.fork()
         if child == 0:
+            _end_with(parent)
             progress.note_in(shared)
             status = REFUSED
             try:
@@ -33,6 +37,13 @@ def guarded() -> int:
         mistake = Mistake(file, line, what, "write this function in another way")
         print(f"rtcf-compile: {mistake}", file=sys.stderr)
         return REFUSED
+
+
+def _end_with(parent: int) -> None:
+    """Let the kernel end this process when its parent ends: nobody would use its results."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+    if os.getppid() != parent:
+        os._exit(REFUSED)
 
 
 def _end_of(child: int) -> int:

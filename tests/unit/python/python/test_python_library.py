@@ -1,6 +1,8 @@
 """C++ compilation by rtcf-compile: none for a component, one for a new message."""
 
+import os
 import re
+import select
 import subprocess
 import textwrap
 from pathlib import Path
@@ -62,6 +64,22 @@ def test_a_crash_of_the_compiler_is_one_line(tmp_path: Path) -> None:
         "rtcf-compile: crashing.py: the compiler ended with SIGSEGV: "
         "write this function in another way\n"
     )
+
+
+def test_the_compiler_ends_with_its_parent(tmp_path: Path) -> None:
+    # The module waits for a writer of the FIFO, and tells its process before.
+    file, pid_file, fifo = (tmp_path / name for name in ("waiting.py", "pid", "fifo"))
+    os.mkfifo(fifo)
+    os.mkfifo(pid_file)
+    file.write_text(
+        "import os\n\n"
+        f"open({str(pid_file)!r}, 'w').write(str(os.getpid()))\nopen({str(fifo)!r}).read()\n"
+    )
+    command = subprocess.Popen([COMMAND, file, "--verify"])
+    child = os.pidfd_open(int(pid_file.read_text()))
+    command.kill()
+    command.wait()
+    assert select.select([child], [], [], DEADLINE_S)[0]
 
 
 class Cache:
