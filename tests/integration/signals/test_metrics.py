@@ -223,7 +223,8 @@ def test_bars_in_the_terminal_show_an_outlier_and_the_others(
         ("calculation duration", statistics.duration), ("wake-up latency", statistics.latency),
     ):  # fmt: skip
         after = done.stdout.partition(f"\n{title} (µs), ")[2]
-        assert after.startswith(f"{found.count} cycles, logarithmic bars\n")
+        count = f"{found.count:,}".replace(",", " ")
+        assert after.startswith(f"{count} cycles, logarithmic bars\n")
         bars = re.findall(
             r"^ *([\d.]+) to +([\d.]+) ([█▏▎▍▌▋▊▉]*) +(\d[\d ]*?)(?:  (.*))?$",
             after.partition("\n\n")[0], re.MULTILINE,
