@@ -151,7 +151,7 @@ UPDATE: dict[str, tuple[str, str]] = {
     "array replaced in a loop over it": (
         "for a, b in zip((self.z, self.held), (1.0, 2.0)):\n"
         "    self.z = self.z + b  # here\n    self.f = a[0]",
-        "goes through",
+        "an array of the loop",
     ),
     "power that is the matrix itself": (
         "a = np.linalg.matrix_power(self.m, 1)\na[0, 0] = 1.0  # here",

@@ -85,7 +85,7 @@ class Plain:
 
 @dataclass
 class _Scope:
-    """The local names of a function, by what they refer to."""
+    """The local names of a function: vectors, matrices and pairs."""
 
     vectors: list[str] = field(default_factory=list)
     matrices: list[str] = field(default_factory=list)

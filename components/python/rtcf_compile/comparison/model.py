@@ -16,6 +16,7 @@ import numpy as np
 from rtcf.component import Component, Fault
 from rtcf.component.declaration import (
     LOG_LEVELS,
+    PORTS,
     TIME_FIELDS,
     Derived,
     Description,
@@ -31,7 +32,7 @@ from rtcf.component.memory import Memory
 from rtcf.component.message_view import MessageView, checked, copy
 
 from rtcf_compile.rewriting import operators
-from rtcf_compile.rewriting.common_rewriting import CommonRewriting, call_of, like, loaded
+from rtcf_compile.rewriting.common_rewriting import CommonRewriting, call_of, index_of, like, loaded
 from rtcf_compile.rewriting.functions import HELPERS, drop_types, operator_functions
 from rtcf_compile.rewriting.functions import made as made_of
 from rtcf_compile.source.checks import resolve
@@ -54,7 +55,7 @@ class Model:
         self.numbers = sorted(functions.numbers)
 
     def run(self, hook: str) -> None:
-        """Run a hook; raises what it raises."""
+        """Run a hook; raise its exceptions."""
         getattr(self._object, hook)()
 
     def load(self, record: Any, anew: bool = False) -> None:
@@ -65,7 +66,7 @@ class Model:
         for name in TIME_FIELDS:
             vars(plain)[name] = record[f"_{name}"].item()
         for member in self._members:
-            if member.kind in (Input, Output, Queue):
+            if member.kind in PORTS:
                 plain._ports[member.name].load(record, anew)
             else:
                 old = None if anew else vars(plain).get(member.name)
@@ -75,7 +76,7 @@ class Model:
         """Copy all members to a record."""
         plain = self._object
         for member in self._members:
-            if member.kind in (Input, Output, Queue):
+            if member.kind in PORTS:
                 plain._ports[member.name].store(record)
             else:
                 _stored(record, member, vars(plain)[member.name])
@@ -100,7 +101,7 @@ def _stored(record: Any, member: Member, value: Any) -> None:
 
 
 class _In:
-    """An input: what a hook reads is its own."""
+    """An input: each read gives a copy."""
 
     def __init__(self, member: Member) -> None:
         self._member, self._name = member, member.name
@@ -136,7 +137,7 @@ class _In:
 
 
 class _Out:
-    """An output: it keeps a copy of what is written."""
+    """An output: it keeps a copy of the written value."""
 
     def __init__(self, member: Member) -> None:
         self._member, self._name = member, member.name
@@ -194,7 +195,7 @@ class _Queued:
 
 
 class _Plain:
-    """What the methods of a component find in `self` besides its members."""
+    """The base of plain classes: ports, and the methods that Component has."""
 
     def __init__(self, description: Description) -> None:
         vars(self)["_members"] = description.members
@@ -421,7 +422,7 @@ class _Operations(CommonRewriting):
         ]
         base, index, new = (ast.Name(each, ast.Load()) for each in names)
         place = call_of("rtcf_get", base, index)
-        steps = (self.visit(target.value), _index(self.visit(target.slice)), place,
+        steps = (self.visit(target.value), index_of(self.visit(target.slice)), place,
                  call_of(f"{change}_element", new, value))  # fmt: skip
         found: list[ast.stmt] = [
             like(node, ast.Assign([ast.Name(name, ast.Store())], step))
@@ -430,7 +431,7 @@ class _Operations(CommonRewriting):
         return [*found, like(node, ast.Expr(call_of("rtcf_set", base, index, new)))]
 
     def _set(self, node: ast.Assign, target: ast.Subscript, value: ast.expr) -> ast.stmt:
-        index = _index(target.slice)
+        index = index_of(target.slice)
         return like(node, ast.Expr(call_of("rtcf_set", loaded(target.value), index, value)))
 
     def _changing(self, operation: ast.operator) -> str:
@@ -452,16 +453,6 @@ class _Operations(CommonRewriting):
         name = f"rtcf_{_IN_PLACE[type(operation)]}"
         self.scope[name], self.scope[f"{name}_element"] = change, change_element
         return name
-
-
-def _index(node: ast.expr) -> ast.expr:
-    """Return an index as a value, with slices as slice objects."""
-    if isinstance(node, ast.Tuple):
-        return like(node, ast.Tuple([_index(each) for each in node.elts], ast.Load()))
-    if not isinstance(node, ast.Slice):
-        return node
-    bounds = [each or ast.Constant(None) for each in (node.lower, node.upper, node.step)]
-    return like(node, call_of("slice", *bounds))
 
 
 _IN_PLACE: dict[type[ast.operator], str] = {

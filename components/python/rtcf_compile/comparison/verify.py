@@ -306,7 +306,7 @@ class _Comparing:
         return self._draw.choice((-np.inf, np.inf), values.shape).astype(values.dtype)
 
     def _raised(self, hook: str, model: Model, record: Any) -> Exception | None:
-        """Run a hook of a model on a record; return what it raises."""
+        """Run a hook of a model on a record; return its exception, or None."""
         model.load(record)
         try:
             with self._bounds.python():

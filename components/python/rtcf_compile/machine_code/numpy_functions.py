@@ -1735,18 +1735,6 @@ def _matrix_power(a: Any, n: Any) -> Any:
     return power
 
 
-def _own_copy(value: Any) -> Any:
-    """Return a copy of an array, a number as it is. Compiled only."""
-    raise NotImplementedError
-
-
-@compiled_as(_own_copy)
-def _copy_of(value: Any) -> Any:
-    if isinstance(value, types.Array):
-        return lambda value: value.copy()
-    return lambda value: value
-
-
 @compiled_as(own.rtcf_whole_pow)
 def _whole_pow(base: Any, exponent: Any) -> Any:
     number = operand(base)
@@ -1759,7 +1747,7 @@ def _whole_pow(base: Any, exponent: Any) -> Any:
         while exponent % 2 == 0 and exponent > 0:
             square = square * square
             exponent //= 2
-        result = _own_copy(square) if exponent == 1 else square
+        result = helpers.rtcf_copied(square) if exponent == 1 else square
         exponent //= 2
         while exponent > 0:
             square = square * square

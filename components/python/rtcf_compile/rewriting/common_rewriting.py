@@ -17,7 +17,7 @@ import numpy as np
 
 from rtcf_compile.rewriting import numpy_functions, operators
 from rtcf_compile.rewriting.helpers import IN_PLACE, INSTEAD, OF_LISTS, rtcf_round, rtcf_round_to
-from rtcf_compile.rewriting.references import is_copied
+from rtcf_compile.rewriting.references import is_copied, is_ellipsis, is_new_axis
 from rtcf_compile.source.checks import resolve
 from rtcf_compile.source.mistake import at
 from rtcf_compile.source.modules import Source, is_of_user, is_own
@@ -608,12 +608,12 @@ class CommonRewriting(ast.NodeTransformer):
             return self._looked_up(node, table)
         node.slice = self._arrays(node.slice)
         parts = list(_parts(node))
-        if isinstance(node.ctx, ast.Load) and any(_is_new(each) for each in parts):
+        if isinstance(node.ctx, ast.Load) and any(is_new_axis(each) for each in parts):
             return self._with_new_axis(node, parts)
         is_load, of_tuple = isinstance(node.ctx, ast.Load), self._is_tuple(node)
         self.generic_visit(node)
         if is_load and (of_tuple or any(self._may_select(each) for each in parts)):
-            return like(node, call_of("rtcf_get", node.value, _index(node.slice)))
+            return like(node, call_of("rtcf_get", node.value, index_of(node.slice)))
         return node
 
     def _looked_up(self, node: ast.Subscript, table: dict[Any, Any]) -> ast.AST:
@@ -657,10 +657,10 @@ class CommonRewriting(ast.NodeTransformer):
 
     def _with_new_axis(self, node: ast.Subscript, parts: list[ast.expr]) -> ast.AST:
         """Rewrite `v[:, None]` and `v[None, :]`: a vector as a column or a row."""
-        others = [each for each in parts if not _is_new(each)]
+        others = [each for each in parts if not is_new_axis(each)]
         if len(parts) > 2 or len(others) > 1 or not all(_is_view(each) for each in others):
             raise self.mistake(node, "a new axis of an array that is no vector", "use np.reshape")
-        is_row = _is_new(parts[0])
+        is_row = is_new_axis(parts[0])
         shape = ast.Tuple(
             [ast.Constant(each) for each in ((1, -1) if is_row else (-1, 1))], ast.Load()
         )
@@ -753,7 +753,7 @@ class CommonRewriting(ast.NodeTransformer):
                 return [*before, node]
         value = self.visit(value)
         base = self.visit(loaded(target.value))
-        index = _index(self.visit(self._arrays(target.slice)))
+        index = index_of(self.visit(self._arrays(target.slice)))
         return [*before, like(node, ast.Expr(call_of("rtcf_set", base, index, value)))]
 
     def _check_index(self, node: ast.Subscript) -> None:
@@ -925,12 +925,8 @@ def _parts(node: ast.Subscript) -> list[ast.expr]:
     return node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
 
 
-def _is_new(index: ast.AST) -> bool:
-    return ast.unparse(index) in ("None", "np.newaxis", "numpy.newaxis")
-
-
 def _is_view(index: ast.AST) -> bool:
-    return isinstance(index, ast.Slice) or _is_ellipsis(index)
+    return isinstance(index, ast.Slice) or is_ellipsis(index)
 
 
 def _reads_members(index: ast.expr) -> bool:
@@ -979,7 +975,7 @@ def _is_range(node: ast.AST) -> bool:
     return isinstance(node, ast.Call) and ast.unparse(node.func) in ("range",)
 
 
-def _index(node: ast.expr) -> ast.expr:
+def index_of(node: ast.expr) -> ast.expr:
     """Return an index as a tuple, with slices as slice objects."""
     parts = node.elts if isinstance(node, ast.Tuple) else [node]
     return like(node, ast.Tuple([_sliced(each) for each in parts], ast.Load()))
@@ -1007,10 +1003,6 @@ def _power(exponent: ast.expr) -> str:
     if not isinstance(number, ast.Constant) or type(number.value) is not int or number.value == 0:
         return "rtcf_pow"
     return "rtcf_negative_pow" if is_negative else "rtcf_whole_pow"
-
-
-def _is_ellipsis(node: ast.AST) -> bool:
-    return isinstance(node, ast.Constant) and node.value is ...
 
 
 def loaded(target: ast.expr) -> ast.expr:

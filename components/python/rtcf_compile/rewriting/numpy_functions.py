@@ -510,7 +510,7 @@ def rtcf_matrix_power(a: Any, n: Any) -> Any:
 def rtcf_whole_pow(base: Any, exponent: Any) -> Any:
     """Return base ** exponent for a constant int above 0, by repeated squaring."""
     if exponent == 1:
-        return base.copy() if isinstance(base, np.ndarray) else base
+        return helpers.rtcf_copied(base)
     result = None
     while exponent > 0:
         if exponent % 2:

@@ -34,6 +34,7 @@ from rtcf.component.declaration import (
 
 from rtcf_compile.rewriting.live_names import LiveNames
 from rtcf_compile.rewriting.methods import Method, Methods
+from rtcf_compile.source.assigned import matches_all
 from rtcf_compile.source.checks import check, resolve
 from rtcf_compile.source.mistake import at
 from rtcf_compile.source.modules import Source, is_own, read
@@ -322,7 +323,7 @@ class _Followed:
     def _call(
         self, method: Method, values: list[Value], named: dict[str, Value], state: Bindings
     ) -> list[tuple[Bindings, Value]]:
-        """Follow a method; return the bindings at its ends and what it may return there."""
+        """Follow a method; return its ends: the bindings and the returned value of each."""
         if method.function is None:
             return []
         self._owners.append(method.owner)
@@ -487,7 +488,7 @@ class _Followed:
                 self._value(case.guard, inside)
                 state = _merged([state, inside])
             ends += self._statements(case.body, [inside])
-            if case.guard is None and _matches_all(case.pattern):
+            if case.guard is None and matches_all(case.pattern):
                 return ends
         return [*ends, state]
 
@@ -725,7 +726,7 @@ class _Followed:
         if site in self._fixed:
             _, _, text = self._written[site]
             raise self._mistake(
-                node, f"changes what the loop goes through, {text}", "copy its arrays: x.copy()"
+                node, f"changes an array of the loop, {text}", "copy its arrays: x.copy()"
             )
         self._copies.add(site)
 
@@ -872,7 +873,7 @@ class _Followed:
     # Expressions.
 
     def _value(self, node: ast.expr, state: Bindings) -> Value:
-        """Follow an expression; return what it may refer to."""
+        """Follow an expression; return its references."""
         if isinstance(node, ast.Name):
             if self._is_self(node):
                 return NOTHING
@@ -972,7 +973,7 @@ class _Followed:
             if method is not None and method.kind == "property":
                 return self._own_call(method, [], {}, node, state)
             return NOTHING
-        if _is_super(node.value):
+        if is_super(node.value):
             method = self._methods.find(node.attr, behind=self._owners[-1])
             if method is not None and method.kind == "property":
                 return self._own_call(method, [], {}, node, state)
@@ -1042,8 +1043,8 @@ class _Followed:
             return self._constant(table.get(node.slice.value), ast.unparse(node))
         parts = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
         views = [each for each in parts if _keeps(each)]
-        axes = sum(map(_is_axis, parts))
-        if len(parts) > 1 and any(map(_is_ellipsis, parts)) and _flat(base):
+        axes = sum(map(is_new_axis, parts))
+        if len(parts) > 1 and any(map(is_ellipsis, parts)) and _flat(base):
             raise self._mistake(node, "... among other indices", "write : for each other index")
         if any(isinstance(each, ast.List | ast.Compare) for each in parts) or any(
             ref.thing[0] in _SURELY for ref in _flat(index)
@@ -1165,7 +1166,7 @@ class _Followed:
                 return NOTHING
             values, named = self._arguments(node, state)
             return self._own_call(method, values, named, node, state)
-        if _is_super(called.value):
+        if is_super(called.value):
             method = self._methods.find(called.attr, behind=self._owners[-1])
             values, named = self._arguments(node, state)
             if method is None:
@@ -1222,7 +1223,7 @@ def _view(ref: Ref) -> Ref:
 
 
 def _elements(value: Value) -> Value:
-    """Return the references of the elements of what is iterated or unpacked."""
+    """Return the references of the elements of a value that is iterated or unpacked."""
     if isinstance(value, tuple):
         found: Value = value[0] if value else NOTHING
         for each in value[1:]:
@@ -1252,27 +1253,19 @@ def _element(base: tuple[Value, ...], index: ast.expr) -> Value:
         return (_elements(base),) if isinstance(index, ast.Slice) else _elements(base)
 
 
-def _is_axis(index: ast.expr) -> bool:
+def is_new_axis(index: ast.AST) -> bool:
+    """Tell whether an index adds a dimension."""
     return ast.unparse(index) in ("None", "np.newaxis", "numpy.newaxis")
 
 
-def _is_ellipsis(index: ast.expr) -> bool:
+def is_ellipsis(index: ast.AST) -> bool:
+    """Tell whether an index is `...`."""
     return isinstance(index, ast.Constant) and index.value is ...
-
-
-def _matches_all(pattern: ast.pattern) -> bool:
-    if isinstance(pattern, ast.MatchOr):
-        return any(map(_matches_all, pattern.patterns))
-    return isinstance(pattern, ast.MatchAs) and pattern.pattern is None
 
 
 def _keeps(index: ast.expr) -> bool:
     """Tell whether an index keeps its dimension."""
-    if isinstance(index, ast.Slice):
-        return True
-    return (isinstance(index, ast.Constant) and index.value in (..., None)) or (
-        ast.unparse(index) in ("np.newaxis", "numpy.newaxis")
-    )
+    return isinstance(index, ast.Slice) or is_ellipsis(index) or is_new_axis(index)
 
 
 def _is_other_power(node: ast.Call) -> bool:
@@ -1305,7 +1298,8 @@ def _names(node: ast.AST) -> set[str]:
     }
 
 
-def _is_super(node: ast.AST) -> bool:
+def is_super(node: ast.AST) -> bool:
+    """Tell whether a node is `super()`."""
     return (
         isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "super"
     )

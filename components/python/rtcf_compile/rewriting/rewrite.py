@@ -31,6 +31,7 @@ from rtcf_compile.rewriting.common_rewriting import call_of, changed_elements, l
 from rtcf_compile.rewriting.logs import Logs, with_name
 from rtcf_compile.rewriting.methods import Method, Methods
 from rtcf_compile.rewriting.ports import Ports, a_kind
+from rtcf_compile.rewriting.references import is_super
 from rtcf_compile.source.checks import METHODS, check_arguments, resolve
 from rtcf_compile.source.modules import Source
 
@@ -130,7 +131,7 @@ class Hook(Ports):
             return self._queue(node, port) if port.kind is Queue else self._port(node, port)
         if self._is_self(node.value):
             return self._own(node)
-        if _is_super(node.value):
+        if is_super(node.value):
             method = self._of_super(node)
             if method.kind == "property":
                 return self._call(node, method, [])
@@ -184,7 +185,7 @@ class Hook(Ports):
             method = self._methods.find(called.attr)
             if method is not None and called.attr not in HOOKS:
                 return self._call(node, method, node.args)
-        if isinstance(called, ast.Attribute) and _is_super(called.value):
+        if isinstance(called, ast.Attribute) and is_super(called.value):
             return self._call(node, self._of_super(called), node.args)
         if isinstance(called, ast.Attribute):
             owner = resolve(called.value, self.source)
@@ -275,7 +276,7 @@ class Hook(Ports):
         if (
             isinstance(call, ast.Call)
             and isinstance(call.func, ast.Attribute)
-            and _is_super(call.func.value)
+            and is_super(call.func.value)
             and call.func.attr in ("prepare", "start", "safe")
             and self._methods.find(call.func.attr, behind=self._owner) is None
         ):
@@ -442,7 +443,7 @@ class Hook(Ports):
     def _is_property(self, node: ast.AST, surely: bool = False) -> bool:
         if not isinstance(node, ast.Attribute):
             return False
-        if _is_super(node.value):
+        if is_super(node.value):
             return True
         method = self._methods.find(node.attr) if self._is_self(node.value) else None
         return method is not None and method.kind == "property"
@@ -531,12 +532,6 @@ class Hook(Ports):
         if isinstance(target, ast.Tuple | ast.List):
             return [found for each in target.elts for found in self._owned(each)]
         return [target] if isinstance(target, ast.Attribute) and self._is_self(target.value) else []
-
-
-def _is_super(node: ast.AST) -> bool:
-    return (
-        isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id == "super"
-    )
 
 
 def _is_none(node: ast.AST) -> bool:

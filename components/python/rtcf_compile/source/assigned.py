@@ -122,7 +122,7 @@ class _Flow:
             if case.guard is not None:
                 inside = self._used(case.guard, inside)
             result = _both(result, self._block(case.body, inside))
-            if case.guard is None and _matches_all(case.pattern):
+            if case.guard is None and matches_all(case.pattern):
                 return result
         return _both(result, known)
 
@@ -221,9 +221,10 @@ def _whole(node: ast.expr) -> int | None:
     return value if type(value) is int else None
 
 
-def _matches_all(pattern: ast.pattern) -> bool:
+def matches_all(pattern: ast.pattern) -> bool:
+    """Tell whether a pattern matches every subject."""
     if isinstance(pattern, ast.MatchOr):
-        return any(_matches_all(each) for each in pattern.patterns)
+        return any(matches_all(each) for each in pattern.patterns)
     return isinstance(pattern, ast.MatchAs) and pattern.pattern is None
 
 

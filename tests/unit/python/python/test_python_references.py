@@ -1,5 +1,5 @@
-"""Names of arrays mean what they mean in NumPy: random programs give the results of a plain class,
-or are rejected.
+"""Names of arrays have the meaning of NumPy: random programs give the results of a plain class, or
+are rejected.
 """
 
 import os
@@ -25,7 +25,7 @@ from rtcf_compile.source import modules
 from rtcf_compile.source.mistake import Mistake
 
 CYCLES = 8  # of each program
-# Runs update on a record; returns what it raised.
+# Runs update on a record; returns the text of its exception, or None.
 Update = Callable[[Any], str | None]
 
 
