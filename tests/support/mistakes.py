@@ -390,7 +390,7 @@ UPDATE: dict[str, tuple[str, str]] = {
     "list call": ("a = list(self.z)", "list"),
     "sorted": ("a = sorted(self.z)", "np.sort"),
     "sorted by a key": ("a = max(self.z, key=abs)", "key"),
-    "any of a generator": ("a = any(each > 0.0 for each in self.z)", "generator"),
+    "tuple of a generator": ("a = tuple(each > 0.0 for each in self.z)", "generator"),
     "map": ("a = map(abs, self.z)", "map"),
     "deque": ("HISTORY.append(self.f)", "HISTORY"),
     "deque of its own": ("a = deque()", "deque"),
@@ -427,8 +427,8 @@ UPDATE: dict[str, tuple[str, str]] = {
     "global without its word": ("TOTAL += 1.0", "TOTAL"),
     "del of a variable": ("a = 1.0\ndel a  # here", "deleted"),
     "del of a state": ("del self.f", "deleted"),
-    "lambda": ("f = lambda x: 2.0 * x\nself.f = f(self.f)", "lambda"),
-    "closure": ("def scaled(x):  # here\n    return self.kp * x", "nested function"),
+    "lambda": ("self.f = (lambda x: 2.0 * x)(self.f)", "call name"),
+    "closure": ("def scaled(x):\n    return self.kp * x\n\nself.f = scaled  # here", "call it"),
     "class in a method": ("class Point:  # here\n    x = 1.0", "class in a hook"),
     "import": ("import scipy", "import"),
     "from import": ("from math import sin", "import"),
@@ -693,9 +693,9 @@ CLASS: dict[str, tuple[str, str]] = {
         "constant",
     ),
     "nonlocal": (
-        "def start(self):\n    n = 0\n    def more():  # here\n        nonlocal n\n"
+        "def start(self):\n    n = 0\n    def more():\n        nonlocal n  # here\n"
         "        n += 1\n    more()",
-        "nested function",
+        "nonlocal",
     ),
 }
 

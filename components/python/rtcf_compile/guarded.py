@@ -5,6 +5,7 @@ import mmap
 import os
 import signal
 import sys
+import traceback
 
 from rtcf_compile.main import REFUSED, main
 from rtcf_compile.source import progress
@@ -25,6 +26,8 @@ def guarded() -> int:
                 status = main()
             except SystemExit as end:
                 status = end.code if isinstance(end.code, int) else REFUSED
+            except Exception:
+                traceback.print_exc()
             finally:
                 sys.stdout.flush()
                 sys.stderr.flush()

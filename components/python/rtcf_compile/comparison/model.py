@@ -8,7 +8,7 @@ of sums of compiled code, and for divisions of single numbers, which NumPy does 
 import ast
 import enum
 import operator
-from collections.abc import Collection
+from collections.abc import Collection, Iterable, Iterator
 from types import CodeType, FunctionType
 from typing import Any
 
@@ -302,7 +302,7 @@ class _Functions:
     def _function(self, function: FunctionType, owner: type | None = None) -> FunctionType:
         if function in self._known:
             return self._known[function]
-        source = read(function)
+        source = read(function, is_whole=True)
         self._note_numbers(source)
         functions = operator_functions(function, self._narrow) | operators.COMPARED
         rewriting = _Operations(source, functions, self._branches)
@@ -314,7 +314,7 @@ class _Functions:
             if isinstance(value, type) and value in self._copies:
                 scope[name] = self._copies[value]
         self._known[function] = _in_class(tree, scope, source, owner)
-        for name in (*function.__code__.co_names, *rewriting.constants):
+        for name in (*_global_names(function.__code__), *rewriting.constants):
             value = scope.get(name)
             if isinstance(value, FunctionType) and is_own(value) and name not in HELPERS:
                 scope[name] = self._function(value)
@@ -327,6 +327,14 @@ class _Functions:
                 self.numbers.add(value)
             elif isinstance(value, type) and issubclass(value, enum.IntEnum):
                 self.numbers.update(map(int, value))
+
+
+def _global_names(code: CodeType) -> Iterator[str]:
+    """Yield the names that a function, or a function nested in it, takes from its module."""
+    yield from code.co_names
+    for each in code.co_consts:
+        if isinstance(each, CodeType):
+            yield from _global_names(each)
 
 
 def _is_kept(name: str, value: Any) -> bool:
@@ -376,6 +384,15 @@ class _Operations(CommonRewriting):
 
     def _is_list(self, node: ast.expr) -> bool:
         return False
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        target, first = resolve(node.func, self.source), node.args[:1]
+        if target is sum:
+            self.scope["rtcf_sum_in_order"] = _sum_in_order
+            node.func = like(node.func, ast.Name("rtcf_sum_in_order", ast.Load()))
+        if target is sum or isinstance(first and first[0], ast.GeneratorExp | ast.ListComp):
+            return self.generic_visit(node)
+        return super().visit_Call(node)
 
     def visit_If(self, node: ast.If) -> ast.AST:
         return self._counted(node)
@@ -453,6 +470,13 @@ class _Operations(CommonRewriting):
         name = f"rtcf_{_IN_PLACE[type(operation)]}"
         self.scope[name], self.scope[f"{name}_element"] = change, change_element
         return name
+
+
+def _sum_in_order(values: Iterable[Any], start: Any = 0) -> Any:
+    """Return the sum from the first element to the last, in all versions of Python."""
+    for each in values:
+        start = start + each
+    return start
 
 
 _IN_PLACE: dict[type[ast.operator], str] = {

@@ -263,6 +263,22 @@ def _copied(value):  # type: ignore[no-untyped-def]
     return scope["each"]
 
 
+@compiled_as(helpers.rtcf_array_of)
+def _array_of(value: Any, count: Any) -> Any:
+    if isinstance(value, types.BaseTuple):
+        raise TypingError("RTCF:an array of tuples:write np.array([a, b]) for each row")
+    if not isinstance(value, types.Array):
+        number = operand(value)
+        if number is None:
+            raise TypingError(f"RTCF:an array of {words(value)}:use numbers or vectors")
+        kind = number.dtype.type
+        return lambda value, count: np.empty(count, kind)
+    if value.ndim != 1:
+        raise TypingError(f"RTCF:an array of {words(value)}:use numbers or vectors")
+    element = value.dtype
+    return lambda value, count: np.empty((count, value.size), element)
+
+
 @compiled_as(helpers.rtcf_looked_up)
 def _looked_up(keys: Any, values: Any, key: Any) -> Any:
     if not isinstance(key, types.Integer | types.Boolean | types.IntEnumMember):
@@ -480,7 +496,7 @@ def _assign(target: Any, value: Any) -> Any:
         return lambda target, value: fill(target, convert(value))
     if isinstance(value, types.Number | types.Boolean):
         return _filling(target.ndim)
-    if isinstance(value, types.UniTuple | types.Tuple) and target.ndim == 1:
+    if isinstance(value, types.UniTuple | types.Tuple):
         return lambda target, value: helpers.rtcf_assign(
             target, numpy_functions.rtcf_array(value, None)
         )

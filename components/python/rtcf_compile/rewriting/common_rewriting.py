@@ -366,7 +366,7 @@ class CommonRewriting(ast.NodeTransformer):
     def _is_list(self, node: ast.expr) -> bool:
         """Tell whether an expression is known to be a list."""
         if isinstance(node, ast.Name):
-            if node.id in self.source.function.__code__.co_varnames:
+            if node.id in self.source.variables:
                 return node.id in self._lists
             return isinstance(resolve(node, self.source), list)
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
@@ -411,7 +411,7 @@ class CommonRewriting(ast.NodeTransformer):
     def _constant(self, node: ast.expr) -> Any:
         """Return the value of a constant expression, or None."""
         names = {each.id for each in ast.walk(node) if isinstance(each, ast.Name)}
-        if names & set(self.source.function.__code__.co_varnames):
+        if names & self.source.variables:
             return None
         if any(isinstance(each, ast.Call) for each in ast.walk(node)):
             return None
@@ -764,7 +764,7 @@ class CommonRewriting(ast.NodeTransformer):
         base: ast.expr = target
         while isinstance(base, ast.Subscript | ast.Attribute):
             base = base.value
-        variables = self.source.function.__code__.co_varnames
+        variables = self.source.variables
         is_other = isinstance(base, ast.Name) and base.id not in variables
         if isinstance(base, ast.Name) and is_other and not base.id.startswith("rtcf_"):
             raise self.mistake(
@@ -787,7 +787,7 @@ class CommonRewriting(ast.NodeTransformer):
             return isinstance(node.op, whole) and both
         if isinstance(node, ast.Constant):
             return type(node.value) is int
-        if isinstance(node, ast.Name) and node.id in self.source.function.__code__.co_varnames:
+        if isinstance(node, ast.Name) and node.id in self.source.variables:
             return node.id in self._counters
         return type(resolve(node, self.source)) is int
 

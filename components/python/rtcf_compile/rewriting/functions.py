@@ -213,6 +213,7 @@ class Functions:
         self._note(function)
         if function not in self._made:
             source = read(function)
+            _find_messages(source.tree, method)
             if function in self._making:
                 self._begin(function, source)
             self._made[function] = self._compiler(self._method(source, method))
@@ -242,11 +243,12 @@ class Functions:
     ) -> dict[str, Any]:
         scope = {
             **source.function.__globals__,
+            **source.lifted,
             **HELPERS,
             **{name: frozen(value) for name, value in constants.items()},
         }
         scope["rtcf_fault"] = Fault
-        variables = set(source.function.__code__.co_varnames)
+        variables = source.variables
         for node in ast.walk(tree):
             if isinstance(node, ast.Name) and node.id in scope and node.id not in variables:
                 value = scope[node.id] = frozen(scope[node.id])
@@ -258,6 +260,17 @@ class Functions:
                 what = "a function of another module"
                 raise at(source.file, node, what, "import the function by name")
         return scope
+
+
+def _find_messages(tree: ast.FunctionDef, method: Method) -> None:
+    """Let a nested function find messages that it would take as arguments."""
+    names = {name for name, _ in method.messages}
+    tree.args.args = [each for each in tree.args.args if each.arg not in names]
+    for name, text in method.messages:
+        found = ast.parse(f"{name} = {text}").body[0]
+        for each in ast.walk(found):
+            ast.copy_location(each, tree)
+        tree.body.insert(0, found)
 
 
 def operator_functions(

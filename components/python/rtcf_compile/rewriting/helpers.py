@@ -71,6 +71,9 @@ def rtcf_set(base: Any, index: Any, value: Any) -> None:
     The arrays may share memory, even where NumPy does not support it: the value for an array of
     ints is copied.
     """
+    if isinstance(base, list):
+        base[index[0]] = value
+        return
     new = np.asarray(_elements(base, value))
     parts = index if isinstance(index, tuple) else (index,)
     if any(isinstance(each, np.ndarray) and each.dtype.kind in "iu" for each in parts):
@@ -264,6 +267,11 @@ def rtcf_copied(value: Any) -> Any:
     return value.copy() if isinstance(value, np.ndarray) else value
 
 
+def rtcf_array_of(value: Any, count: Any) -> Any:
+    """Return a new array for this number of such values, which are numbers or vectors."""
+    return np.empty((count, *np.shape(value)), np.asarray(value).dtype)
+
+
 def rtcf_looked_up(keys: Any, values: Any, key: Any) -> Any:
     """Return an element of a dict of numbers."""
     for number in range(len(keys)):
@@ -419,6 +427,7 @@ BY_NAME = {
             rtcf_view,
             rtcf_copied,
             rtcf_looked_up,
+            rtcf_array_of,
             rtcf_store,
             rtcf_maybe,
             rtcf_is_known,

@@ -18,11 +18,20 @@ class Method:
     place: int  # index of the owner in the resolution order
     kind: str
     function: FunctionType | None
+    # Arguments of a nested function that stand for messages, with the messages as written.
+    messages: tuple[tuple[str, str], ...] = ()
 
     @property
     def symbol(self) -> str:
         """Return the name of its compiled function in other functions."""
-        return f"method_{self.place}_{self.name}"
+        return f"{self.kind.split()[0]}_{self.place}_{self.name}"
+
+
+def nested(
+    function: FunctionType, owner: type, messages: tuple[tuple[str, str], ...] = ()
+) -> Method:
+    """Return a function that was nested in a method and takes its self."""
+    return Method(function.__name__, owner, 0, "nested function", function, messages)
 
 
 class Methods:

@@ -33,7 +33,7 @@ from rtcf.component.declaration import (
 )
 
 from rtcf_compile.rewriting.live_names import LiveNames
-from rtcf_compile.rewriting.methods import Method, Methods
+from rtcf_compile.rewriting.methods import Method, Methods, nested
 from rtcf_compile.source.assigned import matches_all
 from rtcf_compile.source.checks import check, resolve
 from rtcf_compile.source.mistake import at
@@ -877,7 +877,7 @@ class _Followed:
         if isinstance(node, ast.Name):
             if self._is_self(node):
                 return NOTHING
-            if node.id in self._frame.source.function.__code__.co_varnames:
+            if node.id in self._frame.source.variables:
                 return state.get((self._frame.depth, node.id), NOTHING)
             return self._constant(resolve(node, self._frame.source), node.id)
         if isinstance(node, ast.Constant):
@@ -1069,6 +1069,9 @@ class _Followed:
         target = resolve(called, source)
         if is_own(target):
             values, named = self._arguments(node, state)
+            if target in source.lifted.values() and node.args and self._is_self(node.args[0]):
+                method = nested(target, self._owners[-1])
+                return self._own_call(method, values[1:], named, node, state)
             return self._own_call(target, values, named, node, state)
         owner: Value = NOTHING
         held = None

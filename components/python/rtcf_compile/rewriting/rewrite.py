@@ -7,7 +7,9 @@
 import ast
 import copy
 import difflib
+import inspect
 from collections.abc import Sequence
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -29,7 +31,7 @@ from rtcf.component.value_type import ValueType
 
 from rtcf_compile.rewriting.common_rewriting import call_of, changed_elements, like, loaded
 from rtcf_compile.rewriting.logs import Logs, with_name
-from rtcf_compile.rewriting.methods import Method, Methods
+from rtcf_compile.rewriting.methods import Method, Methods, nested
 from rtcf_compile.rewriting.ports import Ports, a_kind
 from rtcf_compile.rewriting.references import is_super
 from rtcf_compile.source.checks import METHODS, check_arguments, resolve
@@ -172,6 +174,9 @@ class Hook(Ports):
     def visit_Call(self, node: ast.Call) -> ast.AST:
         """Rewrite `self.method(…)`, `self.x.write(…)`, `self.info(…)`, `self.fault(…)`."""
         called = node.func
+        own = self.source.lifted.get(called.id) if isinstance(called, ast.Name) else None
+        if own is not None and node.args and self._is_self(node.args[0]):
+            return self._nested(node, own)
         if isinstance(called, ast.Attribute) and self._is_self(called.value):
             is_log = called.attr in LOG_LEVELS and self._methods.find(called.attr) is None
             if is_log:
@@ -215,6 +220,17 @@ class Hook(Ports):
                 )
         return super().visit_Call(node)
 
+    def _nested(self, node: ast.Call, function: FunctionType) -> ast.AST:
+        """Return the call of a nested function, which finds messages by itself."""
+        names = list(inspect.signature(function).parameters)
+        messages = tuple(
+            (name, ast.unparse(each))
+            for name, each in zip(names, node.args, strict=False)
+            if self._message_part(each) is not None
+        )
+        values = [each for each in node.args[1:] if self._message_part(each) is None]
+        return self._call(node, nested(function, self._owner, messages), values)
+
     def _call(self, node: ast.AST, method: Method, arguments: Sequence[ast.expr]) -> ast.AST:
         """Return the call of the compiled function of a method."""
         if method.function is None:
@@ -223,7 +239,7 @@ class Hook(Ports):
                 f"{method.name} is a {method.kind}",
                 "write a method, a static method or a property with `def`",
             )
-        if isinstance(node, ast.Call):
+        if isinstance(node, ast.Call) and method.kind != "nested function":
             written = like(node, ast.Call(node.func, list(arguments), node.keywords))
             own = 0 if method.kind == "static method" else 1  # self is not in the source
             check_arguments(written, method.function, self.source.file, own)

@@ -30,7 +30,7 @@ class _Flow:
 
     def __init__(self, source: Source) -> None:
         self._source = source
-        self._variables = set(source.function.__code__.co_varnames)
+        self._variables = source.variables
         # Per enclosing loop: the variables assigned at break and at continue.
         self._breaks: list[_Known] = []
         self._continues: list[_Known] = []
@@ -168,7 +168,7 @@ class _Flow:
     def _used(self, node: ast.expr, known: frozenset[str]) -> frozenset[str]:
         """Check an expression; return the assigned variables after it."""
         if isinstance(node, ast.Name):
-            if isinstance(node.ctx, ast.Load) and node.id in self._variables - known:
+            if isinstance(node.ctx, ast.Load) and node.id in self._variables - known and not node.id.startswith("rtcf_"):
                 raise at(self._source.file, node, *self._without_value(node.id))
             return known
         if isinstance(node, ast.NamedExpr):

@@ -22,7 +22,7 @@ from rtcf_compile.source.mistake import Mistake, at
 from rtcf_compile.source.modules import Source, is_own
 
 _REFUSED: dict[type[ast.AST], tuple[str, str]] = {
-    ast.ListComp: ("a list allocates memory", "use a loop that fills an array"),
+    ast.ListComp: ("a list allocates memory", "write np.array([… for …])"),
     ast.Dict: (
         "a dict allocates memory",
         "use an enum.IntEnum and `if`, or an array indexed by an int",
@@ -30,7 +30,7 @@ _REFUSED: dict[type[ast.AST], tuple[str, str]] = {
     ast.DictComp: ("a dict allocates memory", "use an array indexed by an int"),
     ast.Set: ("a set allocates memory", "compare with each value: x == 1 or x == 2"),
     ast.SetComp: ("a set allocates memory", "use a loop"),
-    ast.GeneratorExp: ("a generator cannot be compiled", "use a loop"),
+    ast.GeneratorExp: ("a generator cannot be compiled", "write np.array([… for …]), or a loop"),
     ast.Yield: ("a generator cannot be compiled", "keep the progress in a State"),
     ast.YieldFrom: ("a generator cannot be compiled", "keep the progress in a State"),
     ast.Await: ("the cycle cannot wait", "keep the request in a State and test it in each cycle"),
@@ -40,13 +40,11 @@ _REFUSED: dict[type[ast.AST], tuple[str, str]] = {
         'log with arguments: self.info("x {}", x)',
     ),
     ast.Global: ("a global variable is shared by all instances", "declare a State"),
-    ast.Nonlocal: ("nonlocal is not compiled", "declare a State, or return the value"),
     ast.Try: ("exceptions cannot be caught in the cycle", "test the condition with `if` first"),
     ast.With: ("the cycle cannot open or lock anything", "remove the `with`"),
     ast.Import: ("an import cannot be compiled", "import at the top of the file"),
     ast.ImportFrom: ("an import cannot be compiled", "import at the top of the file"),
-    ast.Lambda: ("a lambda is not compiled", "define a function in the module"),
-    ast.FunctionDef: ("a nested function is not compiled", "define it in the module"),
+    ast.Lambda: ("a function cannot be a value", "write name = lambda …, then call name(…)"),
     ast.ClassDef: ("a class in a hook is not compiled", "define it in the module"),
     ast.Delete: ("nothing can be deleted in the cycle", "set it to 0, or remove the del"),
     ast.Starred: ("* unpacks a value that has no fixed size", "write the elements"),
@@ -178,7 +176,9 @@ def check(source: Source, members: Collection[str] = ()) -> None:
             _call(node, source)
         if isinstance(node, ast.Attribute):
             _module(node, source)
-        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load) and node.id not in known:
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load) and not (
+            node.id in known or node.id.startswith("rtcf_")
+        ):  # fmt: skip
             raise _undefined(node, source, members, known)
         if isinstance(node, ast.Raise):
             _raised(node, file)
@@ -215,7 +215,9 @@ def resolve(node: ast.AST, source: Source) -> Any:
     """Return the object that a dotted name refers to in the module, or None."""
     if isinstance(node, ast.Name):
         scope = source.function.__globals__
-        if node.id in source.function.__code__.co_varnames:
+        if node.id in source.lifted:
+            return source.lifted[node.id]
+        if node.id in source.variables:
             return None
         if node.id in scope:
             return scope[node.id]
@@ -244,11 +246,10 @@ def _walk(tree: ast.FunctionDef) -> Iterator[ast.AST]:
 
 
 def _names(source: Source) -> set[str]:
-    function = source.function
-    code = function.__code__
-    builtins = function.__globals__.get("__builtins__", {})
+    scope = source.function.__globals__
+    builtins = scope.get("__builtins__", {})
     known = vars(builtins) if isinstance(builtins, ModuleType) else builtins
-    return {*code.co_varnames, *code.co_cellvars, *function.__globals__, *known}
+    return {*source.variables, *source.lifted, *scope, *known}
 
 
 def _constant(node: ast.Constant, file: str) -> None:
@@ -330,6 +331,8 @@ def _called(node: ast.Call, target: Any, source: Source) -> None:
         if issubclass(target, enum.Enum) and not issubclass(target, enum.IntEnum):
             raise at(file, node, f"{name} is not an enum of ints", "derive it from enum.IntEnum")
     root = (getattr(target, "__module__", None) or "numpy").partition(".")[0]
+    if target in (max, min) and any(each.arg == "key" for each in node.keywords):
+        raise at(file, node, f"{name} takes no key", f"use np.arg{name}, or a loop")
     if target in (max, min) and not node.args:
         raise at(file, node, f"{name} needs arguments", "give it values")
     if isinstance(target, BuiltinFunctionType) and root in ("math", "builtins"):

@@ -6,16 +6,18 @@ import importlib.util
 import inspect
 import linecache
 import sys
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
 
 from rtcf.component import Component, DeclarationError
 
-from rtcf_compile.source import numpy_errors, progress, spelling
+from rtcf_compile.source import lifting, numpy_errors, progress, spelling
 from rtcf_compile.source.mistake import Mistake, source_line
 from rtcf_compile.source.prefix_map import mapped
+from rtcf_compile.source.scopes import everywhere
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,13 @@ class Source:
     function: FunctionType
     tree: ast.FunctionDef
     file: str
+    # The functions that were nested in it, by the names by which it calls them.
+    lifted: Mapping[str, FunctionType] = field(default_factory=dict)
+    variables: frozenset[str] = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Find the variables and arguments, before the tree is rewritten."""
+        object.__setattr__(self, "variables", everywhere(self.tree))
 
 
 def load(file: Path) -> ModuleType:
@@ -81,9 +90,15 @@ def components(module: ModuleType) -> list[type[Component]]:
     return sorted(dict.fromkeys(whole), key=lambda each: inspect.getsourcelines(each)[1])
 
 
-def read(function: FunctionType) -> Source:
-    """Return the syntax tree of a function."""
+def read(function: FunctionType, is_whole: bool = False) -> Source:
+    """Return the syntax tree of a function. `is_whole`: with the functions nested in it."""
     file = inspect.getsourcefile(function) or "?"
+    tree = lifting.tree_of(function) or _parsed(function, file)
+    spelling.normalise(tree)
+    return Source(function, tree, file, {} if is_whole else lifting.lift(tree, function, file))
+
+
+def _parsed(function: FunctionType, file: str) -> ast.FunctionDef:
     try:
         lines, begin = inspect.getsourcelines(function)
     except OSError:
@@ -100,8 +115,7 @@ def read(function: FunctionType) -> Source:
     if not isinstance(tree, ast.FunctionDef):
         kind = "is async" if isinstance(tree, ast.AsyncFunctionDef) else "is a lambda"
         raise Mistake(file, begin, f"{function.__name__} {kind}", "write it with `def`")
-    spelling.normalise(tree)
-    return Source(function, tree, file)
+    return tree
 
 
 def is_own(value: Any) -> bool:

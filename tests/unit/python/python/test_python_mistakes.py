@@ -156,7 +156,7 @@ IN_UPDATE = {
     "float as an index": ("self.z[self.kp] = 1.0", "cannot be indexed by a float"),
     "recursion": ("self.n = twice(self.n)", "twice calls itself"),
     "generator": ("yield self.n", "a generator cannot be compiled"),
-    "generator expression": ("self.n = sum(i for i in range(3))", "a generator cannot be compiled"),
+    "generator expression": ("a = (i for i in range(3))", "a generator cannot be compiled"),
     "np.delete": (
         "self.z[:] = np.delete(self.z, 1)",
         "np.delete changes the size of an array",
@@ -173,10 +173,10 @@ IN_UPDATE = {
     ),
     "with": ("with self.n:\n            pass", "cannot open or lock"),
     "import": ("import math", "an import cannot be compiled"),
-    "lambda": ("f = lambda x: x", "a lambda is not compiled"),
+    "lambda": ("self.n = (lambda x: x)(2)", "a function cannot be a value"),
     "function in a function": (
-        "def f(x):\n            return x",
-        "a nested function is not compiled",
+        "def f(x):\n            return x\n        g = f",
+        "f is a function, used as a value",
     ),
     "class in a hook": ("class A:\n            pass", "a class in a hook"),
     "endless loop": ("while True:\n            self.n += 1", "an endless loop"),

@@ -1,0 +1,662 @@
+"""Nested functions, lambdas and comprehensions as functions of their own, which take the variables
+that they use as arguments (Johnsson, "Lambda Lifting", 1985).
+
+A nested function may only be called: its variables then have the values that Python gives them at
+each call. A comprehension becomes a call in its place, which keeps the order of effects: a loop that
+sums, compares or searches, or one that fills an array where a list and an array are the same.
+"""
+
+import ast
+import copy
+import inspect
+import math
+from collections.abc import Callable, Iterator, Sequence
+from types import CodeType, FunctionType
+from typing import Any, NamedTuple, TypeVar
+
+import numpy as np
+
+from rtcf_compile.source.mistake import at
+from rtcf_compile.source.scopes import bound, free
+
+_Node = TypeVar("_Node", bound=ast.AST)
+_Comprehension = ast.ListComp | ast.GeneratorExp
+_COMPREHENSIONS = (ast.ListComp, ast.GeneratorExp)
+# Builtins for which a list and an array are the same.
+_NEUTRAL = (len, sum, any, all, max, min, enumerate, zip, reversed, math.prod)
+_ITERATORS = (enumerate, zip, reversed)
+_ARRAYS = (np.array, np.asarray)
+_MOST = 16  # elements of a list that are written one by one
+
+
+class _Reduction(NamedTuple):
+    """A function that uses each element once, as a loop.
+
+    In the texts, LOOP is the loop with `step` as its body, VALUE the element, and START the option
+    of the function.
+    """
+
+    function: Callable[..., Any]
+    takes: Any  # types of nodes
+    option: str
+    text: str
+    with_option: str
+    step: str
+
+
+def _fold(function: Any, start: int, sign: str) -> _Reduction:
+    text = "rtcf_each = {}\nLOOP\nreturn rtcf_each"
+    step = f"rtcf_each = rtcf_each {sign} VALUE"
+    return _Reduction(
+        function, _COMPREHENSIONS, "start", text.format(start), text.format("START"), step
+    )
+
+
+def _first(function: Any, test: str, end: str) -> _Reduction:
+    text = f"LOOP\nreturn {end}"
+    step = f"if {test}VALUE:\n    return {end != 'True'}"
+    return _Reduction(function, _COMPREHENSIONS, "", text, text, step)
+
+
+def _extreme(function: Any, sign: str) -> _Reduction:
+    text = (
+        "rtcf_is_first = True\nLOOP\nif rtcf_is_first:\n    {}\nreturn rtcf_each"
+    )
+    step = (
+        "rtcf_value = VALUE\n"
+        "if rtcf_is_first:\n"
+        "    rtcf_each = rtcf_value\n"
+        f"elif rtcf_value {sign} rtcf_each:\n"
+        "    rtcf_each = rtcf_value\n"
+        "rtcf_is_first = False"
+    )
+    none = f"raise ValueError('{function.__name__} of no values')"
+    return _Reduction(
+        function, _COMPREHENSIONS, "default", text.format(none), text.format("return START"), step
+    )
+
+
+_COUNT = "rtcf_each = 0\nLOOP\nreturn rtcf_each"
+_REDUCTIONS = (
+    *(_fold(sum, 0, "+"), _fold(math.prod, 1, "*")),
+    *(_first(any, "", "False"), _first(all, "not ", "True")),
+    *(_extreme(max, ">"), _extreme(min, "<")),
+    _Reduction(len, ast.ListComp, "", _COUNT, _COUNT, "VALUE\nrtcf_each += 1"),
+    _Reduction(next, ast.GeneratorExp, "", "", "LOOP\nreturn START", "return VALUE"),
+)
+_FILLED = (
+    "rtcf_count = COUNT\n"
+    "if rtcf_count < 1:\n"
+    "    raise ValueError('an array without elements')\n"
+    "rtcf_place = 0\n"
+    "LOOP\n"
+    "return rtcf_each",
+    "rtcf_value = VALUE\n"
+    "if rtcf_place == 0:\n"
+    "    rtcf_each = rtcf_array_of(rtcf_value, rtcf_count)\n"
+    "rtcf_each[rtcf_place] = rtcf_value\n"
+    "rtcf_place += 1",
+)
+
+# What was lifted: the tree of each function, and the functions that it may call.
+_trees: dict[CodeType, tuple[ast.FunctionDef, dict[str, FunctionType]]] = {}
+_made: dict[tuple[CodeType, str, int, int], FunctionType] = {}
+
+
+def tree_of(function: FunctionType) -> ast.FunctionDef | None:
+    """Return the tree of a function that was lifted, else None."""
+    known = _trees.get(function.__code__)
+    return copy.deepcopy(known[0]) if known else None
+
+
+def lift(tree: ast.FunctionDef, function: FunctionType, file: str) -> dict[str, FunctionType]:
+    """Replace what is nested in a function by calls; return the functions that it calls, by name.
+
+    Raises Mistake for a nested function that is used in another way.
+    """
+    lifting = _Lifting(tree, function, file)
+    lifting.block(tree.body)
+    return lifting.functions
+
+
+class _Lifting(ast.NodeTransformer):
+    """Replaces the nested functions and the comprehensions of one function."""
+
+    def __init__(self, tree: ast.FunctionDef, function: FunctionType, file: str) -> None:
+        self._tree, self._outer, self._file = tree, function, file
+        arguments = (*tree.args.posonlyargs, *tree.args.args)
+        self._first = arguments[0].arg if arguments else ""
+        self._nested = {name for each in ast.walk(tree) for name, _ in _nested(each)} - {tree.name}
+        self._variables = bound(tree) - self._nested
+        self._lists = self._arrays_for_lists()
+        known = _trees.get(function.__code__)
+        self.functions: dict[str, FunctionType] = dict(known[1]) if known else {}
+        # The nested functions that may be called here: how they are called, and their variables.
+        self._known: dict[str, tuple[inspect.Signature, list[str]]] = {}
+
+    def _mistake(self, node: ast.AST, what: str, remedy: str) -> Exception:
+        return at(self._file, node, what, remedy)
+
+    # Nested functions.
+
+    def block(self, body: list[ast.stmt]) -> None:
+        """Lift from statements; a nested function is known to the statements behind it."""
+        outside, new = dict(self._known), []
+        for node in body:
+            nested = next(_nested(node), None)
+            if nested is not None:
+                self._define(node, *nested)
+            else:
+                new.append(self.visit(node))
+        body[:] = new or [ast.copy_location(ast.Pass(), body[0])]
+        self._known = outside
+
+    def generic_visit(self, node: ast.AST) -> ast.AST:
+        """Visit the parts of a node, and the statements of its blocks in order."""
+        for field, value in ast.iter_fields(node):
+            if isinstance(value, list) and value and isinstance(value[0], ast.stmt):
+                self.block(value)
+            elif isinstance(value, list):
+                value[:] = [self.visit(each) if isinstance(each, ast.AST) else each for each in value]
+            elif isinstance(value, ast.AST):
+                setattr(node, field, self.visit(value))
+        return node
+
+    def _define(self, node: ast.stmt, name: str, nested: ast.FunctionDef | ast.Lambda) -> None:
+        if isinstance(nested, ast.FunctionDef) and nested.decorator_list:
+            decorator = nested.decorator_list[0]
+            raise self._mistake(decorator, "a decorator is not compiled", "remove it")
+        if sum(_sets(each, name) for each in ast.walk(self._tree)) > 1:
+            raise self._mistake(node, f"{name} is set twice", "use two names")
+        for each in ast.walk(nested):
+            if isinstance(each, ast.Nonlocal):
+                remedy = "declare a State, or return the value"
+                raise self._mistake(each, "nonlocal is not compiled", remedy)
+        given = nested.args
+        for each in (*given.defaults, *given.kw_defaults):
+            if each is not None and free(each) & self._variables:
+                what = f"a default of {name} is a variable"
+                raise self._mistake(each, what, f"use the variable in {name} itself")
+        body = nested.body
+        if not isinstance(body, list):
+            body = [ast.copy_location(ast.Return(body), body)]
+        tree = _located(ast.FunctionDef(name, given, body, []), nested)
+        signature = inspect.signature(self._compiled(_signature_only(tree)))
+        tree = copy.deepcopy(tree)
+        _Passing(self._known, self._mistake).visit(tree)
+        if name in free(tree):
+            raise self._mistake(node, f"{name} calls itself", "use a loop")
+        names = self._taken(tree)
+        tree.args = _with_first(names, tree.args)
+        ast.fix_missing_locations(tree)
+        self._add(name, tree, nested)
+        self._known[name] = signature, names
+
+    def _taken(self, tree: ast.AST) -> list[str]:
+        """Return the variables that a nested function takes from this one: the first argument,
+        which may be self, and those that it reads.
+        """
+        others = sorted(free(tree) & self._variables - {self._first})
+        is_hidden = self._first in bound(tree)
+        return [self._first, *others] if self._first and not is_hidden else others
+
+    def _add(self, name: str, tree: ast.FunctionDef, node: ast.AST) -> None:
+        """Make a function that can be called by its name."""
+        key = self._outer.__code__, name, node.lineno, node.col_offset  # type: ignore[attr-defined]
+        if key not in _made:
+            _made[key] = self._compiled(tree)
+            if name.startswith("rtcf_"):
+                _made[key].__qualname__ = f"{self._outer.__qualname__}.<locals>.<comprehension>"
+            _trees[_made[key].__code__] = tree, dict(self.functions)
+        self.functions[name] = _made[key]
+
+    def _compiled(self, tree: ast.FunctionDef) -> FunctionType:
+        module = ast.Module([copy.deepcopy(tree)], [])
+        scope: dict[str, Any] = {}
+        exec(compile(module, self._file, "exec", dont_inherit=True), self._outer.__globals__, scope)
+        function: FunctionType = scope[tree.name]
+        function.__qualname__ = f"{self._outer.__qualname__}.<locals>.{tree.name}"
+        return function
+
+    def visit_Name(self, node: ast.Name) -> ast.AST:
+        """Reject a nested function that is not called."""
+        if node.id not in self._nested:
+            return node
+        if node.id in self._known:
+            raise self._mistake(node, f"{node.id} is a function, used as a value", "call it")
+        what = f"{node.id} is not defined here"
+        raise self._mistake(node, what, "define it before, outside of if and loops")
+
+    # Calls.
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        """Pass variables to nested functions; replace comprehensions as arguments."""
+        if isinstance(node.func, ast.Name) and node.func.id in self._known:
+            new = _passed(node, self._known, self._mistake)
+            new.args = [self.visit(each) for each in new.args]
+            for keyword in new.keywords:
+                keyword.value = self.visit(keyword.value)
+            return new
+        target = self._target(node.func)
+        if (reduced := self._reduced(node, target)) is not None:
+            return reduced
+        first = node.args[0] if node.args else None
+        if target is tuple and len(node.args) == 1 and isinstance(first, ast.GeneratorExp):
+            elements = self._written_out(first)
+            if elements is not None:
+                return self.visit(_located(ast.Tuple(elements, ast.Load()), node))  # type: ignore[no-any-return]
+        if len(node.args) == 1 and not node.keywords and isinstance(first, ast.ListComp) and (
+            any(target is each for each in _ARRAYS)
+        ):  # fmt: skip
+            return self._filled(first)
+        if self._is_neutral(node.func, target):
+            node.func = self.visit(node.func)
+            node.args = [self._as_array(each) for each in node.args]
+            for keyword in node.keywords:
+                keyword.value = self.visit(keyword.value)
+            return node
+        return self.generic_visit(node)
+
+    def _is_neutral(self, called: ast.expr, target: Any) -> bool:
+        """Tell whether a call takes a list and an array alike."""
+        if any(target is each for each in _NEUTRAL) or isinstance(target, np.ufunc):
+            return True
+        if target is not None:
+            return (getattr(target, "__module__", None) or "").startswith("numpy")
+        return isinstance(called, ast.Attribute) and called.attr == "write"
+
+    def _target(self, node: ast.AST) -> Any:
+        """Return the object that a dotted name refers to in the module, or None."""
+        if isinstance(node, ast.Attribute):
+            owner = self._target(node.value)
+            return None if owner is None else getattr(owner, node.attr, None)
+        if not isinstance(node, ast.Name) or node.id in self._variables | self._nested:
+            return None
+        builtins = self._outer.__globals__.get("__builtins__", {})
+        known = builtins if isinstance(builtins, dict) else vars(builtins)
+        return self._outer.__globals__.get(node.id, known.get(node.id))
+
+    def _reduced(self, node: ast.Call, target: Any) -> ast.AST | None:
+        """Return the call of a loop for `sum(x for x in …)` and its like, or None."""
+        reduction = next((each for each in _REDUCTIONS if each.function is target), None)
+        of = node.args[0] if node.args else None
+        if reduction is None or not isinstance(of, reduction.takes):
+            return None
+        given = [*node.args[1:], *(each.value for each in node.keywords)]
+        if len(given) > 1 or not {each.arg for each in node.keywords} <= {reduction.option}:
+            return None
+        if target is next and not given:
+            raise self._mistake(node, "next without a default may raise", "write next(…, default)")
+        text = reduction.text if not given else reduction.with_option
+        start = given[0] if given else ast.Constant(0)
+        return self._loop(of, target.__name__, (text, reduction.step), of.generators, START=start)
+
+    # Comprehensions.
+
+    def visit_ListComp(self, node: ast.ListComp) -> ast.AST:
+        """Write the elements of a list one by one if they are few and known."""
+        elements = self._written_out(node)
+        if elements is None:
+            return node  # rejected, see checks.py
+        return self.visit(_located(ast.List(elements, ast.Load()), node))  # type: ignore[no-any-return]
+
+    def visit_GeneratorExp(self, node: ast.GeneratorExp) -> ast.AST:
+        """Keep others, which checks.py rejects."""
+        return node
+
+    visit_SetComp = visit_DictComp = visit_Lambda = visit_GeneratorExp  # type: ignore[assignment]
+
+    def visit_Assign(self, node: ast.Assign) -> ast.AST:
+        """Fill arrays for members, elements, unpacked names and lists that may be arrays."""
+        one = node.targets[0] if len(node.targets) == 1 else None
+        names = isinstance(one, ast.Tuple | ast.List)
+        if isinstance(one, ast.Attribute | ast.Subscript) or names or (
+            isinstance(one, ast.Name) and one.id in (*self._lists, "rtcf_value")
+        ):  # fmt: skip
+            node.targets = [self.visit(each) for each in node.targets]
+            is_generator = names and isinstance(node.value, ast.GeneratorExp)
+            filled = self._filled if is_generator else self._as_array
+            node.value = filled(node.value)  # type: ignore[operator]
+            return node
+        return self.generic_visit(node)
+
+    def visit_For(self, node: ast.For) -> ast.AST:
+        """Fill an array that is iterated."""
+        node.iter = self._as_array(node.iter)
+        return self.generic_visit(node)
+
+    def _as_array(self, node: ast.expr) -> ast.expr:
+        """Return an expression whose list comprehensions fill arrays."""
+        if isinstance(node, ast.ListComp):
+            return self._filled(node)
+        if isinstance(node, ast.List | ast.Tuple) and isinstance(node.ctx, ast.Load):
+            node.elts = [self._as_array(each) for each in node.elts]
+            return node
+        return self.visit(node)  # type: ignore[no-any-return]
+
+    def _filled(self, node: _Comprehension) -> ast.expr:
+        """Return the call of a loop that fills an array."""
+        if len(node.generators) > 1 or node.generators[0].ifs:
+            if (elements := self._written_out(node)) is not None:
+                return self.visit(_located(ast.List(elements, ast.Load()), node))  # type: ignore[no-any-return]
+            remedy = "use np.where, or a loop that counts" if node.generators[0].ifs else "use a loop"
+            raise self._mistake(node, "the size of this list is not fixed", remedy)
+        first = node.generators[0]
+        before: list[ast.stmt] = []
+        count = self._count(first, before)
+        return self._loop(node, "list", _FILLED, [first], before, COUNT=count)
+
+    def _count(self, of: ast.comprehension, before: list[ast.stmt]) -> ast.expr:
+        """Return the number of elements of an iterable, whose parts get names in statements."""
+
+        def named(node: ast.expr) -> ast.expr:
+            name = f"rtcf_of_{len(before)}"
+            before.append(_located(ast.Assign([ast.Name(name, ast.Store())], node), node))
+            return _located(ast.Name(name, ast.Load()), node)
+
+        def counted(node: ast.expr) -> tuple[ast.expr, ast.expr]:
+            """Return the iterable with names, and its size."""
+            target = self._target(node.func) if isinstance(node, ast.Call) else None
+            if isinstance(node, ast.Call) and any(target is each for each in _ITERATORS):
+                parts = [counted(each) for each in node.args]
+                if target is enumerate:  # the second argument is not iterated
+                    parts[1:] = [(each, each) for each in node.args[1:]]
+                sizes = [size for _, size in parts[: 1 if target is enumerate else None]]
+                new = ast.Call(node.func, [each for each, _ in parts], node.keywords)
+                size = sizes[0] if len(sizes) == 1 else ast.Call(_name("min"), sizes, [])
+                return _located(new, node), _located(size, node)
+            if isinstance(node, ast.Call) and target is range:
+                if any(isinstance(each, ast.Call) for each in ast.walk(node) if each is not node):
+                    node.args = [named(each) for each in node.args]
+            else:
+                node = named(self._as_array(node))
+            size = ast.Call(_name("len"), [copy.deepcopy(node)], [])
+            return node, _located(size, node)
+
+        of.iter, size = counted(of.iter)
+        return size
+
+    def _loop(
+        self,
+        node: _Comprehension,
+        kind: str,
+        texts: tuple[str, str],
+        generators: Sequence[ast.comprehension],
+        before: Sequence[ast.stmt] = (),
+        **given: ast.expr,
+    ) -> ast.Call:
+        """Return the call of a function with the loops of a comprehension."""
+        for each in ast.walk(node):
+            if isinstance(each, ast.NamedExpr):
+                raise self._mistake(each, "a := in a comprehension", "write a loop")
+        body = _placed(texts[1], node, {"VALUE": node.elt})
+        for each in reversed(generators):
+            for test in reversed(each.ifs):
+                body = [_located(ast.If(test, body, []), test)]
+            body = [_located(ast.For(each.target, each.iter, body, []), node)]
+        name = f"rtcf_{kind}_{node.lineno}_{node.col_offset}"
+        tree = ast.FunctionDef(name, _arguments([]), [], [])
+        tree.body = [*before, *_placed(texts[0], node, given, loop=body)]
+        tree = copy.deepcopy(_located(tree, node))
+        _Passing(self._known, self._mistake).visit(tree)
+        names = self._taken(tree)
+        tree.args = _arguments(names)
+        self._add(name, ast.fix_missing_locations(tree), node)
+        call = ast.Call(_name(name), [_name(each) for each in names], [])
+        return _located(call, node)
+
+    def _written_out(self, node: _Comprehension) -> list[ast.expr] | None:
+        """Return the elements of a comprehension over a few constants or names, or None."""
+        if any(isinstance(each, ast.NamedExpr) for each in ast.walk(node)):
+            return None
+        found: list[dict[str, ast.expr]] = [{}]
+        for each in node.generators:
+            if each.ifs:
+                return None
+            longer = []
+            for known in found:
+                values = self._values(_Named(known).visit(copy.deepcopy(each.iter)))
+                if values is None or len(found) * len(values) > _MOST:
+                    return None
+                for value in values:
+                    new = _unpacked(each.target, value)
+                    if new is None:
+                        return None
+                    longer.append({**known, **new})
+            found = longer
+        inner = [each for each in ast.walk(node.elt) if isinstance(each, _COMPREHENSIONS)]
+        if any(bound(each) & set(found[0] if found else ()) for each in inner):
+            return None
+        return [_Named(known).visit(copy.deepcopy(node.elt)) for known in found] or None
+
+    def _values(self, node: ast.expr) -> list[ast.expr] | None:
+        """Return the elements of an iterable of known size, or None."""
+        if isinstance(node, ast.Tuple | ast.List):
+            simple = (ast.Constant, ast.Name)
+            signed = [each.operand if isinstance(each, ast.UnaryOp) else each for each in node.elts]
+            parts = [each.elts if isinstance(each, ast.Tuple) else [each] for each in signed]
+            is_simple = all(isinstance(each, simple) for part in parts for each in part)
+            return list(node.elts) if is_simple else None
+        if isinstance(node, ast.Call) and not node.keywords:
+            target = self._target(node.func)
+            if target is range:
+                numbers = [self._whole(each) for each in node.args]
+                if None in numbers or not 1 <= len(numbers) <= 3:
+                    return None
+                try:
+                    steps = range(*(each for each in numbers if each is not None))
+                except ValueError:
+                    return None
+                return [ast.Constant(each) for each in steps] if len(steps) <= _MOST else None
+            if any(target is each for each in _ITERATORS):
+                parts_of = [self._values(each) for each in node.args]
+                known = [each for each in parts_of if each is not None]
+                if len(known) < len(parts_of) or not known:
+                    return None
+                if target is reversed:
+                    return known[0][::-1]
+                if target is enumerate:
+                    return [_pair(ast.Constant(k), each) for k, each in enumerate(known[0])]
+                return [_pair(*each) for each in zip(*known, strict=False)]
+            return None
+        value = self._target(node)
+        if isinstance(value, list | tuple | np.ndarray) and 0 < len(value) <= _MOST:
+            places = range(len(value))
+            return [ast.Subscript(node, ast.Constant(each), ast.Load()) for each in places]
+        return None
+
+    def _whole(self, node: ast.expr) -> int | None:
+        value = node.value if isinstance(node, ast.Constant) else self._target(node)
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+            value = self._whole(node.operand)
+            return None if value is None else -value
+        return value if type(value) is int else None
+
+    def _arrays_for_lists(self) -> set[str]:
+        """Return the variables that are set once, to a list comprehension, and used only where a
+        list and an array are the same.
+        """
+        found = set()
+        for each in ast.walk(self._tree):
+            if isinstance(each, ast.Assign) and isinstance(each.value, ast.ListComp):
+                found |= {name.id for name in each.targets if isinstance(name, ast.Name)}
+        for name in set(found):
+            stores = [each for each in ast.walk(self._tree) if isinstance(each, ast.Name)
+                      and each.id == name and isinstance(each.ctx, ast.Store)]  # fmt: skip
+            reads = [each for each in ast.walk(self._tree) if isinstance(each, ast.Name)
+                     and each.id == name and isinstance(each.ctx, ast.Load)]  # fmt: skip
+            if len(stores) > 1 or len(reads) > len(list(self._neutral_uses(name))):
+                found.discard(name)
+        return found
+
+    def _neutral_uses(self, name: str) -> Iterator[ast.expr]:
+        """Yield the uses of a variable that are the same for a list and an array."""
+        for each in ast.walk(self._tree):
+            parts: list[ast.expr] = []
+            if isinstance(each, ast.Subscript) and not isinstance(each.slice, ast.Slice):
+                parts = [each.value]
+            elif isinstance(each, ast.For | ast.comprehension):
+                parts = [each.iter]
+            elif isinstance(each, ast.Call):
+                parts = each.args if self._is_neutral(each.func, self._target(each.func)) else []
+            elif isinstance(each, ast.Assign):
+                targets = (ast.Attribute, ast.Subscript, ast.Tuple)
+                is_kept = all(isinstance(target, targets) for target in each.targets)
+                parts = [each.value] if is_kept else []
+            for part in parts:
+                if isinstance(part, ast.Name) and part.id == name:
+                    yield part
+
+
+class _Passing(ast.NodeTransformer):
+    """Passes variables in the calls of nested functions that a nested function makes."""
+
+    def __init__(self, known: Any, mistake: Any) -> None:
+        self._known, self._mistake = known, mistake
+        self._own: list[set[str]] = []
+
+    def visit(self, node: ast.AST) -> Any:
+        """Follow the scopes of nested functions."""
+        if not isinstance(node, ast.FunctionDef | ast.Lambda | ast.ListComp | ast.GeneratorExp):
+            return super().visit(node)
+        self._own.append(bound(node))
+        new = self.generic_visit(node)
+        self._own.pop()
+        return new
+
+    def visit_Call(self, node: ast.Call) -> ast.AST:
+        """Pass the variables of a nested function that is known outside."""
+        self.generic_visit(node)
+        own = set().union(*self._own)
+        if not isinstance(node.func, ast.Name) or node.func.id not in self._known:
+            return node
+        if node.func.id in own:
+            return node
+        for each in self._known[node.func.id][1]:
+            if each in own:
+                what = f"passes {each} of the function around it, and has a variable {each}"
+                raise self._mistake(node, what, "use two names")
+        return _passed(node, self._known, self._mistake)
+
+
+class _Named(ast.NodeTransformer):
+    """Replaces names by expressions where they are read."""
+
+    def __init__(self, known: dict[str, ast.expr]) -> None:
+        self._known = known
+
+    def visit_Name(self, node: ast.Name) -> ast.AST:
+        """Replace a name."""
+        if isinstance(node.ctx, ast.Load) and node.id in self._known:
+            return _located(copy.deepcopy(self._known[node.id]), node)
+        return node
+
+
+def _nested(node: ast.AST) -> Iterator[tuple[str, ast.FunctionDef | ast.Lambda]]:
+    """Yield the name and the function of a statement that defines one."""
+    if isinstance(node, ast.FunctionDef):
+        yield node.name, node
+    elif isinstance(node, ast.Assign) and isinstance(node.value, ast.Lambda):
+        if len(node.targets) == 1 and isinstance(node.targets[0], ast.Name):
+            yield node.targets[0].id, node.value
+
+
+def _sets(node: ast.AST, name: str) -> bool:
+    """Tell whether a node sets a variable or defines a function of this name."""
+    if isinstance(node, ast.Name):
+        return node.id == name and isinstance(node.ctx, ast.Store)
+    return isinstance(node, ast.FunctionDef) and node.name == name
+
+
+def _passed(node: ast.Call, known: Any, mistake: Any) -> ast.Call:
+    """Return a call of a nested function that passes the function's variables."""
+    assert isinstance(node.func, ast.Name)
+    signature, names = known[node.func.id]
+    given = [None] * len(node.args)
+    try:
+        signature.bind(*given, **{str(each.arg): None for each in node.keywords})
+    except TypeError:
+        takes = ", ".join(map(str, signature.parameters.values()))
+        what = f"{node.func.id} takes {takes or 'no arguments'}"
+        raise mistake(node, what, f"write {node.func.id}({takes})") from None
+    arguments = [_located(_name(each), node.func) for each in names]
+    return _located(ast.Call(node.func, [*arguments, *node.args], node.keywords), node)
+
+
+def _signature_only(tree: ast.FunctionDef) -> ast.FunctionDef:
+    """Return a function without annotations that does nothing."""
+    new = copy.deepcopy(tree)
+    new.body = [ast.Pass()]
+    for each in (*new.args.posonlyargs, *new.args.args, *new.args.kwonlyargs):
+        each.annotation = None
+    new.returns = None
+    return ast.fix_missing_locations(new)
+
+
+def _with_first(names: Sequence[str], given: ast.arguments) -> ast.arguments:
+    """Return arguments with others before them."""
+    new = copy.deepcopy(given)
+    first = [ast.arg(each) for each in names]
+    if new.posonlyargs:
+        new.posonlyargs[:0] = first
+    else:
+        new.args[:0] = first
+    return new
+
+
+def _arguments(names: Sequence[str]) -> ast.arguments:
+    return ast.arguments([], [ast.arg(each) for each in names], None, [], [], None, [])
+
+
+def _placed(
+    text: str, node: ast.AST, given: dict[str, ast.expr], loop: list[ast.stmt] | None = None
+) -> list[ast.stmt]:
+    """Return the statements of a text with expressions, and a loop, in the places of names."""
+    found: list[ast.stmt] = []
+    for each in ast.parse(text).body:
+        if isinstance(each, ast.Expr) and isinstance(each.value, ast.Name) and each.value.id == "LOOP":
+            found += loop or []
+            continue
+        for part in ast.walk(each):
+            ast.copy_location(part, node)
+        found.append(_Placed(given).visit(each))
+    return found
+
+
+class _Placed(_Named):
+    """Replaces names by expressions that keep their own places."""
+
+    def visit_Name(self, node: ast.Name) -> ast.AST:
+        """Replace a name."""
+        return self._known.get(node.id, node)
+
+
+def _unpacked(target: ast.expr, value: ast.expr) -> dict[str, ast.expr] | None:
+    """Return the values of the names of a target, or None."""
+    if isinstance(target, ast.Name):
+        return {target.id: value}
+    if not isinstance(target, ast.Tuple | ast.List) or not isinstance(value, ast.Tuple):
+        return None
+    if len(target.elts) != len(value.elts):
+        return None
+    found: dict[str, ast.expr] = {}
+    for each, part in zip(target.elts, value.elts, strict=True):
+        new = _unpacked(each, part)
+        if new is None:
+            return None
+        found |= new
+    return found
+
+
+def _pair(*parts: ast.expr) -> ast.expr:
+    return ast.Tuple(list(parts), ast.Load())
+
+
+def _name(name: str) -> ast.Name:
+    return ast.Name(name, ast.Load())
+
+
+def _located(new: _Node, node: ast.AST) -> _Node:
+    """Return a new node with the place of another, also for its parts without one."""
+    ast.copy_location(new, node)
+    return ast.fix_missing_locations(new)
