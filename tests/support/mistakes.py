@@ -148,11 +148,6 @@ UPDATE: dict[str, tuple[str, str]] = {
     "matrix product in place": ("self.m @= self.m", "version of NumPy"),
     "ellipsis among indices": ("self.z[:] = self.m[..., 0]", "among other indices"),
     "input changed through a function": ("np.asarray(self.w.value)[0] = 1.0", "an Input"),
-    "array replaced in a loop over it": (
-        "for a, b in zip((self.z, self.held), (1.0, 2.0)):\n"
-        "    self.z = self.z + b  # here\n    self.f = a[0]",
-        "an array of the loop",
-    ),
     "power that is the matrix itself": (
         "a = np.linalg.matrix_power(self.m, 1)\na[0, 0] = 1.0  # here",
         "the same array",

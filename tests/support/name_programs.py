@@ -1,4 +1,5 @@
-"""Random programs full of names of arrays: views, swaps, calls with effects, loops, conditions.
+"""Random programs full of names of arrays: views, swaps, calls with effects, nested functions,
+comprehensions, loops, conditions.
 
 A program is the text of some methods of a class. It runs in a component, and in a plain class with
 NumPy arrays as attributes, which knows nothing of rtcf.
@@ -85,20 +86,34 @@ class Plain:
 
 @dataclass
 class _Scope:
-    """The local names of a function: vectors, matrices and pairs."""
+    """The local names of a function: vectors, matrices, pairs and nested functions; `outside`: the
+    vectors of the function around it.
+    """
 
     vectors: list[str] = field(default_factory=list)
     matrices: list[str] = field(default_factory=list)
     pairs: list[str] = field(default_factory=list)
     depth: int = 0
     has_methods: bool = True
+    functions: list[str] = field(default_factory=list)
+    outside: list[str] = field(default_factory=list)
 
     def inner(self) -> "_Scope":
         """Return the scope of a block that may not run."""
         return _Scope(
             list(self.vectors), list(self.matrices), list(self.pairs), self.depth + 1,
-            self.has_methods,
+            self.has_methods, list(self.functions), self.outside,
         )  # fmt: skip
+
+    def nested(self) -> "_Scope":
+        """Return the scope of a nested function that takes a vector p."""
+        return _Scope(["p"], depth=1, has_methods=self.has_methods, functions=list(self.functions),
+                      outside=self.readable)  # fmt: skip
+
+    @property
+    def readable(self) -> list[str]:
+        """Return the vectors that can be read."""
+        return [*self.vectors, *self.outside]
 
 
 @dataclass
@@ -208,6 +223,8 @@ class _Drawn:
             "conditional": lambda: f"({simple()} if {self._test(scope)} else {simple()})",
             "copy": lambda: f"{simple()}.copy()",
         }
+        for name in scope.functions[-2:]:
+            named["nested call"] = lambda name=name: f"{name}({simple()})"  # type: ignore[misc]
         if scope.pairs:
             named["element of a pair"] = lambda: f"{draw.choice(scope.pairs)}[{index % 2}]"
         calls: dict[str, Callable[[str], str]] = {
@@ -215,19 +232,20 @@ class _Drawn:
             "property": lambda name: f"self.{name}",
             "takes": lambda name: f"self.{name}({simple()})",
         }
-        choices = ["member"] * 4 + ["name"] * (4 if scope.vectors else 0) + list(named)
+        choices = ["member"] * 4 + ["name"] * (4 if scope.readable else 0) + list(named)
+        choices += ["nested call"] * (2 if scope.functions else 0)
         choices += [kind for kind in calls for _ in self._calls(kind, scope)] * 2
         choice = draw.choice(choices)
         if choice in ("member", "name"):
-            return self._member(VECTORS) if choice == "member" else draw.choice(scope.vectors)
+            return self._member(VECTORS) if choice == "member" else draw.choice(scope.readable)
         if choice in named:
             return self._feature(choice, named[choice]())
         call = calls[choice](draw.choice(self._calls(choice, scope)))
         return self._feature(f"call: {choice}", call)
 
     def _simple(self, scope: _Scope) -> str:
-        if scope.vectors and self._likely(0.5):
-            return self._draw.choice(scope.vectors)
+        if scope.readable and self._likely(0.5):
+            return self._draw.choice(scope.readable)
         return self._member(VECTORS)
 
     def _vector(self, scope: _Scope, depth: int = 0) -> str:
@@ -244,15 +262,32 @@ class _Drawn:
             lambda: f"half_{self._n}({part()})",
             lambda: f"np.maximum({part()}, {part()})",
             lambda: f"(-{part()})",
-            lambda: self._feature("product", f"({self._matrix_view(scope)} @ {part()}) * 0.25"),
+            lambda: self._filled(scope),
+            lambda: self._feature("product", f"(0.25 * ({self._matrix_view(scope)} @ {part()}))"),
         ]
         return self._draw.choice(ways)()
+
+    def _filled(self, scope: _Scope) -> str:
+        """Return an array made by a comprehension."""
+        one, other = self._vector(scope, 2), self._vector(scope, 2)
+        i = self._draw.randrange(SIZE)
+        text = self._one(
+            f"np.array([0.5 * x for x in {one}])",
+            f"np.array([x - {other}[k] for k, x in enumerate({one})])",
+            f"np.array([x + 0.5 * y for x, y in zip({one}, {other})])",
+            f"np.array([{one}[k] for k in range(4)])",
+            f"np.array([r[{i}] for r in {self._matrix_view(scope)}])",
+        )
+        return self._feature("comprehension", text)
 
     def _new_vector(self, scope: _Scope) -> str:
         """Return an expression that makes a new array."""
         left, right = self._vector(scope, 1), self._vector(scope, 1)
         half = f"half_{self._n}({left})"
-        return self._one(f"{left} - {right}", f"0.5 * {left} + {right}", f"np.array({left})", half)
+        return self._one(
+            f"{left} - {right}", f"0.5 * {left} + {right}", f"np.array({left})", half,
+            self._filled(scope),
+        )  # fmt: skip
 
     def _matrix_view(self, scope: _Scope) -> str:
         draw = self._draw
@@ -280,6 +315,7 @@ class _Drawn:
             f"{self._simple(scope)}[{self._draw.randrange(SIZE)}] > 0.0",
             f"self.s{self._n} < 2.0",
             f"self.v.value[{self._draw.randrange(SIZE)}] > 0.0",
+            self._feature("any", f"any(x > 1.0 for x in {self._simple(scope)})"),
         )
 
     # Statements.
@@ -299,7 +335,7 @@ class _Drawn:
             *("name", "name", "name", "matrix name", "member", "member", "member", "matrix member"),
             *("element", "element of a name", "slice", "in place", "in place name", "swap", "swap"),
             *("swap by a name", "pair", "unpacked", "output", "output in place", "scalar", "call"),
-            *("row set", "chain", "matrix in place", "fill"),
+            *("row set", "chain", "matrix in place", "fill", "nested function"),
             *(("member of a member",) if self._likely(0.4) else ()),
             *(("if", "for", "for rows", "while") if scope.depth < 2 else ()),
         )
@@ -375,6 +411,8 @@ class _Drawn:
             given = self._new_vector(scope)
             scope.vectors.append(name)
             return [indent + self._feature(kind, f"{name} = {self._member(VECTORS)} = {given}")]
+        if kind == "nested function" and scope.depth < 2:
+            return self._nested_function(scope, indent)
         if kind == "output":
             return [indent + self._feature(kind, f"self.y{n}.write({self._vector(scope)})")]
         if kind == "output in place":
@@ -414,6 +452,18 @@ class _Drawn:
             return lines + self._block(scope.inner(), draw.randrange(1, 3), indent + "    ")
         return []
 
+    def _nested_function(self, scope: _Scope, indent: str) -> list[str]:
+        name, inner = self._new("f"), scope.nested()
+        if self._likely(0.4):
+            lines = [f"{indent}{name} = lambda p: {self._vector(inner, 1)}"]
+        else:
+            lines = [f"{indent}def {name}(p):"]
+            lines += self._block(inner, self._draw.randrange(3), indent + "    ")
+            lines += [f"{indent}    return {self._vector_view(inner)}"]
+        scope.functions.append(name)
+        self.features["lambda" if len(lines) == 1 else "nested function"] += 1
+        return lines
+
     def _target(self, names: list[str], prefix: str) -> str:
         """Return a name to bind: a new one, or one that is bound already."""
         if names and self._likely(0.35):
@@ -425,8 +475,19 @@ class _Drawn:
         i = self._draw.randrange(SIZE)
         return self._one(
             f"{self._simple(scope)}[{i}]", f"self.s{self._n} + 1.0", f"self.v.value[{i}]",
-            f"np.sum({self._vector_view(scope)})", f"{i}.0",
+            f"np.sum({self._vector_view(scope)})", f"{i}.0", self._reduced(scope),
         )  # fmt: skip
+
+    def _reduced(self, scope: _Scope) -> str:
+        one, other = self._vector_view(scope), self._vector_view(scope)
+        text = self._one(
+            f"sum(x * y for x, y in zip({one}, {other}))",
+            f"max(abs(x) for x in {one})",
+            f"min(x for r in {self._matrix_view(scope)} for x in r)",
+            f"sum(x for x in {one} if x > 0.0)",
+            f"next((x for x in {one} if x > 1.0), 2.0)",
+        )
+        return self._feature("reduction", text)
 
 
 def component(programs: dict[int, Program]) -> str:

@@ -18,7 +18,7 @@ import ast
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from types import CodeType
-from typing import Any, NamedTuple, TypeGuard
+from typing import Any, NamedTuple
 
 import numpy as np
 from rtcf.component.declaration import (
@@ -43,7 +43,7 @@ from rtcf_compile.source.spelling import defaults_of
 # The name of an array, or of a place: its kind and what tells it from others of the kind.
 Name = tuple[Any, ...]
 # The place of an expression in a function, or the name of a parameter of the function.
-Key = tuple[int, int, int, int] | str
+Key = tuple[int, int, int, int, str] | str
 Site = tuple[CodeType, Key]
 
 
@@ -129,7 +129,9 @@ def is_copied(node: ast.AST) -> bool:
 def key_of(node: ast.expr) -> Key:
     """Return the place of an expression in its function."""
     end = (node.end_lineno or node.lineno, node.end_col_offset or 0)
-    return node.lineno, node.col_offset, *end
+    # Names of lifting.py have the place of what they stand for.
+    kind = node.id if isinstance(node, ast.Name) else type(node).__name__
+    return node.lineno, node.col_offset, *end, kind
 
 
 def _flat(value: Value) -> Refs:
@@ -268,8 +270,8 @@ class _Followed:
         self._frames: list[_Frame] = []
         self._sources: dict[CodeType, Source] = {}
         self._owners: list[type] = []
-        # Values that cannot be copied: zip(…) of a loop.
-        self._fixed: set[Site] = set()
+        # The arrays that zip(…) and its like iterate.
+        self._iterated: dict[ast.expr, Refs] = {}
         # How a binding is written: line, name and expression.
         self._written: dict[Site, tuple[int, str, str]] = {}
 
@@ -463,10 +465,8 @@ class _Followed:
 
     def _for(self, node: ast.For, state: Bindings) -> list[Bindings]:
         iterated = self._value(node.iter, state)
-        called = resolve(node.iter.func, self._frame.source) if _is_call(node.iter) else None
-        if any(called is each for each in _ITERATORS):
-            self._fixed.add(self._site(node.iter))
-        held = self._hold(iterated, node.iter, state)
+        arrays = self._iterated.get(node.iter, NOTHING)
+        held = self._hold((iterated, arrays) if arrays else iterated, node.iter, state)
         value = _elements(iterated)
         ends = self._loop(node, state, value)
         for each in ends:
@@ -589,6 +589,9 @@ class _Followed:
         """Hold the value of an operand while the rest of an expression is computed."""
         others = (name[1] for kind, name in state if kind == "held")
         cell = ("held", (self._frame.depth, max(others, default=0) + 1))
+        if node in self._iterated:
+            state[cell] = value  # its arrays are copied, not the iterator
+            return cell
         site = self._site(node) if may_copy else None
         if site is not None:
             self._written.setdefault(site, (node.lineno, "", ast.unparse(node)))
@@ -612,6 +615,9 @@ class _Followed:
             self._written[site] = (self._frame.source.tree.lineno, name, name)
         if not isinstance(given, ast.Constant):
             value = self._filled(value, site, state)
+        if given in self._iterated:  # arrays of its arguments, which are copied there
+            state[cell] = _mapped(value, lambda ref: ref._replace(bound=ref.site))
+            return
         self._bound(cell, value, site, state)
 
     def _bound(self, cell: Cell, value: Value, site: Site | None, state: Bindings) -> None:
@@ -720,15 +726,7 @@ class _Followed:
                 "the array is replaced while it is changed",
                 "call the method in a statement before",
             )  # fmt: skip
-        self._copy_at(ref.site, node)
-
-    def _copy_at(self, site: Site, node: ast.AST) -> None:
-        if site in self._fixed:
-            _, _, text = self._written[site]
-            raise self._mistake(
-                node, f"changes an array of the loop, {text}", "copy its arrays: x.copy()"
-            )
-        self._copies.add(site)
+        self._copies.add(ref.site)
 
     def _changed(self, refs: Refs, own: Cell | None, node: ast.AST, state: Bindings) -> None:
         """Follow a change of elements; `own`: the variable through which they are changed."""
@@ -737,7 +735,7 @@ class _Followed:
             if ref.thing[0] == "read-only" and ref.place != ref.thing:
                 self._reject(own, ref, None, ref, node, state)
             if kind == "input" and (site := ref.bound or ref.site) is not None:
-                self._copy_at(site, node)
+                self._copies.add(site)
             elif kind == "input":
                 what = f"{ast.unparse(node)} belongs to an Input, which is read-only"
                 raise self._mistake(node, what, "set an Output, or copy it to a variable first")
@@ -1090,6 +1088,9 @@ class _Followed:
             # The first power is the matrix itself, compiled a copy.
             place = ("copy of power", self._site(node))
             return frozenset(each._replace(place=place, is_whole=False) for each in _flat(first))
+        if any(target is each for each in _ITERATORS):
+            inner = [self._iterated.get(each, NOTHING) for each in node.args]
+            self._iterated[node] = everything.union(*inner)
         if target is enumerate:
             return ((NOTHING, _elements(first)),)
         if target is zip:
@@ -1274,10 +1275,6 @@ def _keeps(index: ast.expr) -> bool:
 def _is_other_power(node: ast.Call) -> bool:
     exponent = node.args[1] if len(node.args) > 1 else None
     return isinstance(exponent, ast.Constant) and exponent.value != 1
-
-
-def _is_call(node: ast.expr) -> TypeGuard[ast.Call]:
-    return isinstance(node, ast.Call)
 
 
 def _copy_of(text: str) -> str:

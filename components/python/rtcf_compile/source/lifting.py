@@ -311,7 +311,8 @@ class _Lifting(ast.NodeTransformer):
         one = node.targets[0] if len(node.targets) == 1 else None
         names = isinstance(one, ast.Tuple | ast.List)
         if isinstance(one, ast.Attribute | ast.Subscript) or names or (
-            isinstance(one, ast.Name) and one.id in (*self._lists, "rtcf_value")
+            isinstance(one, ast.Name)
+            and (one.id in self._lists or one.id.startswith(("rtcf_value", "rtcf_of_")))
         ):  # fmt: skip
             node.targets = [self.visit(each) for each in node.targets]
             is_generator = names and isinstance(node.value, ast.GeneratorExp)
@@ -369,7 +370,7 @@ class _Lifting(ast.NodeTransformer):
                 if any(isinstance(each, ast.Call) for each in ast.walk(node) if each is not node):
                     node.args = [named(each) for each in node.args]
             else:
-                node = named(self._as_array(node))
+                node = named(node)
             size = ast.Call(_name("len"), [copy.deepcopy(node)], [])
             return node, _located(size, node)
 

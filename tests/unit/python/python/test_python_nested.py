@@ -172,6 +172,28 @@ WAYS = {
     "comprehension in a comprehension": """
         self.y.write(sum(max(abs(x - other) for other in v) for x in self.a))
         self.a = v""",
+    "arrays of a loop that are replaced": """
+        self.a = 1.0 * v
+        for old, b in zip((self.a, v), (1.0, 2.0)):
+            self.a = self.a + b
+            self.m[0, 1] += old[0]
+        for row, x in zip(self.m, self.a):
+            self.m = 0.5 * self.m + x
+            self.a[2] += row[1]
+        for k, (x, z) in enumerate(zip(reversed(self.a), v)):
+            self.a = self.a * 0.9 + z
+            self.m[1, k] = x
+        self.w.write(self.m[1])""",
+    "nested function in a comprehension over its values": """
+        def half(x):
+            return x / 2.0 + u
+        self.w.write([half(x) for x in [half(z) for z in v]])""",
+    "array that is replaced in a comprehension over it": """
+        def swapped():
+            self.a, self.m[0] = self.m[0].copy(), self.a
+            return self.a[0]
+        self.m[0] = v
+        self.w.write([x - swapped() for k, x in enumerate(self.a)])""",
     "nested function in a comprehension": """
         def error(k):
             return v[k] - self.a[k]
