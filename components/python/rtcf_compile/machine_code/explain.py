@@ -24,6 +24,7 @@ _OPERATORS = {
     **{"eq": "==", "ne": "!=", "lt": "<", "le": "<=", "gt": ">", "ge": ">=", "is_": "is"},
     **{"neg": "-", "pos": "+", "invert": "~", "not_": "not", "contains": "in"},
 }
+_COMPLEX = "use abs(z), z.real or z.imag, or a function of cmath"
 _BITS = ("&", "|", "^", "<<", ">>", "~")
 # The names of functions in the source, by the helpers that replace them.
 NAMES = {
@@ -181,6 +182,9 @@ def _no_implementation(name: str, arguments: list[str], source: str) -> tuple[st
         if each in _OPERATORS:
             return _operator(_OPERATORS[each], kinds)
     of = " and ".join(kinds)
+    if "a complex number" in kinds:
+        of_name = NAMES.get(name, name.removeprefix("rtcf_").replace("math_", "math."))
+        return f"{of_name} of {of}", _COMPLEX
     if name.startswith("rtcf_"):
         done = f"{NAMES[name]} of {of}" if name in NAMES else f"is not possible with {of}"
         remedy = "give it a matrix" if ".linalg." in done else "give it numbers and arrays"
@@ -202,6 +206,8 @@ def _operator(operator: str, kinds: list[str]) -> tuple[str, str]:
         return joined, "test it before with `is not None`"
     if "a text" in kinds:
         return joined, "use numbers: the cycle cannot build text"
+    if "a complex number" in kinds:
+        return joined, _COMPLEX
     if "a list or tuple" in kinds:
         return joined, "make it an array: np.array([…])"
     if operator == "not":

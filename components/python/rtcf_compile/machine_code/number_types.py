@@ -17,9 +17,9 @@ from numba.np.numpy_support import as_dtype
 
 from rtcf_compile.rewriting.operators import COMPARISONS, is_narrow
 
-_ORDER = {"b": 0, "u": 1, "i": 1, "f": 2}
+_ORDER = {"b": 0, "u": 1, "i": 1, "f": 2, "c": 3}
 _COMPARISONS = tuple(COMPARISONS.values())
-_PYTHONS = {"i": "int", "u": "int", "f": "float", "b": "bool"}
+_PYTHONS = {"i": "int", "u": "int", "f": "float", "b": "bool", "c": "complex"}
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,8 @@ class Operand:
     def words(self) -> str:
         """Describe it for messages."""
         if not self.is_array and not self.is_narrow:
-            return {"b": "a bool", "i": "an int", "f": "a float"}[self.dtype.kind]
+            kinds = {"b": "a bool", "i": "an int", "f": "a float", "c": "a complex number"}
+            return kinds[self.dtype.kind]
         return f"an array of {self.dtype.name}" if self.is_array else f"a single {self.dtype.name}"
 
 
@@ -53,7 +54,7 @@ def operand(kind: Any) -> Operand | None:
     if isinstance(kind, types.Optional):
         kind = kind.type
     element = kind.dtype if isinstance(kind, types.Array) else kind
-    if not isinstance(element, types.Integer | types.Float | types.Boolean):
+    if not isinstance(element, types.Integer | types.Float | types.Boolean | types.Complex):
         return None
     return Operand(as_dtype(element), isinstance(kind, types.Array))
 
@@ -138,7 +139,7 @@ def _result(
     operation: Callable[..., Any], one: np.dtype[Any], other: np.dtype[Any]
 ) -> np.dtype[Any]:
     result = np.promote_types(one, other)
-    if operation is operator.truediv and result.kind != "f":
+    if operation is operator.truediv and result.kind not in "fc":
         return np.dtype(np.float64)
     return result
 

@@ -657,6 +657,16 @@ def _diff(a: Any) -> Any:
     return lambda a: a[:, 1:] - a[:, :-1]
 
 
+@compiled_as(own.rtcf_real)
+def _real(val: Any) -> Any:
+    return lambda val: val.real
+
+
+@compiled_as(own.rtcf_imag)
+def _imag(val: Any) -> Any:
+    return lambda val: val.imag
+
+
 # Reductions.
 
 
@@ -720,6 +730,26 @@ def _halves(a: Any, begin: Any, n: Any, zero: Any) -> Any:
     return sums[0]
 
 
+@plain
+def _complex_sum(a: Any) -> Any:
+    """Return the sum of a vector; of up to 64 elements in NumPy's order."""
+    n, result = a.shape[0], 0.0j
+    if n < 4:
+        for i in range(n):
+            result += a[i]
+        return result
+    r0, r1, r2, r3 = a[0], a[1], a[2], a[3]
+    for i in range(4, n - n % 4, 4):
+        r0 += a[i]
+        r1 += a[i + 1]
+        r2 += a[i + 2]
+        r3 += a[i + 3]
+    result += (r0 + r1) + (r2 + r3)
+    for i in range(n - n % 4, n):
+        result += a[i]
+    return result
+
+
 def _summed(a: Any) -> Any:
     """Return the sum of a vector."""
     raise NotImplementedError
@@ -727,6 +757,8 @@ def _summed(a: Any) -> Any:
 
 @compiled_as(_summed)
 def _sum_of(a: Any) -> Any:
+    if isinstance(a.dtype, types.Complex):
+        return lambda a: _complex_sum(a)
     if isinstance(a.dtype, types.Float):
         zero = _dtype(a).type(0)
         return lambda a: zero + _halves(a, 0, a.shape[0], zero)
@@ -913,7 +945,7 @@ def _with_two(function: Any) -> Any:
 
 def _wide(dtype: Any) -> Any:
     """Return the type of a sum."""
-    if dtype.kind == "f":
+    if dtype.kind in "fc":
         return dtype
     return np.dtype(np.uint64) if dtype.kind == "u" else np.dtype(np.int64)
 
@@ -942,7 +974,7 @@ def _as_floats(a: Any) -> Any:
 
 @compiled_as(_as_floats)
 def _floats_of(a: Any) -> Any:
-    if isinstance(a.dtype, types.Float):
+    if isinstance(a.dtype, types.Float | types.Complex):
         return lambda a: a
     return lambda a: own.rtcf_array(a, np.float64)
 

@@ -18,6 +18,7 @@ from rtcf.component import Component, describe
 from rtcf.component.declaration import HOOKS, REALTIME_HOOKS, Description
 from rtcf.component.ros_name import class_name_error
 
+import rtcf_compile.machine_code.complex_functions
 import rtcf_compile.machine_code.int_ufuncs
 import rtcf_compile.machine_code.numpy_functions
 import rtcf_compile.machine_code.operators

@@ -74,7 +74,7 @@ def _of_numbers(operation: Callable[..., Any], one: Operand, other: Operand) -> 
         to = None
     else:
         result = np.promote_types(one.dtype, other.dtype)
-        if operation is operator.truediv and result.kind != "f":
+        if operation is operator.truediv and result.kind not in "fc":
             result = np.dtype(np.float64)
         to = result.type
     if operation not in own.DIVISIONS:

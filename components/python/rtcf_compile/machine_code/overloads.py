@@ -22,6 +22,7 @@ from rtcf_compile.machine_code.sharing import overlaps, shares
 from rtcf_compile.machine_code.tile import ROWS
 from rtcf_compile.rewriting import helpers, numpy_functions, operators
 
+_PART = "write z.real, z.imag or abs(z)"
 # numba matches an overload by its parameter names and compiles the function that it returns.
 _OPTIONS: dict[str, Any] = {
     "boundscheck": False,
@@ -320,9 +321,10 @@ def _to_float(value: Any) -> Any:
         return lambda value: float(value.value)
     if isinstance(value, types.Boolean):
         return lambda value: 1.0 if value else 0.0
-    if isinstance(value, types.Number):
+    if isinstance(value, types.Float | types.Integer):
         return lambda value: np.float64(value)
-    raise TypingError(f"RTCF:float of {words(value)}:give it a number")
+    remedy = _PART if isinstance(value, types.Complex) else "give it a number"
+    raise TypingError(f"RTCF:float of {words(value)}:{remedy}")
 
 
 @compiled_as(helpers.rtcf_float)
@@ -331,7 +333,8 @@ def _float(value: Any) -> Any:
         return lambda value: float(value.value)
     if isinstance(value, types.Float | types.Integer):
         return lambda value: np.float64(value)
-    raise TypingError(f"RTCF:a number is set to {words(value)}:give it a float")
+    remedy = _PART if isinstance(value, types.Complex) else "give it a float"
+    raise TypingError(f"RTCF:a number is set to {words(value)}:{remedy}")
 
 
 @compiled_as(helpers.rtcf_int)
@@ -370,7 +373,7 @@ def _require_fit(columns: Any, rows: Any) -> None:
 def _matmul(a: Any, b: Any) -> Any:
     if not isinstance(a, types.Array) or not isinstance(b, types.Array):
         raise TypingError(f"RTCF:@ of {words(a)} and {words(b)}:use * for numbers")
-    if not isinstance(a.dtype, types.Float) and not isinstance(b.dtype, types.Float):
+    if not any(isinstance(each.dtype, types.Float | types.Complex) for each in (a, b)):
         raise TypingError(
             f"RTCF:@ of {words(a)} and {words(b)}:convert one to floats: x.astype(float)"
         )
@@ -482,6 +485,15 @@ def _row_of_any() -> Any:
     return row
 
 
+def _refuse_loss(target: Any, new: Any) -> None:
+    """Reject elements set to floats or complex numbers that they cannot store."""
+    is_complex = isinstance(target.dtype, types.Complex)
+    if isinstance(new, types.Float) and not is_complex and not isinstance(target.dtype, types.Float):
+        raise TypingError(f"RTCF:elements of {target.dtype} are set to {new}:round them first")
+    if isinstance(new, types.Complex) and not is_complex:
+        raise TypingError(f"RTCF:elements of {target.dtype} are set to {new}:{_PART}")
+
+
 @compiled_as(helpers.rtcf_assign, in_line=True)
 def _assign(target: Any, value: Any) -> Any:
     if not isinstance(target, types.Array):
@@ -489,8 +501,7 @@ def _assign(target: Any, value: Any) -> Any:
     if not target.mutable:
         raise TypingError("RTCF:a constant of the module is set:declare a State, or copy it")
     new = value.dtype if isinstance(value, types.Array) else value
-    if isinstance(new, types.Float) and not isinstance(target.dtype, types.Float):
-        raise TypingError(f"RTCF:elements of {target.dtype} are set to {new}:round them first")
+    _refuse_loss(target, new)
     if (convert := _fitted(target, value)) is not None:
         fill = plain(_filling(target.ndim))
         return lambda target, value: fill(target, convert(value))
@@ -733,8 +744,7 @@ def _set(base: Any, index: Any, value: Any) -> Any:
     if not base.mutable:
         raise TypingError("RTCF:a constant of the module is set:declare a State, or copy it")
     new = value.dtype if isinstance(value, types.Array) else value
-    if isinstance(new, types.Float) and not isinstance(base.dtype, types.Float):
-        raise TypingError(f"RTCF:elements of {base.dtype} are set to {new}:round them first")
+    _refuse_loss(base, new)
     kinds = _kinds(base, index)
     if "array" in kinds or "mask" in kinds:
         return _selected(kinds, value)
@@ -1310,6 +1320,8 @@ def _pow(base: Any, exponent: Any) -> Any:
     if not isinstance(base, numbers) or not isinstance(exponent, numbers):
         power_of = plain(_power_of_arrays(base, exponent))
         return lambda base, exponent: power_of(as_base(base), as_exponent(exponent))
+    if isinstance(base, types.Complex) or isinstance(exponent, types.Complex):
+        return lambda base, exponent: helpers.rtcf_complex_pow(base, exponent)
     for each in (base, exponent):
         _refuse_narrow(helpers.rtcf_pow, each, "f")
     if not isinstance(base, types.Float) and not isinstance(exponent, types.Float):
@@ -1374,7 +1386,7 @@ def _power_of_arrays(base: Any, exponent: Any) -> Any:
 
 @compiled_as(helpers.rtcf_negative_pow)
 def _negative_pow(base: Any, exponent: Any) -> Any:
-    if isinstance(base, types.Number | types.Boolean):
+    if isinstance(base, types.Number | types.Boolean) and not isinstance(base, types.Complex):
         return lambda base, exponent: helpers.rtcf_pow(float(base), float(exponent))
     return lambda base, exponent: helpers.rtcf_pow(base, exponent)
 

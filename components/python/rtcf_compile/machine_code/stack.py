@@ -26,6 +26,7 @@ _RESULT = re.compile(rf"  ({_NAME}) = (\w+) (.*)")
 _OFFSET = re.compile(
     rf"(?:inbounds |nuw |nusw )*(i8|i64|double), [^,]*? ({_NAME}), i64 (-?\d+)(?:,|$)"
 )
+_TYPE = re.compile(r"(?:\{[^}]*\}|[^,{])*")
 _STORED = re.compile(rf"  store .* ({_NAME})(?:, align \d+)?(?:, ![^,]*)*$")
 _BYTES = {"i8": 1, "i64": 8, "double": 8}
 
@@ -114,7 +115,7 @@ class _Function:
                 if instruction == "load" and offset is None:
                     continue
                 if instruction == "load" and offset == _DATA:
-                    kind = rest.split(",")[0]
+                    kind = _TYPE.match(rest)[0]  # type: ignore[index]
                     pointer = "ptr" if kind == "ptr" else "i8*"
                     changed[number] = f"  {derived} = bitcast {pointer} {made} to {kind}"
                     further = None
@@ -155,7 +156,7 @@ class _Function:
         if result[2] == "phi":
             pairs = re.findall(r"\[ (.*?), %[^\]]* \]", result[3])
             return [each for each in pairs if each != "undef"]
-        return [part.split(" ")[-1] for part in result[3].split(", ")[1:3]]
+        return [part.split(" ")[-1] for part in _plain(result[3]).split(", ")[1:3]]
 
 
 def _moved(rest: str, name: str, offset: int | None) -> int | None:
@@ -164,6 +165,11 @@ def _moved(rest: str, name: str, offset: int | None) -> int | None:
     if offset is None or found is None or found[2] != name:
         return None
     return offset + _BYTES[found[1]] * int(found[3])
+
+
+def _plain(text: str) -> str:
+    """Return operands with pointers to complex numbers as pointers to their first part."""
+    return text.replace("{ double, double }", "double")
 
 
 def _pointer(typed: str) -> str:

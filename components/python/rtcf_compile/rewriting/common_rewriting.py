@@ -33,7 +33,7 @@ ARENA = 64 * 1024
 _NEW = (np.zeros, np.ones, np.empty, np.full, np.eye, np.identity)
 _PLAIN = (*_NEW, np.zeros_like, np.ones_like, np.empty_like, np.full_like, np.arange)
 _PLAIN_METHODS = ("copy", "fill", "flatten", "item", "view")
-_DTYPES = {float: np.float64, int: np.int64, bool: np.bool_}
+_DTYPES = {float: np.float64, int: np.int64, bool: np.bool_, complex: np.complex128}
 # NumPy functions with the position of their element type argument.
 _TYPED = {np.zeros: 1, np.ones: 1, np.empty: 1, np.full: 2, np.zeros_like: 1, np.ones_like: 1}
 
@@ -586,8 +586,9 @@ class CommonRewriting(ast.NodeTransformer):
             scalar = np.dtype(value)
         except TypeError:
             scalar = np.dtype(object)
-        if scalar.kind not in "fiub":
-            raise self.mistake(node, "is not a number type", "use np.float64, np.int64 or bool")
+        if not is_number(scalar):
+            remedy = "use float, int, bool or complex"
+            raise self.mistake(node, "is not a number type", remedy)
         name = f"rtcf_dtype_{scalar.name}"
         self.constants[name] = scalar.type
         return like(node, ast.Name(name, ast.Load()))
@@ -906,8 +907,14 @@ def _is_namespace(value: Any) -> bool:
     )
 
 
+def is_number(kind: np.dtype[Any]) -> bool:
+    """Tell whether a type is one of numbers that are compiled."""
+    return kind.kind in "fiub" or kind == np.complex128
+
+
 def _is_constant(value: Any) -> bool:
-    return isinstance(value, bool | int | float | str | tuple | list | np.ndarray | np.generic)
+    numbers = bool | int | float | complex | np.generic
+    return isinstance(value, numbers | str | tuple | list | np.ndarray)
 
 
 def _number_in(node: ast.Call) -> float | None:

@@ -13,7 +13,7 @@ from rtcf.component import Component, Fault
 from rtcf.component.declaration import HOOKS, REALTIME_HOOKS, Description
 
 from rtcf_compile.rewriting import helpers, numpy_functions, operators
-from rtcf_compile.rewriting.common_rewriting import ARENA, CommonRewriting
+from rtcf_compile.rewriting.common_rewriting import ARENA, CommonRewriting, is_number
 from rtcf_compile.rewriting.logs import Logs
 from rtcf_compile.rewriting.methods import Method, Methods
 from rtcf_compile.rewriting.references import References
@@ -308,9 +308,9 @@ def _constant(node: ast.Name, value: Any, source: Source) -> None:
     what = kinds.get(type(value))
     if what:
         raise at(source.file, node, f"is {what} of the module", "use a tuple or np.array(…)")
-    if isinstance(value, np.ndarray) and value.dtype.kind not in "fiub":
+    if isinstance(value, np.ndarray) and not is_number(value.dtype):
         raise at(source.file, node, f"is an array of {value.dtype}", "use an array of numbers")
-    known = (bool, int, float, str, tuple, np.ndarray, np.generic, type, ModuleType, type(None))
+    known = (bool, int, float, complex, str, tuple, np.ndarray, np.generic, type, ModuleType, type(None))
     if isinstance(value, known) or callable(value) or isinstance(value, enum.Enum):
         return
     if dataclasses.is_dataclass(value):

@@ -8,6 +8,7 @@ lists for it.
 
 import ast
 import builtins
+import cmath
 import math
 import operator
 from collections.abc import Callable
@@ -51,7 +52,8 @@ def rtcf_assign(target: Any, value: Any) -> None:
 def _elements(target: Any, value: Any) -> Any:
     """Return the value for the elements of an array; raise if they cannot store it."""
     new = np.asarray(value)
-    if new.dtype.kind == "f" and target.dtype.kind != "f":
+    order = "biufc"
+    if new.dtype.kind in "fc" and order.index(new.dtype.kind) > order.index(target.dtype.kind):
         raise TypeError(f"elements are {target.dtype.name}, not {new.dtype.name}")
     if new.ndim == 0 and new.dtype.kind in "iu" and target.dtype.kind in "iu":
         return operators.as_element(new.item(), target.dtype)
@@ -138,12 +140,13 @@ OF_LISTS: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
 }
 
 
-def _checked(function: Callable[[float], float]) -> Callable[[Any], float]:
-    def checked(value: Any) -> float:
+def _checked(function: Callable[[Any], Any], module: str = "math") -> Callable[[Any], Any]:
+    def checked(value: Any) -> Any:
         return function(value)
 
-    checked.__name__ = f"rtcf_math_{function.__name__}"
-    checked.__doc__ = f"Return math.{function.__name__}(value), which raises outside its domain."
+    name = function.__name__
+    checked.__name__ = f"rtcf_{module}_{name}"
+    checked.__doc__ = f"Return {module}.{name}(value), which raises outside its domain."
     return checked
 
 
@@ -155,6 +158,26 @@ _MATH: list[Callable[[float], float]] = [
     *(math.sinh, math.cosh, math.tanh, math.asinh, math.acosh, math.atanh),
 ]
 MATH: dict[Callable[..., Any], Callable[[Any], float]] = {each: _checked(each) for each in _MATH}
+
+
+_CMATH: list[Callable[[complex], Any]] = [
+    *(cmath.sqrt, cmath.exp, cmath.log, cmath.log10),
+    *(cmath.sin, cmath.cos, cmath.tan, cmath.asin, cmath.acos, cmath.atan),
+    *(cmath.sinh, cmath.cosh, cmath.tanh, cmath.asinh, cmath.acosh, cmath.atanh),
+]
+CMATH: dict[Callable[..., Any], Callable[[Any], Any]] = {
+    each: _checked(each, "cmath") for each in _CMATH
+}
+
+
+def rtcf_cmath_rect(r: Any, phi: Any) -> complex:
+    """Return cmath.rect(r, phi), which raises outside its domain."""
+    return cmath.rect(r, phi)
+
+
+def rtcf_complex_pow(base: Any, exponent: Any) -> complex:
+    """Return base ** exponent of complex numbers."""
+    return complex(base) ** complex(exponent)
 
 
 def rtcf_math_fmod(x: Any, y: Any) -> float:
@@ -175,6 +198,8 @@ def rtcf_pow(base: Any, exponent: Any) -> Any:
         if exponent < 0:
             raise ValueError("an int to a negative power: make it a float")
         return base**exponent
+    if isinstance(base, complex) or isinstance(exponent, complex):
+        return rtcf_complex_pow(base, exponent)
     base, exponent = float(base), float(exponent)
     finite = math.isfinite(base) and math.isfinite(exponent)
     if finite and base < 0.0 and not exponent.is_integer():
@@ -186,7 +211,7 @@ def rtcf_negative_pow(base: Any, exponent: Any) -> Any:
     """Return base ** exponent for a constant exponent below 0: a float, even for an int."""
     if isinstance(base, np.ndarray):
         return base**exponent
-    return rtcf_pow(float(base), float(exponent))
+    return rtcf_pow(base if isinstance(base, complex) else float(base), float(exponent))
 
 
 def rtcf_math_pow(base: Any, exponent: Any) -> Any:
@@ -407,6 +432,8 @@ INSTEAD: dict[Callable[..., Any], Callable[..., Any]] = {
     np.where: rtcf_where,
     math.fmod: rtcf_math_fmod,
     math.pow: rtcf_math_pow,
+    cmath.rect: rtcf_cmath_rect,
+    **CMATH,
     math.remainder: rtcf_math_remainder,
     math.floor: rtcf_floor,
     math.ceil: rtcf_ceil,
@@ -438,7 +465,7 @@ BY_NAME = {
         ),
         *(rtcf_items, rtcf_front, rtcf_age, rtcf_after, rtcf_pow, rtcf_round, rtcf_index),
         rtcf_round_to,
-        *(rtcf_negative_pow, rtcf_changed),
+        *(rtcf_negative_pow, rtcf_changed, rtcf_complex_pow),
         *IN_PLACE.values(),
         *OF_LISTS.values(),
         *INSTEAD.values(),

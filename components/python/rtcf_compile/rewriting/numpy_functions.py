@@ -79,6 +79,18 @@ def rtcf_linspace(start: Any, stop: Any, num: Any = 50, endpoint: Any = True) ->
     return np.linspace(start, stop, num, endpoint)
 
 
+@_stands_for(np.real)
+def rtcf_real(val: Any) -> Any:
+    """Return the real part of a number or array."""
+    return np.real(val)
+
+
+@_stands_for(np.imag)
+def rtcf_imag(val: Any) -> Any:
+    """Return the imaginary part of a number or array."""
+    return np.imag(val)
+
+
 # Shapes.
 
 
@@ -541,6 +553,8 @@ def _of_the_c_library(function: Function, name: str) -> Function:
         if any(np.size(each) == 0 for each in arguments):
             return function(*arguments)
         dtype = np.result_type(np.float32, *(np.asarray(each).dtype for each in arguments))
+        if dtype.kind == "c":
+            return function(*arguments)
         return by_type[dtype](*arguments)[()]
 
     if count == 2:

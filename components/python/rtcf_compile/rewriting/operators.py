@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 Function = Callable[..., Any]
-WIDE = frozenset(np.dtype(each) for each in (np.bool_, np.int64, np.float64))
+WIDE = frozenset(np.dtype(each) for each in (np.bool_, np.int64, np.float64, np.complex128))
 # A longer shift leaves no bit of an int64. The limit keeps Python ints small.
 _LONGEST_SHIFT = 4096
 DIVISIONS = (operator.truediv, operator.floordiv, operator.mod)
@@ -46,7 +46,7 @@ def _alike(number: Any, array: Any, operation: Function | None) -> Any:
     """Return a Python number converted to the element type of a narrow array."""
     if type(number) not in (int, float) or not isinstance(array, np.ndarray):
         return number
-    if not is_narrow(array.dtype) or (type(number) is float and array.dtype.kind != "f"):
+    if not is_narrow(array.dtype) or (type(number) is float and array.dtype.kind not in "fc"):
         return number
     if array.dtype.kind in "iu" and operation in _COMPARISONS:
         return number  # compare without conversion

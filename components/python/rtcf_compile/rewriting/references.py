@@ -80,11 +80,11 @@ _MOST_STATES = 12  # different bindings at one place, before they are merged
 # Functions and methods whose result refers to their first argument, in NumPy.
 _SAME = (np.asarray, np.ascontiguousarray)
 _VIEWS = (
-    *(np.reshape, np.ravel, np.transpose, np.flip, np.squeeze, np.flipud, np.fliplr),
+    *(np.real, np.imag, np.reshape, np.ravel, np.transpose, np.flip, np.squeeze, np.flipud, np.fliplr),
     *(np.broadcast_to, np.expand_dims, np.atleast_1d, np.atleast_2d, np.atleast_3d),
 )
 _VIEW_METHODS = ("reshape", "ravel", "transpose", "squeeze", "view", "swapaxes")
-_VIEW_ATTRIBUTES = ("T", "real", "flat")
+_VIEW_ATTRIBUTES = ("T", "real", "imag", "flat")
 # Views in NumPy, copies in compiled code.
 _DIAGONALS, _DIAGONAL_METHODS = (np.diag, np.diagonal), ("diagonal",)
 _CHANGING_METHODS = ("fill", "sort", "partition", "put", "itemset")

@@ -78,7 +78,6 @@ _BUILTINS: dict[str, tuple[str, str]] = {
     "hash": ("values have no hash in the cycle", "compare them: a == b"),
     "next": ("an iterator cannot be compiled", "use a loop, or an index"),
     "iter": ("an iterator cannot be compiled", "use a loop, or an index"),
-    "complex": ("complex numbers are not compiled", "use two floats"),
     "bytes": ("bytes are not compiled", "use an array of np.uint8"),
     "bytearray": ("bytes are not compiled", "use an array of np.uint8"),
     "frozenset": ("a set allocates memory", "use an array of bools"),
@@ -130,7 +129,7 @@ _FUNCTIONS = {
 }
 # Functions that change an array, or return one that is sometimes a view.
 _REJECTED = (
-    *(np.asfortranarray, np.real, np.imag, np.copyto, np.fill_diagonal, np.put, np.putmask),
+    *(np.asfortranarray, np.copyto, np.fill_diagonal, np.put, np.putmask),
     *(np.place, np.put_along_axis, operator.setitem, operator.delitem),
     *(getattr(operator, each) for each in dir(operator) if each.startswith("i") and each[1:] in (
         *("add", "sub", "mul", "truediv", "floordiv", "mod", "pow", "matmul", "and", "or", "xor"),
@@ -140,7 +139,7 @@ _REJECTED = (
 # Decorators that leave the body of a function as it is.
 _DECORATORS = ("property", "staticmethod", "override", "final")
 # Packages whose functions are compiled, or rejected individually.
-_COMPILED = ("builtins", "math", "numpy", "operator", "rtcf", "_operator")
+_COMPILED = ("builtins", "cmath", "math", "numpy", "operator", "rtcf", "_operator")
 _LARGEST, _SMALLEST = 2**63 - 1, -(2**63)
 
 
@@ -259,8 +258,6 @@ def _constant(node: ast.Constant, file: str) -> None:
             raise at(
                 file, node, "does not fit int64", "write it as a float, or keep it below 2**63"
             )
-    elif isinstance(value, complex):
-        raise at(file, node, "complex numbers are not compiled", "use two floats")
     elif isinstance(value, bytes):
         raise at(file, node, "bytes are not compiled", "use an array of np.uint8")
 

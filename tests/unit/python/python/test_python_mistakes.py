@@ -214,7 +214,7 @@ IN_UPDATE = {
     "fault with a variable": ("self.fault(self.n)", "a fault takes one constant text"),
     "isinstance": ("a = isinstance(self.n, int)", "types are fixed at compile time"),
     "time set": ("self.dt = 1.0", "belongs to the loop"),
-    "complex number": ("a = 1j", "complex numbers are not compiled"),
+    "complex number": ("self.n = 1j", "a whole number is set to a complex number"),
 }
 IN_PREPARE = {
     "input in prepare": ("self.d = self.u.value", "prepare runs beside the loop"),
