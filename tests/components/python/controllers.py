@@ -196,6 +196,48 @@ class Pendulum(Component):
         self.torque.write(torque)
 
 
+class Integrator(Component):
+    """Has private members, beside a port of the same name."""
+
+    u: Input[float]
+    integral: Output[float] = Output(unit="m")
+    ki: Parameter[float] = Parameter(2.0, min=0.0, max=10.0)
+    _integral: State[float] = State(0.5, unit="m", doc="of the input")
+    _last: State[float | None]
+    _latched: State[bool] = State(False, live=True)
+    _sums: State[np.float64, 3]
+    _time: State[int]  # the loop's is self.time
+    _record: State[int]
+    _memory: State[np.float64, 2]
+    _gain: Derived[float]
+    _LIMIT = 1e6
+    __FACTOR = 0.5
+
+    def prepare(self):
+        """Compute the gain."""
+        self._gain = self.ki * self.__FACTOR
+
+    def _limited(self, value):
+        return min(max(value, -self._LIMIT), self._LIMIT)
+
+    def __step(self, __share):
+        __sum = self._integral + self._gain * self.u.value * __share
+        return self._limited(__sum)
+
+    def update(self):
+        """Integrate."""
+        old = self._sums
+        self._integral = self.__step(self.dt)
+        self._sums = 0.5 * self._sums + self._integral
+        self._memory[:] = self._sums[:2] - old[:2]
+        if self._last is None or self.u.value > self._last:
+            self._last = self.u.value
+        self._latched = self._latched or self._integral > 1e3
+        self._time += self.time
+        self._record += 1
+        self.integral.write(self._integral)
+
+
 def quotient(a, b):
     """Return a / b."""
     return a / b

@@ -17,6 +17,7 @@ from rtcf.component.declaration import (
     Parameter,
     Queue,
     State,
+    own_field,
 )
 from rtcf.component.message_type import MessageType
 from rtcf.component.value_type import ValueType
@@ -98,7 +99,7 @@ class _Library:
             self.data.bytes(record.tobytes(), 8),
             record.nbytes,
             *(self._hook(compiled, hook) for hook in HOOKS),
-            sum(2**i for i, name in enumerate(TIME_FIELDS) if f"_{name}" in compiled.used),
+            sum(2**i for i, name in enumerate(TIME_FIELDS) if own_field(name) in compiled.used),
             *self._array([self._input(compiled, m) for m in _of(compiled, Input, Queue)]),
             *self._array([self._output(compiled, m) for m in _of(compiled, Output)]),
             *self._array([e for m in _of(compiled, Parameter) for e in self._parameter(m, record)]),
@@ -233,7 +234,7 @@ class _Library:
         texts = [str(member.options.get(each, "")) for each in ("unit", "doc")]
         offset = _offset(record, member.name)
         live = int(bool(member.options.get("live", False)))
-        return self.data.struct(member.name, *texts, self._type(member.type), offset, live)
+        return self.data.struct(member.outer_name, *texts, self._type(member.type), offset, live)
 
     def _lines(self, compiled: Compiled) -> list[Value]:
         numbers = {*compiled.lines, *(each.line for each in compiled.raises.values())} - {0}
@@ -318,7 +319,7 @@ def _record(compiled: Compiled) -> "np.ndarray[tuple[()], np.dtype[np.void]]":
     """Return the initial record of a component."""
     about = compiled.description
     record = np.zeros((), about.record)
-    head = ["_component", *(f"_{name}" for name in TIME_FIELDS), "_line"]
+    head = [own_field(name) for name in ("component", *TIME_FIELDS, "line")]
     assert [_offset(record, name) for name in head] == list(range(0, 64, 8)), "see RecordHead"
     for member in about.of(State) + about.of(Parameter):
         record[member.name] = member.initial

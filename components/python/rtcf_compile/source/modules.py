@@ -100,7 +100,7 @@ def read(function: FunctionType) -> Source:
     if not isinstance(tree, ast.FunctionDef):
         kind = "is async" if isinstance(tree, ast.AsyncFunctionDef) else "is a lambda"
         raise Mistake(file, begin, f"{function.__name__} {kind}", "write it with `def`")
-    spelling.normalise(tree)
+    spelling.normalise(tree, function)
     return Source(function, tree, file)
 
 
