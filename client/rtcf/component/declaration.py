@@ -326,8 +326,6 @@ def _member(owner: type, name: str, annotation: object, line: int) -> Member:
         raise DeclarationError("is an enum, which is set by name: remove min and max")
     if kind is Queue:
         _check_size(name, options.get("size"))
-    if kind is Parameter and declared.shape and declared.is_bool:
-        raise DeclarationError("is an array of bools: declare single bools, or an array of ints")
     if options.get("texts") is not None:
         _check_texts(message, options["texts"])
     value = _initial(declared, initial)

@@ -487,7 +487,7 @@ def _parameters(record: Any, parameters: list[Member], draw: Any) -> None:
     for member in parameters:
         low, high = (member.options.get(each) for each in ("min", "max"))
         if member.type.is_bool:
-            record[member.name] = draw.random() < 0.5
+            record[member.name] = draw.random(member.type.shape) < 0.5
         elif member.type.enumeration:
             record[member.name] = draw.choice([int(each) for each in member.type.enumeration])
         elif low is not None and high is not None and member.type.is_float:

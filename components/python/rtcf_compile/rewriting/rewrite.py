@@ -222,11 +222,7 @@ class Hook(Ports):
     def _call(self, node: ast.AST, method: Method, arguments: Sequence[ast.expr]) -> ast.AST:
         """Return the call of the compiled function of a method."""
         if method.function is None:
-            raise self.mistake(
-                node,
-                f"{method.name} is a {method.kind}",
-                "write a method, a static method or a property with `def`",
-            )
+            raise self.mistake(node, f"{method.name} is a {method.kind}", method.remedy)
         if isinstance(node, ast.Call):
             written = like(node, ast.Call(node.func, list(arguments), node.keywords))
             own = 0 if method.kind == "static method" else 1  # self is not in the source
@@ -530,6 +526,8 @@ class Hook(Ports):
         method = self._methods.find(name)
         if method is not None and method.kind == "property":
             return self._call(node, method, [])
+        if method is not None and method.function is None:
+            raise self.mistake(node, f"{name} is a {method.kind}", method.remedy)
         if method is not None:
             raise self.mistake(node, "a method is not a value", f"call it: self.{name}(…)")
         raise self._undeclared(node)
