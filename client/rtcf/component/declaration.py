@@ -89,13 +89,15 @@ class Declarable:
 class Input(Declarable):
     """An input: `self.u.value`, `.new`, `.valid`, `.age` (ns), `.connected`."""
 
+    allowed = ("unit", "doc")
+
 
 class Queue(Declarable):
     """An input that keeps up to `size` messages, in order: `self.goals.size`, `.front` (the oldest
     message), `.pop()`, `.age` (of the oldest message, ns), `.dropped`, `.connected`.
     """
 
-    allowed = ("size",)
+    allowed = ("size", "unit", "doc")
 
 
 class Output(Declarable):
@@ -106,7 +108,7 @@ class Output(Declarable):
     message: `{"header.frame_id": "base"}`.
     """
 
-    allowed = ("unit", "finite", "texts")
+    allowed = ("unit", "doc", "finite", "texts")
 
 
 class Parameter(Declarable):

@@ -196,11 +196,39 @@ class Pendulum(Component):
         self.torque.write(torque)
 
 
+class Axes(Component):
+    """Adds the axes that are enabled."""
+
+    u: Input[np.float64, 3]
+    y: Output[np.float64, 3]
+    enabled: Parameter[bool, 3] = Parameter([True, False, True], doc="axes that move")
+    plan: Parameter[bool, 2, 2] = Parameter([[True, False], [False, False]], name="plan/way")
+    many: Derived[int]
+    total: State[np.float64, 3]
+
+    def prepare(self):
+        """Count."""
+        self.many = np.count_nonzero(self.enabled) + np.count_nonzero(self.plan)
+        if self.many == 0:
+            raise ValueError("no axis")
+
+    def update(self):
+        """Add."""
+        step = np.where(self.enabled, self.u.value, 0.0)
+        step[~self.enabled] = 1.0
+        for axis in range(3):
+            if self.enabled[axis] and self.plan[0, axis % 2]:
+                step[axis] += self.many
+        self.total += np.clip(step, -1e3, 1e3)
+        self.y.write(self.total)
+
+
 class Integrator(Component):
     """Has private members, beside a port of the same name."""
 
-    u: Input[float]
-    integral: Output[float] = Output(unit="m")
+    u: Input[float] = Input(unit="m/s", doc="measured speed")
+    goals: Queue[float] = Queue(size=2, unit="m", doc="positions to reach")
+    integral: Output[float] = Output(unit="m", doc="position")
     ki: Parameter[float] = Parameter(2.0, min=0.0, max=10.0)
     _integral: State[float] = State(0.5, unit="m", doc="of the input")
     _last: State[float | None]
@@ -234,7 +262,7 @@ class Integrator(Component):
             self._last = self.u.value
         self._latched = self._latched or self._integral > 1e3
         self._time += self.time
-        self._record += 1
+        self._record += self.goals.size
         self.integral.write(self._integral)
 
 

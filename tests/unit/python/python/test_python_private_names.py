@@ -77,7 +77,7 @@ def test_attributes_keep_the_underscore_and_states_lose_it_outside() -> None:
     integrator.cycle()
     assert integrator._gain == 2.0
     assert integrator._integral == integrator.integral.value == 0.5 + 2.0 * 0.001
-    assert (integrator._last, integrator._time, integrator._record) == (1.0, 0, 1)
+    assert (integrator._last, integrator._time, integrator._record) == (1.0, 0, 0)
     assert integrator._memory.tolist() == integrator._sums[:2].tolist()
     integrator._integral = 7.0
     integrator.cycle()
