@@ -19,6 +19,7 @@ from collections import deque, namedtuple
 from dataclasses import dataclass, field
 from typing import Any
 
+import numba
 import numpy as np
 from geometry_msgs.msg import PoseArray, PoseStamped, Twist
 from rtcf.component import Component, Derived, Input, Output, Parameter, Queue, State
@@ -66,6 +67,29 @@ SHARED = Gains()
 @functools.lru_cache(maxsize=4)
 def cached(x):
     return x
+
+
+def timed(hook):
+    def inner(self):
+        return hook(self)
+
+    return inner
+
+
+def wrapped(hook):
+    @functools.wraps(hook)
+    def inner(self):
+        return hook(self)
+
+    return inner
+
+
+class Timed:
+    def __init__(self, hook):
+        self.hook = hook
+
+    def __call__(self, *given):
+        return self.hook(*given)
 
 
 def limited(x, low, high=1.0):
@@ -472,6 +496,15 @@ UPDATE: dict[str, tuple[str, str]] = {
     "vars": ("a = vars(self)", "vars"),
     "id": ("a = id(self.z)", "id"),
     "next": ("a = next(self.z)", "next"),
+    "function that a function returns": (
+        "def scaled(share):\n    def scale(x):\n        return share * x  # here\n\n"
+        "    return scale\n\n\nhalved = scaled(0.5)\n---\nself.f = halved(self.f)",
+        "share is a variable of scaled: define scale in the module",
+    ),
+    "function with an own decorator": (
+        "@wrapped  # here\ndef halved(x):\n    return 0.5 * x\n---\nself.f = halved(self.f)",
+        "remove the decorator",
+    ),
     "object of a class": ("a = Filter(3.0)", "Filter"),
     "object of the module": ("self.f = FILTER.step(self.f)", "FILTER"),
     "dataclass made": ("a = Gains(2.0)", "Gains"),
@@ -483,6 +516,9 @@ UPDATE: dict[str, tuple[str, str]] = {
     "member misspelt": ("self.f = self.kd", "kd"),
     "member that is not declared": ("self.sum = 0.0", "sum"),
     "member that is not declared, counted": ("self.count += 1", "count"),
+    "private member that is not declared": ("self._sum = 0.0", "write `_sum: State[float]`"),
+    "member private to the class": ("self.__sum = 0.0", "write `_sum: State[float]`"),
+    "method private to the class": ("self.f = self.__sum()", "def __sum(self"),
     "parameter set": ("self.kp = 2.0", "parameter"),
     "element of a parameter set": ("self.gains[0] = 2.0", "parameter"),
     "parameter's value": ("self.f = self.kp.value", "value"),
@@ -593,7 +629,15 @@ CLASS: dict[str, tuple[str, str]] = {
     "queue that is too large": ("v: Queue[float] = Queue(size=5000)", "1024"),
     "unit that is no text": ("v: Output[float] = Output(unit=1)", "unit"),
     "name with two underscores": ("v__w: State[float]", "name"),
-    "private name": ("_v: State[float]", "name"),
+    "private input": ("_v: Input[float]", "write v"),
+    "private parameter": ("_v: Parameter[float] = 1.0", "write v"),
+    "name private to the class": ("__v: State[float]", "write _v"),
+    "private name with a letter that ROS has not": ("_ö: State[float]", "write _o"),
+    "private name of another state": ("_f: State[float]", "and f are both f outside"),
+    "declaration without an annotation, private to the class": (
+        "__v = State(0.0)",
+        "write `_v: State",
+    ),
     "word of every component": ("time: State[float]", "time"),
     "log's word": ("info: State[float]", "info"),
     "initial value that does not fit": ("v: State[np.uint8] = State(300)", "uint8"),
@@ -621,14 +665,38 @@ CLASS: dict[str, tuple[str, str]] = {
     "cached property": (
         "@functools.cached_property\ndef k(self):\n    return 1.0\n\n"
         "def start(self):\n    self.f = self.k  # here",
-        "k",
+        "cached_property: write @property",
     ),
     "decorated method": (
         "@functools.lru_cache\ndef k(self):\n    return 1.0\n\n"
         "def start(self):\n    self.f = self.k()  # here",
-        "decorat",
+        "remove the decorator",
     ),
-    "decorated hook": ("@functools.lru_cache\ndef start(self):  # or\n    self.f = 1.0", "decorat"),
+    "decorated hook": (
+        "@functools.lru_cache\ndef start(self):\n    self.f = 1.0",
+        "lru_cache): remove the decorator",
+    ),
+    "hook compiled by numba": (
+        "@numba.njit\ndef start(self):\n    self.f = 1.0",
+        "(jit): remove the decorator",
+    ),
+    "hook with an own decorator": (
+        "@timed\ndef start(self):\n    self.f = 1.0",
+        "(timed): remove the decorator",
+    ),
+    "hook with a decorator that wraps it": (
+        "@wrapped\ndef start(self):\n    self.f = 1.0",
+        "not compiled: remove the decorator",
+    ),
+    "hook with a class as its decorator": (
+        "@Timed\ndef start(self):\n    self.f = 1.0",
+        "(Timed): remove the decorator",
+    ),
+    "static method compiled by numba": (
+        "@staticmethod\n@numba.njit\ndef k(x):\n    return x\n\n"
+        "def start(self):\n    self.f = self.k(1.0)  # here",
+        "(jit): remove the decorator",
+    ),
     "property called": (
         "@property\ndef k(self):\n    return 1.0\n\n"
         "def start(self):\n    self.f = self.k()  # here",

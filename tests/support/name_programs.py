@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 SIZE = 4
-VECTORS, MATRICES = ("a", "b", "c"), ("m", "k")
+VECTORS, MATRICES = ("a", "_b", "c"), ("m", "k")
 
 FUNCTIONS = """\
 def half_{n}(p):
@@ -44,7 +44,7 @@ MEMBERS = """\
     y{n}: Output[np.float64, 4]
     z{n}: Output[np.float64, 4, 4]
     a{n}: State[np.float64, 4]
-    b{n}: State[np.float64, 4]
+    _b{n}: State[np.float64, 4]
     c{n}: State[np.float64, 4]
     m{n}: State[np.float64, 4, 4]
     k{n}: State[np.float64, 4, 4]
@@ -78,7 +78,7 @@ class Plain:
     def __init__(self):
         self.v, self.w = In(), In()
         self.y{n}, self.z{n} = Out(4), Out((4, 4))
-        self.a{n}, self.b{n}, self.c{n} = np.zeros(4), np.zeros(4), np.zeros(4)
+        self.a{n}, self._b{n}, self.c{n} = np.zeros(4), np.zeros(4), np.zeros(4)
         self.m{n}, self.k{n} = np.zeros((4, 4)), np.zeros((4, 4))
         self.s{n} = 0.0
 """

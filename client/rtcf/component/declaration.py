@@ -20,7 +20,7 @@ from rtcf.component.message_type import Leaf, MessageType, is_message, message_t
 from rtcf.component.ros_name import advice, is_member_name
 from rtcf.component.value_type import DeclarationError, ValueType, value_type
 
-# Fields in the record of every component, in addition to those of its members.
+# Fields in the record of every component, in addition to those of its members; see own_field().
 TIME_FIELDS = {
     "time": np.dtype(np.int64),
     "stamp": np.dtype(np.int64),
@@ -32,6 +32,8 @@ TIME_FIELDS = {
 HOOKS = ("prepare", "start", "update", "safe")
 REALTIME_HOOKS = ("update", "safe")  # in the real-time thread
 LOG_LEVELS = ("debug", "info", "warn", "error", "fatal")
+# A class keeps the value that was assigned to a declaration under another name.
+ASSIGNED = "__declared_"
 _RESERVED = {*TIME_FIELDS, *HOOKS, *LOG_LEVELS, "configure", "stop", "cleanup", "fault"}
 
 
@@ -87,13 +89,15 @@ class Declarable:
 class Input(Declarable):
     """An input: `self.u.value`, `.new`, `.valid`, `.age` (ns), `.connected`."""
 
+    allowed = ("unit", "doc")
+
 
 class Queue(Declarable):
     """An input that keeps up to `size` messages, in order: `self.goals.size`, `.front` (the oldest
     message), `.pop()`, `.age` (of the oldest message, ns), `.dropped`, `.connected`.
     """
 
-    allowed = ("size",)
+    allowed = ("size", "unit", "doc")
 
 
 class Output(Declarable):
@@ -104,7 +108,7 @@ class Output(Declarable):
     message: `{"header.frame_id": "base"}`.
     """
 
-    allowed = ("unit", "finite", "texts")
+    allowed = ("unit", "doc", "finite", "texts")
 
 
 class Parameter(Declarable):
@@ -149,6 +153,11 @@ class Member:
     is_none: bool = False  # initially
 
     @property
+    def outer_name(self) -> str:
+        """Return the name outside the component: `integral` of `_integral`."""
+        return self.name.removeprefix("_")
+
+    @property
     def leaves(self) -> tuple[Leaf, ...]:
         """Return the numbers and arrays of numbers in a value."""
         return self.message.leaves if self.message else (Leaf((), self.type),)
@@ -189,9 +198,9 @@ class Description:
     @property
     def record(self) -> np.dtype[Any]:
         """Return the layout of a component's memory, which is that of a C struct."""
-        fields: list[tuple[Any, ...]] = [("_component", np.int64)]
-        fields += [(f"_{name}", dtype) for name, dtype in TIME_FIELDS.items()]
-        fields.append(("_line", np.int64))
+        fields: list[tuple[Any, ...]] = [(own_field("component"), np.int64)]
+        fields += [(own_field(name), dtype) for name, dtype in TIME_FIELDS.items()]
+        fields.append((own_field("line"), np.int64))
         for member in self.members.values():
             if member.kind is Queue:
                 fields += _queue_fields(member)
@@ -208,8 +217,13 @@ class Description:
             elif member.kind is Output:
                 fields.append((f"{member.name}__written", np.bool_))
         # Must be last: compiled code and the runtime compute its place from the end of the record.
-        fields.append(("_raised", np.int64, (2,)))
+        fields.append((own_field("raised"), np.int64, (2,)))
         return np.dtype(fields, align=True)
+
+
+def own_field(name: str) -> str:
+    """Return the field of the record that belongs to no member; no member begins with `__`."""
+    return f"__{name}"
 
 
 def describe(cls: type) -> Description:
@@ -229,28 +243,38 @@ def describe(cls: type) -> Description:
             if not is_constant(annotation)
         }
         for name, annotation in annotations.items():
+            written = written_name(base, name)
+            line = lines.get(written, 0)
             try:
-                member = _member(base, name, annotation, lines.get(name, 0))
+                member = _member(base, name, annotation, line)
                 result.members[name] = member
                 if member.type.optional:
                     result.members[member.known] = _known(member)
             except DeclarationError as error:
-                raise _at(error, base, lines.get(name, 0), name) from None
+                raise _at(error, base, line, written) from None
         for name, value in vars(base).items():
-            if name.startswith(("__", "_declared_")) or name in annotations or callable(value):
+            if name.startswith("__") or name in annotations or callable(value):
                 continue
             if isinstance(value, MemberAttribute):
                 continue
             if isinstance(value, Declarable):
-                kind = type(value).__name__
+                kind, written = type(value).__name__, written_name(base, name)
+                own = written if written == name else private_name(written)
                 raise _at(
-                    DeclarationError(f"has no annotation: write `{name}: {kind}[float] = …`"),
+                    DeclarationError(f"has no annotation: write `{own}: {kind}[float] = …`"),
                     base,
-                    lines.get(name, 0),
-                    name,
+                    lines.get(written, 0),
+                    written,
                 )
             if not isinstance(value, staticmethod | classmethod | property | cached_property):
                 result.constants[name] = value
+    states: dict[str, str] = {}
+    for member in result.of(State):
+        if (other := states.setdefault(member.outer_name, member.name)) != member.name:
+            both = DeclarationError(
+                f"and {other} are both {member.outer_name} outside the component: rename one"
+            )
+            raise _at(both, cls, member.line, member.name)
     taken: dict[str, str] = {}
     for member in result.of(Parameter):
         for name in member.elements:
@@ -275,16 +299,10 @@ def _member(owner: type, name: str, annotation: object, line: int) -> Member:
             f"is neither Input, Queue, Output, Parameter, Derived nor State: write {name}: "
             f"State[…] for a value that changes, {name} = … for a constant"
         )
-    # Names of Derived members are not visible outside the component.
-    if not name.isascii() and annotation.kind is not Derived:
-        raise DeclarationError(f"is not a valid name in ROS (ASCII letters only): {advice(name)}")
-    if "__" in name or name.startswith("_") or (name.isascii() and not is_member_name(name)):
-        raise DeclarationError("is not a valid name: use a letter, then letters, digits, single _")
-    if name in _RESERVED:
-        raise DeclarationError("is a reserved name: take another name")
+    _check_name(owner, name, annotation.kind)
     kind, message = annotation.kind, _message(annotation)
     declared = ValueType(np.dtype(np.bool_)) if message else value_type(annotation.declared)
-    given = vars(owner).get(f"_declared_{name}", vars(owner).get(name))
+    given = vars(owner).get(ASSIGNED + name, vars(owner).get(name))
     if isinstance(given, MemberAttribute):
         given = None
     options, initial = {}, None
@@ -295,7 +313,7 @@ def _member(owner: type, name: str, annotation: object, line: int) -> Member:
                 f"write {kind.__name__}(…)"
             )
         options, initial = given.options, given.initial
-    elif f"_declared_{name}" in vars(owner) and given is None and not declared.optional:
+    elif ASSIGNED + name in vars(owner) and given is None and not declared.optional:
         raise DeclarationError("is None: declare State[float | None], or set a number")
     elif given is not None:
         if kind in (*PORTS, Derived):
@@ -310,8 +328,6 @@ def _member(owner: type, name: str, annotation: object, line: int) -> Member:
         raise DeclarationError("is an enum, which is set by name: remove min and max")
     if kind is Queue:
         _check_size(name, options.get("size"))
-    if kind is Parameter and declared.shape and declared.is_bool:
-        raise DeclarationError("is an array of bools: declare single bools, or an array of ints")
     if options.get("texts") is not None:
         _check_texts(message, options["texts"])
     value = _initial(declared, initial)
@@ -324,6 +340,39 @@ def _member(owner: type, name: str, annotation: object, line: int) -> Member:
     return Member(
         name, kind, declared, value, options, line, message, declared.optional and initial is None
     )
+
+
+def _check_name(owner: type, name: str, kind: type[Declarable]) -> None:
+    """Raise DeclarationError for a name that a member of this kind cannot have.
+
+    Ports, parameters and states are visible outside the component, Derived members are not.
+    """
+    written = written_name(owner, name)
+    outer = name.removeprefix("_")
+    if written.startswith("__"):
+        raise DeclarationError(f"begins with two _: write {private_name(written)}")
+    if outer != name and kind not in (State, Derived):
+        remedy = f"write {outer}" if is_member_name(outer) else "take another name"
+        raise DeclarationError(f"is {_a(kind)}, whose name in ROS begins with a letter: {remedy}")
+    if not name.isascii() and kind is not Derived:
+        raise DeclarationError(f"is not a valid name in ROS (ASCII letters only): {advice(name)}")
+    if not outer or "__" in name or (name.isascii() and not is_member_name(outer)):
+        raise DeclarationError("is not a valid name: use a letter, then letters, digits, single _")
+    if name in _RESERVED:
+        raise DeclarationError("is a reserved name: take another name")
+
+
+def private_name(written: str) -> str:
+    """Return the name that a member may have in place of `__x`: `_x`."""
+    return f"_{written.strip('_') or 'name'}"
+
+
+def written_name(owner: type, name: str) -> str:
+    """Return an attribute's name as in the source of a class: Python makes `_Observer__x` of
+    `self.__x`.
+    """
+    prefix = f"_{owner.__name__.lstrip('_')}"
+    return name.removeprefix(prefix) if name.startswith(f"{prefix}__") else name
 
 
 def is_constant(annotation: object) -> bool:

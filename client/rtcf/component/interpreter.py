@@ -4,11 +4,13 @@ Compiled code has one record of all members. Each call of `cycle()` runs one `up
 """
 
 import enum
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from rtcf.component.declaration import (
+    ASSIGNED,
     LOG_LEVELS,
     TIME_FIELDS,
     Derived,
@@ -22,6 +24,9 @@ from rtcf.component.declaration import (
     State,
     describe,
     is_constant,
+    own_field,
+    private_name,
+    written_name,
 )
 from rtcf.component.memory import Memory
 from rtcf.component.message_view import MessageView, checked, copy, named, put
@@ -30,6 +35,9 @@ from rtcf.component.value_type import ValueType
 
 class Fault(Exception):
     """Raised by `self.fault(…)`: the loop ends, or continues without an optional component."""
+
+
+_TIME, _PERIOD = own_field("time"), own_field("period")
 
 
 class _Value:
@@ -161,7 +169,7 @@ class QueuePort:
         if self.size == 0:
             return -1
         written = self._record[f"{self._name}__times"][self._record[f"{self._name}__oldest"]]
-        return max(0, int(self._record["_time"] - written))
+        return max(0, int(self._record[_TIME] - written))
 
     @property
     def dropped(self) -> int:
@@ -190,7 +198,7 @@ class QueuePort:
         place = (self._record[f"{name}__oldest"] + self._record[f"{name}__count"]) % size
         value = named(value, self._member.type, name)
         self._record[name][place] = checked(value, self._member.type, name)
-        self._record[f"{name}__times"][place] = self._record["_time"]
+        self._record[f"{name}__times"][place] = self._record[_TIME]
         self._record[f"{name}__count"] += 1
 
 
@@ -232,18 +240,19 @@ class _Attribute(MemberAttribute):
     def __get__(self, component: Any, owner: type) -> Any:
         if component is None:
             return self
+        values = _values(component)
         if self._member.kind is Input:
-            return InputPort(component._memory, self._member)
+            return InputPort(values.memory, self._member)
         if self._member.kind is Output:
-            kept = component._kept if self._member.name in component._not_finite else None
-            return OutputPort(component._memory, self._member, kept)
+            kept = values.kept if self._member.name in values.not_finite else None
+            return OutputPort(values.memory, self._member, kept)
         if self._member.kind is Queue:
-            return QueuePort(component._memory.record, self._member)
-        return _Value(component._memory, self._member).get()
+            return QueuePort(values.memory.record, self._member)
+        return _Value(values.memory, self._member).get()
 
     def __set__(self, component: Any, value: Any) -> None:
         if self._member.kind in (State, Derived):
-            _Value(component._memory, self._member).set(value)
+            _Value(_values(component).memory, self._member).set(value)
         elif self._member.kind is Parameter:
             raise AttributeError(f"{self._member.name} is a parameter, which hooks cannot set")
         else:
@@ -256,25 +265,64 @@ def fresh_record(description: Description) -> Any:
     for member in description.members.values():
         if member.kind is not Queue and not member.message:
             record[member.name] = member.initial
-    record["_period"], record["_dt"], record["_frequency"] = 1_000_000, 1e-3, 1e3
+    for name, value in (("period", 1_000_000), ("dt", 1e-3), ("frequency", 1e3)):
+        record[own_field(name)] = value
     return record
+
+
+@dataclass
+class _Values:
+    """The values of a component. They are no attributes: a member may have any name."""
+
+    memory: Memory
+    finite: list[Member]  # outputs declared with finite=True
+    kept: Memory  # their last finite values
+    not_finite: set[str] = field(default_factory=set)  # outputs whose readers see `kept`
+
+    def keep_finite(self) -> list[str]:
+        """Show readers the last finite value of finite outputs; return errors to log."""
+        errors = []
+        for member in self.finite:
+            name = member.name
+            fields = [name + leaf.field for leaf in member.leaves]
+            record = self.memory.written()
+            values = [record[each] for each in fields]
+            written = record[f"{name}__written"]
+            if not all(np.isfinite(each).all() for each in values):
+                self.not_finite.add(name)
+                if written:
+                    errors.append(f"output {name} is not finite: readers keep its last value")
+                    record[f"{name}__written"] = False
+            elif written:
+                for each, value in zip(fields, values, strict=True):
+                    self.kept.set(each, value)
+        return errors
+
+
+_KEY = "values of the interpreter"  # not a name
+
+
+def _values(component: "Component") -> _Values:
+    values: _Values = vars(component)[_KEY]
+    return values
+
+
+def record_of(component: "Component") -> Any:
+    """Return the record of a component, which may be changed from outside."""
+    return _values(component).memory.whole()
 
 
 class Component:
     """Base class of components in Python. Derived classes declare members and implement hooks."""
 
-    _memory: Memory
-    _finite: list[Member]
-    _kept: Memory  # the last finite values of these outputs
-    _not_finite: set[str]  # names of the outputs whose readers see the value of _kept
     log: list[tuple[str, str]]
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """Rename the declarations to `_declared_NAME`: instances use their names."""
+        """Rename what is assigned to declarations: instances use their names."""
         super().__init_subclass__(**options)
         for name, annotation in dict(vars(cls).get("__annotations__", {})).items():
             if name in vars(cls) and not is_constant(annotation):
-                setattr(cls, f"_declared_{name}", vars(cls)[name])
+                setattr(cls, ASSIGNED + name, vars(cls)[name])
                 delattr(cls, name)
 
     def __init__(self, **parameters: Any) -> None:
@@ -288,18 +336,15 @@ class Component:
                 raise TypeError(f"{type(self).__name__} has no parameter {name!r}")
             member = description.members[name]
             _Value(Memory(record), member).set(named(parameters[name], member.type, name))
-        object.__setattr__(self, "_memory", Memory(record))
         finite = [each for each in description.of(Output) if each.options.get("finite")]
-        object.__setattr__(self, "_finite", finite)
-        object.__setattr__(self, "_kept", Memory(record.copy()))
-        object.__setattr__(self, "_not_finite", set())
+        vars(self)[_KEY] = _Values(Memory(record), finite, Memory(record.copy()))
         object.__setattr__(self, "log", [])
         self.prepare()
 
     @property
     def _record(self) -> Any:
-        """The record, which may be changed from outside."""
-        return self._memory.whole()
+        """For tests: the record, see record_of()."""
+        return record_of(self)
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Set a state or a derived member; raise AttributeError for any other name."""
@@ -309,9 +354,12 @@ class Component:
                 f"or write a method: self.set_{name}(…)"
             )
         if not isinstance(getattr(type(self), name, None), _Attribute):
+            cls = type(self)
+            written = next((each for base in cls.__mro__
+                            if (each := written_name(base, name)) != name), name)  # fmt: skip
+            own = name if written == name else private_name(written)
             raise AttributeError(
-                f"{name} is not declared: write `{name}: State[float]` in class "
-                f"{type(self).__name__}"
+                f"{written} is not declared: write `{own}: State[float]` in class {cls.__name__}"
             )
         object.__setattr__(self, name, value)
 
@@ -334,40 +382,24 @@ class Component:
 
     def cycle(self) -> None:
         """For tests: run `update()` once and advance the time by one period."""
-        record = self._memory.record
+        values = _values(self)
+        record = values.memory.record
         for name in record.dtype.names:
             if name.endswith("__written"):
                 record[name] = False
-        self._not_finite.clear()
+        values.not_finite.clear()
         self.update()
-        self._keep_finite()
-        record["_iteration"] += 1
-        record["_time"] += record["_period"]
+        self.log.extend(("error", text) for text in values.keep_finite())
+        record[own_field("iteration")] += 1
+        record[_TIME] += record[_PERIOD]
         for name in record.dtype.names:
             if name.endswith("__new"):
                 record[name] = False
 
-    def _keep_finite(self) -> None:
-        """Show readers the last finite value of outputs declared with `finite=True`."""
-        for member in self._finite:
-            name = member.name
-            fields = [name + leaf.field for leaf in member.leaves]
-            record = self._memory.written()
-            values = [record[each] for each in fields]
-            written = record[f"{name}__written"]
-            if not all(np.isfinite(each).all() for each in values):
-                self._not_finite.add(name)
-                if written:
-                    text = f"output {name} is not finite: readers keep its last value"
-                    self.log.append(("error", text))
-                    record[f"{name}__written"] = False
-            elif written:
-                for each, value in zip(fields, values, strict=True):
-                    self._kept.set(each, value)
-
 
 def _time(name: str) -> property:
-    return property(lambda self: self._memory.record[f"_{name}"].item(), doc=f"The loop's {name}.")
+    own = own_field(name)
+    return property(lambda self: _values(self).memory.record[own].item(), doc=f"The loop's {name}.")
 
 
 def _log(level: str) -> Any:

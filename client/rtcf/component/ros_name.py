@@ -24,7 +24,8 @@ def is_member_name(name: str) -> bool:
 def advice(name: str) -> str:
     """Return a remedy for a name: its transliteration to ASCII if there is one."""
     plain = "".join(_WORDS.get(each) or _letter(each) for each in name)
-    return f"write {plain}" if is_member_name(plain) else "take another name"
+    is_name = is_member_name(plain.removeprefix("_"))
+    return f"write {plain}" if is_name else "take another name"
 
 
 def _letter(character: str) -> str:

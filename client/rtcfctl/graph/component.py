@@ -263,7 +263,7 @@ def _print_members(
 def print_ports(ports: list[graph_pb2.PortInfo], output: Output) -> None:
     """Print ports with mapped names, types and newest values."""
     output.table(
-        ("port", "", "mapped name", "type", "value", "unit", "age", ""),
+        ("port", "", "mapped name", "type", "value", "unit", "age", "", "meaning"),
         (
             (
                 port.name,
@@ -274,6 +274,7 @@ def print_ports(ports: list[graph_pb2.PortInfo], output: Output) -> None:
                 port.unit,
                 words.age(port.age_ns) if port.HasField("age_ns") else "",
                 _flags(port),
+                port.doc,
             )
             for port in ports
         ),

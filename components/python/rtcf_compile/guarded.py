@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 import traceback
+from pathlib import Path
 
 from rtcf_compile.main import REFUSED, main
 from rtcf_compile.source import progress
@@ -26,8 +27,8 @@ def guarded() -> int:
                 status = main()
             except SystemExit as end:
                 status = end.code if isinstance(end.code, int) else REFUSED
-            except Exception:
-                traceback.print_exc()
+            except Exception as error:
+                _report(_failure(error), *progress.noted(shared))
             finally:
                 sys.stdout.flush()
                 sys.stderr.flush()
@@ -35,11 +36,21 @@ def guarded() -> int:
         status = _end_of(child)
         if status >= 0:
             return status
-        file, line = progress.noted(shared)
         what = f"the compiler ended with {signal.Signals(-status).name}"
-        mistake = Mistake(file, line, what, "write this function in another way")
-        print(f"rtcf-compile: {mistake}", file=sys.stderr)
+        _report(what, *progress.noted(shared))
         return REFUSED
+
+
+def _failure(error: Exception) -> str:
+    """Return the error of the compiler itself, and its place in the compiler."""
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    what = " ".join(f"{type(error).__name__}: {error}".split())
+    return f"the compiler failed at {Path(place.filename).name}:{place.lineno}: {what}"
+
+
+def _report(what: str, file: str, line: int) -> None:
+    mistake = Mistake(file, line, what, "write this function in another way")
+    print(f"rtcf-compile: {mistake}", file=sys.stderr)
 
 
 def _end_with(parent: int) -> None:

@@ -19,7 +19,8 @@ namespace rtcf::python {
 class MessageInput final : public InputBase {
    public:
     MessageInput(Component* owner, const InputTable& table, std::byte* record)
-        : InputBase(owner, table.name, table.message->type(), emptySlot(table.message->type())),
+        : InputBase(owner, table.name, table.message->type(), emptySlot(table.message->type()),
+                    {table.unit, table.doc}),
           owner_(*owner),
           fields_(*table.message, table.leaves, table.leaf_count),
           offset_(valueOffset(table.message->type())),
@@ -89,7 +90,7 @@ class MessageOutput final : public OutputBase {
    private:
     MessageOutput(Component* owner, const OutputTable& table, std::byte* record,
                   const Finite& finite)
-        : OutputBase(owner, table.name, table.unit, table.message->type(),
+        : OutputBase(owner, table.name, {table.unit, table.doc}, table.message->type(),
                      table.finite != 0 ? &finite : nullptr),
           fields_(*table.message, table.leaves, table.leaf_count),
           offset_(valueOffset(port().type())),

@@ -45,7 +45,7 @@ class ValueInput final : public InputBase {
    public:
     ValueInput(Component* owner, const InputTable& table)
         : InputBase(owner, table.name, valueTypeOf(*table.type),
-                    emptySlot(valueTypeOf(*table.type))),
+                    emptySlot(valueTypeOf(*table.type)), {table.unit, table.doc}),
           owner_(owner) {}
 
     /// Real-time safe.
@@ -67,7 +67,7 @@ class ValueOutput final : public OutputBase {
 
    private:
     ValueOutput(Component* owner, const OutputTable& table, std::byte* record, const Finite& finite)
-        : OutputBase(owner, table.name, table.unit, valueTypeOf(*table.type),
+        : OutputBase(owner, table.name, {table.unit, table.doc}, valueTypeOf(*table.type),
                      table.finite != 0 ? &finite : nullptr),
           written_(placeIn<bool>(record, table.written)) {}
 
@@ -104,7 +104,8 @@ class QueuePort final : public QueueBase {
 
     QueuePort(Component* owner, const InputTable& table, std::byte* record,
               std::unique_ptr<Slots> slots)
-        : QueueBase(owner, table.name, typeInfoOf(*table.type), {slots->size(), &at, slots.get()}),
+        : QueueBase(owner, table.name, typeInfoOf(*table.type), {slots->size(), &at, slots.get()},
+                    {table.unit, table.doc}),
           owner_(owner),
           slots_(std::move(slots)),
           copy_(*table.type),

@@ -225,10 +225,11 @@ void Instance::freezePorts() {
     auto ports = std::make_shared<std::vector<MappedPort>>();
     ports->reserve(inputs.size() + outputs.size());
     for (const InputPort* input : inputs)
-        ports->push_back({input->name(), mapped(input->name()), {}, &input->type(), false});
+        ports->push_back(
+            {input->name(), mapped(input->name()), input->texts(), &input->type(), false});
     for (const OutputPort* output : outputs) {
         ports->push_back(
-            {output->name(), mapped(output->name()), output->unit(), &output->type(), true});
+            {output->name(), mapped(output->name()), output->texts(), &output->type(), true});
         samples_.push_back(output->type().make_slot(output->sample()));
     }
     ports_ = std::move(ports);

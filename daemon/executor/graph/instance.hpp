@@ -23,7 +23,7 @@ namespace rtcf::executor {
 struct MappedPort {
     std::string name;
     std::string mapped_name;
-    std::string unit;  ///< of an output
+    PortTexts texts;
     const TypeInfo* type;
     bool output;
 };

@@ -29,11 +29,14 @@ pb::ParameterInfo parameterTo(const ParameterDeclaration& declaration,
     return info;
 }
 
-void setPortType(pb::PortInfo& info, const std::string& name, bool output, const TypeInfo& type) {
+void setPortType(pb::PortInfo& info, const std::string& name, bool output, const TypeInfo& type,
+                 const PortTexts& texts) {
     info.set_name(name);
     info.set_direction(output ? pb::DIRECTION_OUTPUT : pb::DIRECTION_INPUT);
     info.set_type(type.name);
     info.set_md5(type.md5);
+    info.set_unit(texts.unit);
+    info.set_doc(texts.doc);
 }
 
 pb::Difference::Kind differenceKindTo(Difference::Kind kind) {
@@ -246,9 +249,8 @@ pb::ComponentInfo componentTo(const GraphView& graph, std::size_t position, Runn
     for (std::size_t i = 0; i < component.ports->size(); ++i) {
         const MappedPort& port = (*component.ports)[i];
         pb::PortInfo& message = *info.add_ports();
-        setPortType(message, port.name, port.output, *port.type);
+        setPortType(message, port.name, port.output, *port.type, port.texts);
         message.set_mapped_name(port.mapped_name);
-        message.set_unit(port.unit);
         const ConnectionView& connection = graph.connectionOf(port);
         message.set_connected(connection.connected());
         message.set_mapped(port.output ? connection.published : connection.subscribed);
@@ -312,12 +314,10 @@ pb::ComponentType typeTo(const std::string& package, const std::string& library,
     type.set_library(library);
     type.set_doc(record.doc);
     for (const InputPort* input : accessTo(component).inputs()) {
-        setPortType(*type.add_ports(), input->name(), false, input->type());
+        setPortType(*type.add_ports(), input->name(), false, input->type(), input->texts());
     }
     for (const OutputPort* output : accessTo(component).outputs()) {
-        pb::PortInfo& port = *type.add_ports();
-        setPortType(port, output->name(), true, output->type());
-        port.set_unit(output->unit());
+        setPortType(*type.add_ports(), output->name(), true, output->type(), output->texts());
     }
     for (const ParameterBase* parameter : accessTo(component).parameters()) {
         *type.add_parameters() =

@@ -196,6 +196,76 @@ class Pendulum(Component):
         self.torque.write(torque)
 
 
+class Axes(Component):
+    """Adds the axes that are enabled."""
+
+    u: Input[np.float64, 3]
+    y: Output[np.float64, 3]
+    enabled: Parameter[bool, 3] = Parameter([True, False, True], doc="axes that move")
+    plan: Parameter[bool, 2, 2] = Parameter([[True, False], [False, False]], name="plan/way")
+    many: Derived[int]
+    total: State[np.float64, 3]
+
+    def prepare(self):
+        """Count."""
+        self.many = np.count_nonzero(self.enabled) + np.count_nonzero(self.plan)
+        if self.many == 0:
+            raise ValueError("no axis")
+
+    def update(self):
+        """Add."""
+        step = np.where(self.enabled, self.u.value, 0.0)
+        step[~self.enabled] = 1.0
+        for axis in range(3):
+            if self.enabled[axis] and self.plan[0, axis % 2]:
+                step[axis] += self.many
+        self.total += np.clip(step, -1e3, 1e3)
+        self.y.write(self.total)
+
+
+class Integrator(Component):
+    """Has private members, beside a port of the same name."""
+
+    u: Input[float] = Input(unit="m/s", doc="measured speed")
+    goals: Queue[float] = Queue(size=2, unit="m", doc="positions to reach")
+    integral: Output[float] = Output(unit="m", doc="position")
+    ki: Parameter[float] = Parameter(2.0, min=0.0, max=10.0)
+    _integral: State[float] = State(0.5, unit="m", doc="of the input")
+    _last: State[float | None]
+    _latched: State[bool] = State(False, live=True)
+    _sums: State[np.float64, 3]
+    _time: State[int]  # the loop's is self.time
+    _record: State[int]
+    _memory: State[np.float64, 2]
+    _gain: Derived[float]
+    _LIMIT = 1e6
+    __FACTOR = 0.5
+
+    def prepare(self):
+        """Compute the gain."""
+        self._gain = self.ki * self.__FACTOR
+
+    def _limited(self, value):
+        return min(max(value, -self._LIMIT), self._LIMIT)
+
+    def __step(self, __share):
+        __sum = self._integral + self._gain * self.u.value * __share
+        return self._limited(__sum)
+
+    def update(self):
+        """Integrate."""
+        old = self._sums
+        self._integral = self.__step(self.dt)
+        self._sums = 0.5 * self._sums + self._integral
+        self._memory[:] = self._sums[:2] - old[:2]
+        if self._last is None or self.u.value > self._last:
+            self._last = self.u.value
+        self._latched = self._latched or self._integral > 1e3
+        self._time += self.time
+        self._record += self.goals.size
+        self.integral.write(self._integral)
+
+
 def quotient(a, b):
     """Return a / b."""
     return a / b

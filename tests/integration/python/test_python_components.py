@@ -218,6 +218,69 @@ def test_declarations_are_as_in_cpp_components(client: rtcf.Client, daemon: Daem
     assert refused.returncode == 1 and "step" in refused.stderr
 
 
+def test_ports_have_units_and_meanings(daemon: Daemon, client: rtcf.Client) -> None:
+    told = {
+        "u": ("m/s", "measured speed"),
+        "goals": ("m", "positions to reach"),
+        "integral": ("m", "position"),
+    }
+    types = {each.type: each for each in client.list_types("py").types}
+    of_type = types["Integrator"].ports
+    assert {each.name: (each.unit, each.doc) for each in of_type} == told
+    client.load(rtcf.component("py", "Integrator", name="integrator"))
+    loaded = _ports(client, "integrator")
+    assert {name: (each.unit, each.doc) for name, each in loaded.items()} == told
+    for words in (("--type", "py/Integrator"), ("integrator",)):
+        shown = daemon.ctl("info", *words).stdout
+        assert re.search(r"^u +in .* m/s .*measured speed$", shown, re.M), shown
+
+
+def test_an_array_of_bools_is_set_by_its_elements(daemon: Daemon, client: rtcf.Client) -> None:
+    client.load(rtcf.component("py", "Axes", name="axes", parameters=["enabled_1:=true"]))
+    types = {each.name: each.type for each in client.get_component("axes").parameters}
+    names = [f"enabled_{i}" for i in range(3)]
+    names += [f"plan/way_{i}_{j}" for i in range(2) for j in range(2)]
+    assert types == dict.fromkeys(names, "bool")
+    client.step(2)
+    assert _states(client, "axes")["total"] == "[8; 0; 8]"
+    assert daemon.ctl("set", "axes", "enabled_0:=false", "plan/way_0_1:=true").returncode == 0
+    client.step(1)
+    assert _states(client, "axes")["total"] == "[9; 4; 12]"
+    refused = daemon.ctl("set", "axes", "enabled_0:=2")
+    assert refused.returncode == 1 and "enabled_0" in refused.stderr
+    others = [f"{name}:=false" for name in names]
+    refused = daemon.ctl("set", "axes", *others)
+    assert refused.returncode == 1 and "no axis" in refused.stderr
+
+
+def test_private_states_lose_their_underscore_outside(
+    tmp_path: Path, daemon: Daemon, client: rtcf.Client
+) -> None:
+    client.load(rtcf.component("py", "Integrator", name="integrator"))
+    names = ["integral", "last", "last__known", "latched", "sums", "time", "record", "memory"]
+    assert list(_states(client, "integrator")) == names
+    assert daemon.ctl("write", "integrator.u", "3.0").returncode == 0
+    client.step(4)
+    assert float(_states(client, "integrator")["integral"]) == pytest.approx(0.512)
+    snapshot = str(tmp_path / "snapshot")
+    assert daemon.ctl("snapshot", snapshot).returncode == 0
+    before = _states(client, "integrator")
+    done = daemon.ctl("set", "integrator.state", "integral:=2000.0")
+    assert done.returncode == 0, done.stderr
+    client.step(1)
+    states = _states(client, "integrator")
+    assert float(states["integral"]) > 2000.0 and states["latched"] == "1"
+    assert daemon.ctl("get", "integrator.state.integral").stdout.startswith("2000.")
+    assert daemon.ctl("restore", snapshot).returncode == 0
+    assert _states(client, "integrator") == before
+    assert daemon.ctl("reset", "integrator").returncode == 0
+    assert _states(client, "integrator")["integral"] == "0.5"
+    with client.watch_ports(["/integrator.integral*"]) as stream:
+        client.step(1)
+        signals = set(next(iter(stream)).schema.signals)
+    assert signals == {"/integrator.integral", "/integrator.integral[state]"}
+
+
 def test_a_parameter_change_takes_effect_in_the_next_cycle(
     client: rtcf.Client, daemon: Daemon
 ) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rtcf.component.declaration import REALTIME_HOOKS, Description, Member
+from rtcf.component.declaration import REALTIME_HOOKS, Description, Member, own_field
 
 from rtcf_compile.library.toolchain import compiler
 from rtcf_compile.machine_code import port_access
@@ -72,7 +72,8 @@ class Inside:
             raised = self._hooks[hook](record.ctypes.data)
         if not raised:
             return None
-        return self._text(raised, int(record["_line"]), record["_raised"].tolist())
+        line, values = (record[own_field(name)].tolist() for name in ("line", "raised"))
+        return self._text(raised, line, values)
 
     def _text(self, raised: int, noted: int, values: list[int]) -> str:
         begin = ctypes.cast(raised, ctypes.POINTER(ctypes.c_void_p))[0]

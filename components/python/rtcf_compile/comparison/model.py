@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from rtcf.component import Component, Fault
 from rtcf.component.declaration import (
+    ASSIGNED,
     LOG_LEVELS,
     PORTS,
     TIME_FIELDS,
@@ -26,6 +27,7 @@ from rtcf.component.declaration import (
     Output,
     Queue,
     State,
+    own_field,
 )
 from rtcf.component.interpreter import QueuePort
 from rtcf.component.memory import Memory
@@ -51,6 +53,7 @@ class Model:
         self.branches: dict[Branch, list[int]] = {}
         functions = _Functions(cls, narrow, self.branches)
         self._object = functions.plain()(description)
+        self._ports = vars(self._object)[_PORTS]
         # The ints in the source, and the values of its enums.
         self.numbers = sorted(functions.numbers)
 
@@ -64,10 +67,10 @@ class Model:
         """
         plain = self._object
         for name in TIME_FIELDS:
-            vars(plain)[name] = record[f"_{name}"].item()
+            vars(plain)[name] = record[own_field(name)].item()
         for member in self._members:
             if member.kind in PORTS:
-                plain._ports[member.name].load(record, anew)
+                self._ports[member.name].load(record, anew)
             else:
                 old = None if anew else vars(plain).get(member.name)
                 vars(plain)[member.name] = _loaded(record, member, old)
@@ -77,7 +80,7 @@ class Model:
         plain = self._object
         for member in self._members:
             if member.kind in PORTS:
-                plain._ports[member.name].store(record)
+                self._ports[member.name].store(record)
             else:
                 _stored(record, member, vars(plain)[member.name])
 
@@ -194,26 +197,30 @@ class _Queued:
         return QueuePort(self._record, self._member)
 
 
+# Attributes of plain objects that no member can have.
+_MEMBERS, _PORTS = "__members", "__ports"
+
+
 class _Plain:
     """The base of plain classes: ports, and the methods that Component has."""
 
     def __init__(self, description: Description) -> None:
-        vars(self)["_members"] = description.members
+        vars(self)[_MEMBERS] = description.members
         kinds: dict[Any, Any] = {Input: _In, Output: _Out, Queue: _Queued}
-        vars(self)["_ports"] = {
+        vars(self)[_PORTS] = {
             name: kinds[member.kind](member)
             for name, member in description.members.items()
             if member.kind in kinds
         }
 
     def __getattr__(self, name: str) -> Any:
-        port = vars(self)["_ports"].get(name)
+        port = vars(self)[_PORTS].get(name)
         if port is None:
             raise AttributeError(name)
         return port.port() if isinstance(port, _Queued) else port
 
     def __setattr__(self, name: str, value: Any) -> None:
-        member = vars(self)["_members"].get(name)
+        member = vars(self)[_MEMBERS].get(name)
         if member is None or member.kind not in (State, Derived):
             raise AttributeError(name)
         vars(self)[name] = _converted(member, value)
@@ -340,7 +347,7 @@ def _global_names(code: CodeType) -> Iterator[str]:
 def _is_kept(name: str, value: Any) -> bool:
     return (
         name not in ("__dict__", "__weakref__", "__annotations__")
-        and not name.startswith("_declared_")
+        and not name.startswith(ASSIGNED)
         and not isinstance(value, MemberAttribute)
     )
 

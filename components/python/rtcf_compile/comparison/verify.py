@@ -27,6 +27,7 @@ from rtcf.component.declaration import (
     Output,
     Parameter,
     Queue,
+    own_field,
 )
 from rtcf.component.interpreter import QueuePort, fresh_record
 from rtcf.component.value_type import ValueType
@@ -46,6 +47,7 @@ _ANEW = 200  # cycles between restarts
 _EDGES = (0.0, -0.0, 1.0, -1.0, 1e-300, -1e-300, 1e-3, 1e3, 1e12, -1e12, 1e300, np.inf, np.nan)
 # Exceptions that only Python raises; IEEE 754 continues with infinity or NaN.
 _PYTHONS_OWN = (OverflowError,)
+_LINE = own_field("line")
 
 
 @dataclass
@@ -212,8 +214,8 @@ class _Comparing:
             for name in writes:
                 record[name] = False
             self._both("update")
-            record["_iteration"] += 1
-            record["_time"] += record["_period"]
+            record[own_field("iteration")] += 1
+            record[own_field("time")] += record[own_field("period")]
             self._cycle += 1
             result.cycles = self._cycle
         if "safe" in hooks:
@@ -252,7 +254,7 @@ class _Comparing:
                 self._updates_raised += 1
                 self._last_raised = said
             return
-        mine["_line"] = theirs["_line"] = record["_line"]
+        mine[_LINE] = theirs[_LINE] = record[_LINE]
         for member in self._optional:
             if not mine[member.known] and not theirs[member.known]:
                 mine[member.name] = theirs[member.name]  # None has no value
@@ -288,7 +290,7 @@ class _Comparing:
         names = [
             name
             for name in theirs.dtype.names
-            if theirs[name].dtype.kind == "f" and not name.startswith("_")
+            if theirs[name].dtype.kind == "f" and not name.startswith(own_field(""))
         ]
         towards: dict[str, Any] = {}
         for number in range(_TRIES):
@@ -485,7 +487,7 @@ def _parameters(record: Any, parameters: list[Member], draw: Any) -> None:
     for member in parameters:
         low, high = (member.options.get(each) for each in ("min", "max"))
         if member.type.is_bool:
-            record[member.name] = draw.random() < 0.5
+            record[member.name] = draw.random(member.type.shape) < 0.5
         elif member.type.enumeration:
             record[member.name] = draw.choice([int(each) for each in member.type.enumeration])
         elif low is not None and high is not None and member.type.is_float:

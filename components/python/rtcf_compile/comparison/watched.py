@@ -18,6 +18,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 from rtcf.component import Component
+from rtcf.component.declaration import own_field
 
 from rtcf_compile.comparison.verify import Comparison, compare
 from rtcf_compile.machine_code.object_file import Compiled
@@ -158,7 +159,7 @@ def _end(compiled: Compiled, status: int, shared: mmap.mmap) -> Comparison:
     numbers: Any = np.ndarray(4, np.int64, shared)
     hook, cycle, in_machine_code = (int(numbers[each]) for each in (_HOOK, _CYCLE, _COMPILED))
     record: Any = np.ndarray((), compiled.description.record, shared, _HEADER)
-    line = int(record["_line"]) if in_machine_code else 0
+    line = int(record[own_field("line")]) if in_machine_code else 0
     del numbers, record  # the mapping cannot be closed while they refer to it
     result = Comparison(compiled.description.name)
     result.cycles = cycle

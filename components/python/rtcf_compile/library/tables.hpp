@@ -104,6 +104,8 @@ struct QueueTable {
 /// An input; offsets in the record are -1 if no hook reads the field.
 struct InputTable {
     const char* name;
+    const char* unit;
+    const char* doc;
     const TypeTable* type;        ///< null: a message
     const MessageTable* message;  ///< null: not a message
     const QueueTable* queue;      ///< null: only the newest value
@@ -120,6 +122,7 @@ struct InputTable {
 struct OutputTable {
     const char* name;
     const char* unit;
+    const char* doc;
     const TypeTable* type;        ///< null: a message
     const MessageTable* message;  ///< null: not a message
     std::int64_t finite;          ///< 1: declared Finite
@@ -258,6 +261,6 @@ struct LibraryTable {
 };
 
 /// The suffix of the symbol that points to the tables of a library.
-#define RTCF_PYTHON_TABLES 4
+#define RTCF_PYTHON_TABLES 5
 
 }  // namespace rtcf::python

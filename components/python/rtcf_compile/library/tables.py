@@ -17,6 +17,7 @@ from rtcf.component.declaration import (
     Parameter,
     Queue,
     State,
+    own_field,
 )
 from rtcf.component.message_type import MessageType
 from rtcf.component.value_type import ValueType
@@ -29,7 +30,7 @@ from rtcf_compile.rewriting.logs import LogCall
 from rtcf_compile.source.mistake import display, source_line
 from rtcf_compile.source.prefix_map import mapped
 
-TABLES = 4
+TABLES = 5
 _WHOLE = ("int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64")
 SCALARS = {name: i for i, name in enumerate(("bool", *_WHOLE, "float32", "float64"))}
 _LEVELS = {"debug": 1, "info": 2, "warn": 3, "error": 4, "fatal": 5}
@@ -98,7 +99,7 @@ class _Library:
             self.data.bytes(record.tobytes(), 8),
             record.nbytes,
             *(self._hook(compiled, hook) for hook in HOOKS),
-            sum(2**i for i, name in enumerate(TIME_FIELDS) if f"_{name}" in compiled.used),
+            sum(2**i for i, name in enumerate(TIME_FIELDS) if own_field(name) in compiled.used),
             *self._array([self._input(compiled, m) for m in _of(compiled, Input, Queue)]),
             *self._array([self._output(compiled, m) for m in _of(compiled, Output)]),
             *self._array([e for m in _of(compiled, Parameter) for e in self._parameter(m, record)]),
@@ -137,6 +138,7 @@ class _Library:
         warning = f"a message of {name} has more elements than declared and is ignored"
         return self.data.struct(
             name,
+            *_texts(member),
             None if member.message else self._type(member.type),
             self._message(member.message),
             self._queue(compiled, member) if is_queue else None,
@@ -158,7 +160,7 @@ class _Library:
         place, name, options = _Places(compiled), member.name, member.options
         return self.data.struct(
             name,
-            str(options.get("unit", "")),
+            *_texts(member),
             None if member.message else self._type(member.type),
             self._message(member.message),
             int(bool(options.get("finite"))),
@@ -213,8 +215,7 @@ class _Library:
         return [
             self.data.struct(
                 name,
-                str(options.get("unit", "")),
-                str(options.get("doc", "")),
+                *_texts(member),
                 SCALARS[member.type.scalar.name],
                 offset + i * member.type.scalar.itemsize,
                 *(int(each is not None) for each in bounds),
@@ -230,10 +231,10 @@ class _Library:
         return self.data.struct(_offset(record, member.name), size)
 
     def _state(self, member: Member, record: np.ndarray) -> Value:  # type: ignore[type-arg]
-        texts = [str(member.options.get(each, "")) for each in ("unit", "doc")]
         offset = _offset(record, member.name)
         live = int(bool(member.options.get("live", False)))
-        return self.data.struct(member.name, *texts, self._type(member.type), offset, live)
+        kind = self._type(member.type)
+        return self.data.struct(member.outer_name, *_texts(member), kind, offset, live)
 
     def _lines(self, compiled: Compiled) -> list[Value]:
         numbers = {*compiled.lines, *(each.line for each in compiled.raises.values())} - {0}
@@ -318,11 +319,16 @@ def _record(compiled: Compiled) -> "np.ndarray[tuple[()], np.dtype[np.void]]":
     """Return the initial record of a component."""
     about = compiled.description
     record = np.zeros((), about.record)
-    head = ["_component", *(f"_{name}" for name in TIME_FIELDS), "_line"]
+    head = [own_field(name) for name in ("component", *TIME_FIELDS, "line")]
     assert [_offset(record, name) for name in head] == list(range(0, 64, 8)), "see RecordHead"
     for member in about.of(State) + about.of(Parameter):
         record[member.name] = member.initial
     return record
+
+
+def _texts(member: Member) -> list[str]:
+    """Return the unit and the documentation of a member."""
+    return [str(member.options.get(each, "")) for each in ("unit", "doc")]
 
 
 def _offset(record: np.ndarray, name: str) -> int:  # type: ignore[type-arg]

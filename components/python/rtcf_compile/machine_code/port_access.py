@@ -7,7 +7,7 @@ The offsets in ports and slots are those of port.hpp and slot.hpp; value_ports.h
 
 from collections.abc import Iterator, Sequence
 
-from rtcf.component.declaration import Description, Input, Member, Output
+from rtcf.component.declaration import Description, Input, Member, Output, own_field
 
 STAMP = 0  # byte offset in a slot
 SOURCE, SEEN = 0, 8  # byte offsets in an input
@@ -83,7 +83,7 @@ class PortAccess:
         assert fields is not None
         self._places = {name: int(field[1]) for name, field in fields.items()}
         self._used = used
-        self.raised = self._places["_raised"]  # the numbers in the text of an exception
+        self.raised = self._places[own_field("raised")]  # the numbers in the text of an exception
         self._inputs, self._outputs = inputs(description), outputs(description)
 
     def read(self) -> str:

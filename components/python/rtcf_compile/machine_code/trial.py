@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from rtcf.component import Component
 from rtcf.component.declaration import Description, Input, Member, Queue, describe
+from rtcf.component.interpreter import record_of
 from rtcf.component.value_type import ValueType
 
 from rtcf_compile.source import numpy_errors
@@ -40,7 +41,7 @@ def _cycles(component: Any, about: Description, draw: Any) -> None:
     component.start()
     for cycle in range(_CYCLES):
         for member in about.of(Input):
-            _draw(component._record, member, draw, cycle)
+            _draw(record_of(component), member, draw, cycle)
         for member in about.of(Queue):
             getattr(component, member.name).put(_value(member.type, draw, cycle))
         component.cycle()

@@ -48,6 +48,7 @@ class CommonRewriting(ast.NodeTransformer):
         self.source = source
         self._functions = functions
         self.constants: dict[str, Any] = {}
+        self._named_values: dict[str, Any] = {}  # what the names of constants stand for
         # These read the tree before it is rewritten.
         self._counters = self._find_counters()
         self._lists: set[str] = set()
@@ -82,9 +83,17 @@ class CommonRewriting(ast.NodeTransformer):
 
     def _named_constant(self, node: ast.expr, value: Any) -> ast.expr:
         """Return a constant, or a function of another module, by a name of its own."""
-        name = f"constant_{re.sub('[^a-zA-Z0-9]', '_', ast.unparse(node))}"
+        name = self._name_for(value, ast.unparse(node))
         self.constants[name] = value
         return like(node, ast.Name(name, ast.Load()))
+
+    def _name_for(self, value: Any, written: str) -> str:
+        """Return a name for a constant, such as `constant_Gains_kp` for `Gains.kp`."""
+        plain = f"constant_{re.sub('[^a-zA-Z0-9]', '_', written)}"
+        name, number = plain, 0
+        while self._named_values.setdefault(name, value) is not value:
+            name, number = f"{plain}_{number}", number + 1
+        return name
 
     def _enum(self, cls: type[enum.IntEnum]) -> ast.expr:
         """Return an enum class as a constant."""
@@ -630,11 +639,11 @@ class CommonRewriting(ast.NodeTransformer):
         if not numbers or not all(isinstance(each, int | float) for each in table.values()):
             remedy = "use ints or enums as keys, and numbers as values"
             raise self.mistake(node, f"{name} is a dict with other keys or values", remedy)
-        place = re.sub("[^a-zA-Z0-9]", "_", name)
-        self.constants[f"constant_{place}_keys"] = tuple(map(int, table))
+        keys, values = (self._name_for(table, f"{name} {each}") for each in ("keys", "values"))
+        self.constants[keys] = tuple(map(int, table))
         kind = int if all(isinstance(each, int) for each in table.values()) else float
-        self.constants[f"constant_{place}_values"] = tuple(map(kind, table.values()))
-        parts = [ast.Name(f"constant_{place}_{each}", ast.Load()) for each in ("keys", "values")]
+        self.constants[values] = tuple(map(kind, table.values()))
+        parts = [ast.Name(each, ast.Load()) for each in (keys, values)]
         return like(node, call_of("rtcf_looked_up", *parts, self.visit(node.slice)))
 
     def _is_tuple(self, node: ast.Subscript) -> bool:

@@ -69,6 +69,10 @@ class Functions:
             file = inspect.getsourcefile(self._cls) or "?"
             line = inspect.getsourcelines(self._cls)[1]
             raise Mistake(file, line, "has no update", "write `def update(self):`")
+        if dataclasses.is_dataclass(self._cls):
+            file = inspect.getsourcefile(self._cls) or "?"
+            line = inspect.getsourcelines(self._cls)[1]
+            raise Mistake(file, line, "a component is no dataclass", "remove the decorator")
         if (own := self._methods.find("__init__")) is not None and own.function is not None:
             raise Mistake(
                 read(own.function).file,
@@ -140,15 +144,8 @@ class Functions:
         if method.function is not None:
             return method.function
         file = inspect.getsourcefile(method.owner) or "?"
-        value = inspect.unwrap(vars(method.owner)[method.name])
-        of = getattr(value, "__func__", value)
-        line = of.__code__.co_firstlineno if inspect.isfunction(of) else 0
-        raise Mistake(
-            file,
-            line or inspect.getsourcelines(method.owner)[1],
-            f"{method.name} is a {method.kind}",
-            "write a method, a static method or a property with `def`",
-        )
+        what = f"{method.name} is a {method.kind}"
+        raise Mistake(file, method.line, what, method.remedy)
 
     def _method(self, source: Source, method: Method, is_hook: bool = False) -> FunctionType:
         function = source.function

@@ -1,12 +1,19 @@
 """The methods of a component class in Python's resolution order, with bases and mixins."""
 
+import ast
 import functools
 import inspect
+import textwrap
 from dataclasses import dataclass
 from types import FunctionType
 from typing import Any
 
 from rtcf.component import Component
+
+from rtcf_compile.source.checks import decorator_of
+from rtcf_compile.source.modules import is_of_user
+
+_DECORATED = "function with a decorator"
 
 
 @dataclass(frozen=True)
@@ -25,6 +32,25 @@ class Method:
     def symbol(self) -> str:
         """Return the name of its compiled function in other functions."""
         return f"{self.kind.split()[0]}_{self.place}_{self.name}"
+
+    @property
+    def remedy(self) -> str:
+        """Return what to do about a kind that has no function."""
+        if self.kind.startswith(_DECORATED):
+            return f"remove the decorator from def {self.name}"
+        if self.kind == "cached_property":
+            return "write @property"
+        return "write a method, a static method or a property with `def`"
+
+    @property
+    def line(self) -> int:
+        """Return the line at which the method begins in the source of its class."""
+        lines, begin = inspect.getsourcelines(self.owner)
+        for each in ast.walk(ast.parse(textwrap.dedent("".join(lines)))):
+            if isinstance(each, ast.FunctionDef) and each.name == self.name:
+                first = min([each.lineno, *(one.lineno for one in each.decorator_list)])
+                return begin + first - 1
+        return begin
 
 
 def nested(
@@ -68,6 +94,10 @@ class Methods:
 
 
 def _method(name: str, owner: type, place: int, value: Any) -> Method | None:
+    of = value.__func__ if isinstance(value, staticmethod) else value
+    of = of.fget if isinstance(of, property) else of
+    if _is_of_decorator(of, owner):
+        return Method(name, owner, place, f"{_DECORATED} ({decorator_of(of)})", None)
     if inspect.isfunction(value):
         return Method(name, owner, place, "method", value)
     if isinstance(value, staticmethod) and inspect.isfunction(value.__func__):
@@ -76,7 +106,18 @@ def _method(name: str, owner: type, place: int, value: Any) -> Method | None:
         return Method(name, owner, place, "property", value.fget)
     if isinstance(value, staticmethod | classmethod | property | functools.cached_property):
         return Method(name, owner, place, type(value).__name__, None)
-    if hasattr(value, "__wrapped__"):
-        decorator = type(value).__name__.strip("_").removesuffix("_wrapper")
-        return Method(name, owner, place, f"function with a decorator ({decorator})", None)
     return None
+
+
+def _is_of_decorator(value: Any, owner: type) -> bool:
+    """Tell whether an attribute of a class is what a decorator made of a method: a function of
+    another function, or an object that can be called. A decorator that uses functools.wraps gives
+    the method's own source.
+    """
+    if inspect.isfunction(value):
+        is_own = value.__qualname__.startswith(f"{owner.__qualname__}.")
+        return not is_own and "<locals>" in value.__qualname__ and bool(value.__code__.co_freevars)
+    others = staticmethod | classmethod | property | functools.cached_property | type
+    if isinstance(value, others):
+        return False
+    return hasattr(value, "__wrapped__") or (callable(value) and is_of_user(type(value)))

@@ -8,7 +8,15 @@ import ast
 import copy
 import enum
 
-from rtcf.component.declaration import PORTS, Description, Input, Member, Output, Queue
+from rtcf.component.declaration import (
+    PORTS,
+    Description,
+    Input,
+    Member,
+    Output,
+    Queue,
+    own_field,
+)
 from rtcf.component.message_type import MessageType
 from rtcf.component.value_type import ValueType
 
@@ -238,8 +246,8 @@ class Ports(CommonRewriting):
         if node.attr == "front":
             return like(node, call_of("rtcf_front", *ring))
         if node.attr == "age":
-            self.used.add("_time")
-            return like(node, call_of("rtcf_age", self._field("_time", ast.Load()), *ring))
+            now = self._field(own_field("time"), ast.Load())
+            return like(node, call_of("rtcf_age", now, *ring))
         if node.attr in _QUEUE_FIELDS:
             return like(node, self._field(name + _QUEUE_FIELDS[node.attr], node.ctx))
         raise self.mistake(

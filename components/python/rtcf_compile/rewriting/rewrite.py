@@ -26,6 +26,9 @@ from rtcf.component.declaration import (
     Parameter,
     Queue,
     State,
+    own_field,
+    private_name,
+    written_name,
 )
 from rtcf.component.value_type import ValueType
 
@@ -102,7 +105,8 @@ class Hook(Ports):
     def _mark(self, node: ast.AST, line: int) -> ast.stmt:
         """Return a statement that notes a line."""
         self.lines.add(line)
-        target = ast.Attribute(ast.Name(self._self, ast.Load()), "_line", ast.Store())
+        own = ast.Name(self._self, ast.Load())
+        target = ast.Attribute(own, own_field("line"), ast.Store())
         return like(node, ast.Assign([target], ast.Constant(line)))
 
     def _may_raise(self, node: ast.AST) -> bool:
@@ -182,7 +186,7 @@ class Hook(Ports):
             if is_log:
                 arguments = [self.visit(each) for each in node.args[1:]]
                 number = self._logs.add(called.attr, node, self.source)
-                component = self._field("_component")
+                component = self._field(own_field("component"))
                 return like(node, call_of(f"rtcf_log_{number}", component, *arguments))
             if called.attr == "fault":
                 raise self.mistake(node, "fault ends the hook", "write it as a separate statement")
@@ -234,11 +238,7 @@ class Hook(Ports):
     def _call(self, node: ast.AST, method: Method, arguments: Sequence[ast.expr]) -> ast.AST:
         """Return the call of the compiled function of a method."""
         if method.function is None:
-            raise self.mistake(
-                node,
-                f"{method.name} is a {method.kind}",
-                "write a method, a static method or a property with `def`",
-            )
+            raise self.mistake(node, f"{method.name} is a {method.kind}", method.remedy)
         if isinstance(node, ast.Call) and method.kind != "nested function":
             written = like(node, ast.Call(node.func, list(arguments), node.keywords))
             own = 0 if method.kind == "static method" else 1  # self is not in the source
@@ -429,7 +429,11 @@ class Hook(Ports):
         names = [each for each in self._description.members if "__" not in each]
         words = (*names, *TIME_FIELDS, *LOG_LEVELS, *self._methods.names())
         remedy = f"write `{node.attr}: State[float]` in the class"
-        if near := difflib.get_close_matches(node.attr, words, 1, 0.75):
+        written = written_name(self._owner, node.attr)
+        if written != node.attr:
+            own = private_name(written)
+            remedy = f"write `{own}: State[float]` in the class, and self.{own}"
+        elif near := difflib.get_close_matches(node.attr, words, 1, 0.75):
             remedy = f"correct its name (self.{near[0]}), or {remedy}"
         return self.mistake(node, "is not declared", remedy)
 
@@ -451,10 +455,11 @@ class Hook(Ports):
             raise self.mistake(node, f"{name} is a hook, which the loop calls", remedy)
         if method is None and name not in (*HOOKS, *LOG_LEVELS, "fault"):
             near = difflib.get_close_matches(name, (*self._methods.names(), *LOG_LEVELS), 1, 0.6)
-            remedy = f"define it: def {name}(self, …):"
+            written = written_name(self._owner, name)
+            remedy = f"define it: def {written}(self, …):"
             if near:
                 remedy = f"correct its name (self.{near[0]}), or {remedy}"
-            raise self.mistake(node, f"there is no method {name}", remedy)
+            raise self.mistake(node, f"there is no method {written}", remedy)
 
     def _is_property(self, node: ast.AST, surely: bool = False) -> bool:
         if not isinstance(node, ast.Attribute):
@@ -523,8 +528,7 @@ class Hook(Ports):
         name = node.attr
         if name in TIME_FIELDS:
             self._touch(node, name)
-            self.used.add(f"_{name}")
-            return like(node, self._field(f"_{name}", node.ctx))
+            return like(node, self._field(own_field(name), node.ctx))
         member = self._description.members.get(name)
         if member is not None:
             if member.kind is State:
@@ -534,11 +538,12 @@ class Hook(Ports):
                 raise self.mistake(node, f"is {a_kind(member)}", f"write self.{name}.{value}")
             return self._value(node, name, member)
         if name in self._description.constants:
-            self.constants[f"constant_{name}"] = self._description.constants[name]
-            return like(node, ast.Name(f"constant_{name}", ast.Load()))
+            return self._named_constant(node, self._description.constants[name])
         method = self._methods.find(name)
         if method is not None and method.kind == "property":
             return self._call(node, method, [])
+        if method is not None and method.function is None:
+            raise self.mistake(node, f"{name} is a {method.kind}", method.remedy)
         if method is not None:
             raise self.mistake(node, "a method is not a value", f"call it: self.{name}(…)")
         raise self._undeclared(node)

@@ -148,7 +148,7 @@ def check(source: Source, members: Collection[str] = ()) -> None:
     tree, file = source.tree, source.file
     for each in tree.decorator_list:
         if ast.unparse(each).rpartition(".")[2] not in _DECORATORS:
-            raise at(file, each, "a decorator is not compiled", "call the function instead")
+            raise at(file, each, "a decorator is not compiled", "remove the decorator")
     arguments = tree.args
     if arguments.vararg or arguments.kwarg:
         raise Mistake(file, tree.lineno, f"{tree.name} takes any number of arguments", "name each")
@@ -198,6 +198,10 @@ def _undefined(
     node: ast.Name, source: Source, members: Collection[str], known: Collection[str]
 ) -> Mistake:
     name, tree = node.id, source.tree
+    if name in source.function.__code__.co_freevars:
+        around = decorator_of(source.function)
+        remedy = f"define {tree.name} in the module, or remove the decorator if {around} is one"
+        return at(source.file, node, f"{name} is a variable of {around}", remedy)
     given = ", ".join(["self", *(each.arg for each in tree.args.args)])
     if name == "self":
         return at(source.file, node, f"{tree.name} has no self", f"write def {tree.name}({given}):")
@@ -316,7 +320,7 @@ def _called(node: ast.Call, target: Any, source: Source) -> None:
         return
     inner: Any = getattr(target, "__wrapped__", getattr(target, "py_func", None))
     if is_own(inner):
-        what = f"{name} has a decorator ({_kind_of(target)}), which is not compiled"
+        what = f"{name} has a decorator ({decorator_of(target)}), which is not compiled"
         raise at(file, node, what, f"remove it from def {inner.__name__}")
     if isinstance(target, type):
         if issubclass(target, Declarable):
@@ -352,10 +356,14 @@ def _called(node: ast.Call, target: Any, source: Source) -> None:
         )
 
 
-def _kind_of(target: Any) -> str:
-    """Return the name of the decorator that made an object, if its class has it."""
+def decorator_of(target: Any) -> str:
+    """Return the name of the decorator that made an object, if its class has it, or a function that
+    another one returned.
+    """
+    if isinstance(target, FunctionType):
+        return target.__qualname__.partition(".<locals>")[0]
     module, kind = type(target).__module__.partition(".")[0], type(target).__name__
-    return module if module == "numba" else kind.strip("_").removesuffix("_wrapper")
+    return "jit" if module == "numba" else kind.strip("_").removesuffix("_wrapper")
 
 
 def check_arguments(

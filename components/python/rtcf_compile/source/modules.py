@@ -94,7 +94,7 @@ def read(function: FunctionType, is_whole: bool = False) -> Source:
     """Return the syntax tree of a function. `is_whole`: with the functions nested in it."""
     file = inspect.getsourcefile(function) or "?"
     tree = lifting.tree_of(function) or _parsed(function, file)
-    spelling.normalise(tree)
+    spelling.normalise(tree, function)
     return Source(function, tree, file, {} if is_whole else lifting.lift(tree, function, file))
 
 

@@ -1,7 +1,8 @@
 """Different ways to write the same: replaced by one of them when a function is read.
 
 An f-string in a log call becomes a format with arguments, an argument that is given only by its
-name an ordinary one, and `x[...]` becomes `x[:]`.
+name an ordinary one, and `x[...]` becomes `x[:]`. A name that is private to a class, `self.__x`,
+becomes the name that Python uses, `self._Observer__x`.
 """
 
 import ast
@@ -11,9 +12,15 @@ from typing import Any
 from rtcf.component.declaration import LOG_LEVELS
 
 
-def normalise(tree: ast.AST) -> None:
+def normalise(tree: ast.AST, function: FunctionType) -> None:
     """Change the tree of a function in place."""
-    _Spelling().visit(tree)
+    _Spelling(_class_of(function)).visit(tree)
+
+
+def _class_of(function: FunctionType) -> str:
+    """Return the name of the class around a function in the source; empty if there is none."""
+    owner = function.__qualname__.rpartition(".")[0].rpartition(".")[2]
+    return "" if owner == "<locals>" else owner
 
 
 def defaults_of(function: FunctionType) -> tuple[Any, ...] | None:
@@ -22,7 +29,24 @@ def defaults_of(function: FunctionType) -> tuple[Any, ...] | None:
     return (*(function.__defaults__ or ()), *by_name.values()) or None
 
 
+# The fields of nodes with names that may be private to a class.
+_NAMES: dict[type[ast.AST], str] = {
+    **{ast.Name: "id", ast.Attribute: "attr", ast.arg: "arg", ast.keyword: "arg"},
+    **{ast.MatchAs: "name", ast.MatchStar: "name"},
+}
+
+
 class _Spelling(ast.NodeTransformer):
+    def __init__(self, owner: str) -> None:
+        self._prefix = f"_{owner.lstrip('_')}" if owner.strip("_") else ""
+
+    def visit(self, node: ast.AST) -> Any:
+        field = _NAMES.get(type(node))
+        name = getattr(node, field, None) if field else None
+        if self._prefix and name and name.startswith("__") and not name.endswith("__"):
+            setattr(node, field, self._prefix + name)
+        return super().visit(node)
+
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
         self.generic_visit(node)
         given = node.args

@@ -83,11 +83,11 @@ struct AbiProbe {
         add({sizeof(InputBase), offsetof(InputBase, source_), offsetof(InputBase, seen_)});
         add({sizeof(OutputBase), offsetof(OutputBase, raw_), offsetof(OutputBase, now_),
              offsetof(OutputBase, port_), sizeof(OutputPort), offsetof(OutputPort, output_),
-             offsetof(OutputPort, name_), offsetof(OutputPort, unit_), offsetof(OutputPort, type_),
-             offsetof(OutputPort, slot_), offsetof(OutputPort, staged_),
-             offsetof(OutputPort, sample_), offsetof(OutputPort, written_),
-             offsetof(OutputPort, draft_), offsetof(OutputPort, connected_),
-             offsetof(OutputPort, checked_), offsetof(OutputPort, policy_)});
+             offsetof(OutputPort, name_), offsetof(OutputPort, type_), offsetof(OutputPort, slot_),
+             offsetof(OutputPort, staged_), offsetof(OutputPort, sample_),
+             offsetof(OutputPort, written_), offsetof(OutputPort, draft_),
+             offsetof(OutputPort, connected_), offsetof(OutputPort, checked_),
+             offsetof(OutputPort, policy_), offsetof(OutputPort, texts_)});
         add({sizeof(InputPort),
              offsetof(InputPort, input_),
              offsetof(InputPort, owner_),
@@ -97,6 +97,7 @@ struct AbiProbe {
              offsetof(InputPort, connected_),
              offsetof(InputPort, fed_),
              offsetof(InputPort, awaited_),
+             offsetof(InputPort, texts_),
              sizeof(QueueBase),
              offsetof(QueueBase, ring_),
              sizeof(QueueBase::Ring),

@@ -331,9 +331,10 @@ const T* Predecessor::output(std::string_view name) const noexcept {
 }
 
 inline InputBase::InputBase(Component* owner, std::string name, const TypeInfo& type,
-                            const SlotHeader& empty)
+                            const SlotHeader& empty, PortTexts texts)
     : source_(&empty) {
-    accessTo(*owner).declare(std::make_unique<InputPort>(*this, *owner, std::move(name), type));
+    accessTo(*owner).declare(
+        std::make_unique<InputPort>(*this, *owner, std::move(name), type, std::move(texts)));
 }
 
 inline std::int64_t InputBase::age(const Component* owner) const noexcept RTCF_NONBLOCKING {
@@ -348,8 +349,8 @@ inline bool InputBase::connected(const Component* owner) const noexcept RTCF_NON
 }
 
 inline QueueBase::QueueBase(Component* owner, std::string name, const TypeInfo& type,
-                            const Ring& ring)
-    : InputBase(owner, std::move(name), type, kNoValue), ring_(new Ring(ring)) {
+                            const Ring& ring, PortTexts texts)
+    : InputBase(owner, std::move(name), type, kNoValue, std::move(texts)), ring_(new Ring(ring)) {
     ring_->port = accessTo(*owner).inputs().back();
     ring_->port->setQueue(this);
 }
@@ -360,10 +361,10 @@ inline std::int64_t QueueBase::age() noexcept {
     return std::max<std::int64_t>(0, ring_->port->owner().time() - timeOf(slot->stamp));
 }
 
-inline OutputBase::OutputBase(Component* owner, std::string name, std::string unit,
+inline OutputBase::OutputBase(Component* owner, std::string name, PortTexts texts,
                               const TypeInfo& type, const Finite* finite)
     : now_(&accessTo(*owner).now()),
-      port_(std::make_unique<OutputPort>(*this, std::move(name), std::move(unit), type, finite)) {
+      port_(std::make_unique<OutputPort>(*this, std::move(name), std::move(texts), type, finite)) {
     raw_ = port_->written();
     accessTo(*owner).declare(port_.get());
 }

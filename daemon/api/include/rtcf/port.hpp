@@ -48,12 +48,19 @@ enum class DataStatus {
     New,   ///< written since this input's last read
 };
 
+/// What a port's value is, for people.
+struct PortTexts {
+    std::string unit;  ///< e.g. "N m"; empty = none
+    std::string doc;   ///< one line; empty = none
+};
+
 /// Base class of inputs of all types. It has only the members that each cycle touches; an InputPort
 /// has the others.
 class InputBase {
    public:
     /// Declares the input to its owner.
-    InputBase(Component* owner, std::string name, const TypeInfo& type, const SlotHeader& empty);
+    InputBase(Component* owner, std::string name, const TypeInfo& type, const SlotHeader& empty,
+              PortTexts texts = {});
     InputBase(const InputBase&) = delete;
     InputBase& operator=(const InputBase&) = delete;
 
@@ -93,18 +100,25 @@ class InputBase {
     std::int64_t seen_ = 0;  // stamp of the value of the last read()
 };
 
-/// Name, type and connection of an input. Owned by the component, but kept outside its object, so
-/// that the members that each cycle touches lie close together in the processor's caches. For the
-/// executor.
+/// Name, type, texts and connection of an input. Owned by the component, but kept outside its
+/// object, so that the members that each cycle touches lie close together in the processor's
+/// caches. For the executor.
 class InputPort {
    public:
-    InputPort(InputBase& input, const Component& owner, std::string name, const TypeInfo& type)
-        : input_(input), owner_(owner), name_(std::move(name)), type_(type) {}
+    InputPort(InputBase& input, const Component& owner, std::string name, const TypeInfo& type,
+              PortTexts texts)
+        : input_(input),
+          owner_(owner),
+          name_(std::move(name)),
+          type_(type),
+          texts_(std::move(texts)) {}
     InputPort(const InputPort&) = delete;
     InputPort& operator=(const InputPort&) = delete;
 
     /// Name within the component. Real-time safe.
     const std::string& name() const noexcept { return name_; }
+    /// Unit and meaning of the value. Real-time safe.
+    const PortTexts& texts() const noexcept { return texts_; }
     /// Description of the value's type. Real-time safe.
     const TypeInfo& type() const noexcept { return type_; }
     const Component& owner() const noexcept RTCF_NONBLOCKING { return owner_; }
@@ -203,6 +217,7 @@ class InputPort {
     bool connected_ = false;
     const Shared<bool>* fed_ = nullptr;  // null = a writer in this runner, or none
     Shared<const SlotHeader*> awaited_ = nullptr;
+    PortTexts texts_;
 };
 
 /// An input port carrying values of type T.
@@ -211,8 +226,11 @@ class Input final : public InputBase {
    public:
     /// @param owner the component, `this`
     /// @param name  ROS base name, unique among the component's ports
-    Input(Component* owner, std::string name)
-        : InputBase(owner, std::move(name), typeInfo<T>(), empty()) {}
+    /// @param unit  unit of the value, for people
+    /// @param doc   what the value is, one line, for people
+    Input(Component* owner, std::string name, std::string unit = {}, std::string doc = {})
+        : InputBase(owner, std::move(name), typeInfo<T>(), empty(),
+                    {std::move(unit), std::move(doc)}) {}
 
     /// Tells whether value() is new to this input: written since its last read(). Real-time safe.
     DataStatus read() noexcept RTCF_NONBLOCKING { return readStatus(); }
@@ -245,7 +263,7 @@ class OutputPort;
 class OutputBase {
    public:
     /// Declares the output to its owner.
-    OutputBase(Component* owner, std::string name, std::string unit, const TypeInfo& type,
+    OutputBase(Component* owner, std::string name, PortTexts texts, const TypeInfo& type,
                const Finite* finite);
     OutputBase(const OutputBase&) = delete;
     OutputBase& operator=(const OutputBase&) = delete;
@@ -271,20 +289,20 @@ class OutputBase {
     std::unique_ptr<OutputPort> port_;
 };
 
-/// Name, unit, slots and readers of an output. Kept outside the component's object, like InputPort.
-/// For the executor.
+/// Name, texts, slots and readers of an output. Kept outside the component's object, like
+/// InputPort. For the executor.
 class OutputPort {
    public:
     /// @param finite policy of an output that is declared Finite; null = it is not
-    OutputPort(const OutputBase& output, std::string name, std::string unit, const TypeInfo& type,
+    OutputPort(const OutputBase& output, std::string name, PortTexts texts, const TypeInfo& type,
                const Finite* finite)
         : output_(output),
           name_(std::move(name)),
-          unit_(std::move(unit)),
           type_(type),
           slot_(type.make_slot(nullptr)),
           written_(slot_.get()),
-          draft_(isShared(type) ? makeDraft(type) : slot_) {
+          draft_(isShared(type) ? makeDraft(type) : slot_),
+          texts_(std::move(texts)) {
         dropDraft();
         if (finite == nullptr) return;
         checked_ = true;
@@ -297,8 +315,10 @@ class OutputPort {
     const OutputBase& output() const noexcept RTCF_NONBLOCKING { return output_; }
     /// Name within the component. Real-time safe.
     const std::string& name() const noexcept { return name_; }
+    /// Unit and meaning of the value. Real-time safe.
+    const PortTexts& texts() const noexcept { return texts_; }
     /// Unit of the value. Real-time safe.
-    const std::string& unit() const noexcept { return unit_; }
+    const std::string& unit() const noexcept { return texts_.unit; }
     /// Description of the value's type. Real-time safe.
     const TypeInfo& type() const noexcept { return type_; }
     /// True if the output has a reader. Real-time safe.
@@ -401,7 +421,6 @@ class OutputPort {
 
     const OutputBase& output_;
     std::string name_;
-    std::string unit_;
     const TypeInfo& type_;
     std::shared_ptr<SlotHeader> slot_;
     std::shared_ptr<SlotHeader> staged_;  // null = readers see written values at once
@@ -412,6 +431,7 @@ class OutputPort {
     bool connected_ = false;
     bool checked_ = false;  // declared Finite
     OnNonFinite policy_ = OnNonFinite::Hold;
+    PortTexts texts_;
 };
 
 inline OutputBase::~OutputBase() { detail::endMember(this); }
@@ -426,11 +446,15 @@ class Output final : public OutputBase {
     /// @param owner the component, `this`
     /// @param name  ROS base name, unique among the component's ports
     /// @param unit  unit of the value, for people
-    Output(Component* owner, std::string name, std::string unit = {})
-        : OutputBase(owner, std::move(name), std::move(unit), typeInfo<T>(), nullptr) {}
+    /// @param doc   what the value is, one line, for people
+    Output(Component* owner, std::string name, std::string unit = {}, std::string doc = {})
+        : OutputBase(owner, std::move(name), {std::move(unit), std::move(doc)}, typeInfo<T>(),
+                     nullptr) {}
     /// An output whose values the executor checks for NaN and infinity before readers see them.
-    Output(Component* owner, std::string name, std::string unit, Finite finite)
-        : OutputBase(owner, std::move(name), std::move(unit), typeInfo<T>(), &finite) {
+    Output(Component* owner, std::string name, std::string unit, Finite finite,
+           std::string doc = {})
+        : OutputBase(owner, std::move(name), {std::move(unit), std::move(doc)}, typeInfo<T>(),
+                     &finite) {
         detail::requireCheckable<T>();
     }
 

@@ -101,7 +101,8 @@ class QueueBase : public InputBase {
         InputPort* port = nullptr;
     };
 
-    QueueBase(Component* owner, std::string name, const TypeInfo& type, const Ring& ring);
+    QueueBase(Component* owner, std::string name, const TypeInfo& type, const Ring& ring,
+              PortTexts texts = {});
     ~QueueBase() = default;
 
     void setSample(std::shared_ptr<SlotHeader> sample) noexcept {
@@ -139,8 +140,11 @@ class Queue final : public QueueBase {
    public:
     /// @param owner the component, `this`
     /// @param name  ROS base name, unique among the component's ports
-    Queue(Component* owner, std::string name)
-        : Queue(owner, std::move(name), std::make_unique<Slots>()) {}
+    /// @param unit  unit of a message, for people
+    /// @param doc   what a message is, one line, for people
+    Queue(Component* owner, std::string name, std::string unit = {}, std::string doc = {})
+        : Queue(owner, std::move(name), std::make_unique<Slots>(),
+                {std::move(unit), std::move(doc)}) {}
 
     /// The oldest message; null if the queue is empty. The pointer is valid until pop(). Real-time
     /// safe if the assignment of T is.
@@ -169,8 +173,8 @@ class Queue final : public QueueBase {
 
     using Slots = std::array<Slot<T>, N>;
 
-    Queue(Component* owner, std::string name, std::unique_ptr<Slots> slots)
-        : QueueBase(owner, std::move(name), typeInfo<T>(), {N, &at, slots.get()}),
+    Queue(Component* owner, std::string name, std::unique_ptr<Slots> slots, PortTexts texts)
+        : QueueBase(owner, std::move(name), typeInfo<T>(), {N, &at, slots.get()}, std::move(texts)),
           slots_(std::move(slots)) {}
 
     static SlotHeader* at(void* slots, std::size_t index) {

@@ -5,6 +5,7 @@
 
 #include <new>
 #include <stdexcept>
+#include <string>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -462,6 +463,22 @@ TEST(Declaration, OfATakenNameIsRefused) {
     const Input<double> in{&component, "x"};
     const auto again = [&] { const Output<double> out{&component, "x"}; };
     EXPECT_THROW(again(), std::logic_error);
+}
+
+TEST(Declaration, OfAPortHasAUnitAndAMeaning) {
+    BareComponent component;
+    const Input<double> in{&component, "in", "rad", "measured angle"};
+    const Queue<double, 2> queue{&component, "queue", "m", "way points"};
+    const Output<double> out{&component, "out", "N m", "to the drive"};
+    const Output<double> finite{&component, "finite", "N", Finite(), "checked"};
+    const Output<double> plain{&component, "plain"};
+    std::vector<std::string> told;
+    for (const InputPort* each : accessTo(component).inputs())
+        told.push_back(each->texts().unit + ": " + each->texts().doc);
+    for (const OutputPort* each : accessTo(component).outputs())
+        told.push_back(each->unit() + ": " + each->texts().doc);
+    EXPECT_EQ(told, (std::vector<std::string>{"rad: measured angle", "m: way points",
+                                              "N m: to the drive", "N: checked", ": "}));
 }
 
 TEST(Declaration, OfAnIllegalNameIsRefused) {

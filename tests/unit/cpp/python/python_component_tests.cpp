@@ -77,6 +77,8 @@ constexpr std::uint64_t hashOf(std::string_view text) { return detail::stateHash
 const TypeTable kNumber{Scalar::Double, 0, 0};
 const TypeTable kInteger{Scalar::Int64, 0, 0};
 const InputTable kInput{"u",
+                        "rad",
+                        "wanted angle",
                         &kNumber,
                         nullptr,
                         nullptr,
@@ -87,8 +89,9 @@ const InputTable kInput{"u",
                         nullptr,
                         0,
                         {LogLevel::Warn, "gain.py", 3, "update", "too large"}};
-const OutputTable kOutput{"x",     "m", &kNumber, nullptr, 0, offsetof(Record, is_written),
-                          nullptr, 0,   nullptr,  0};
+const OutputTable kOutput{
+    "x",     "m", "position", &kNumber, nullptr, 0, offsetof(Record, is_written),
+    nullptr, 0,   nullptr,    0};
 const ParameterTable kGain{"gain",  "", "", Scalar::Double, offsetof(Record, gain), 1, 0, 0.0, 0.0,
                            nullptr, 0,  0};
 const StateTable kCount{"count", "", "", &kInteger, offsetof(Record, count), 0};
@@ -124,7 +127,10 @@ class PythonComponents : public testing::Test {
 
 TEST_F(PythonComponents, DeclaresTheContentOfItsTable) {
     EXPECT_EQ(accessTo(component_).inputs().front()->name(), "u");
+    EXPECT_EQ(accessTo(component_).inputs().front()->texts().unit, "rad");
+    EXPECT_EQ(accessTo(component_).inputs().front()->texts().doc, "wanted angle");
     EXPECT_EQ(accessTo(component_).outputs().front()->unit(), "m");
+    EXPECT_EQ(accessTo(component_).outputs().front()->texts().doc, "position");
     const ParameterDeclaration& gain = accessTo(component_).parameters().front()->declaration();
     EXPECT_EQ(gain.type, "double");
     EXPECT_EQ(std::get<double>(gain.default_value), 2.5);

@@ -196,6 +196,18 @@ def test_an_enum_can_be_given_by_name() -> None:
         switched.wanted.put(7)
 
 
+def test_an_array_of_bools_is_a_parameter() -> None:
+    axes = made("Axes", enabled=[False, True, True])
+    assert (axes.enabled.tolist(), axes.many) == ([False, True, True], 3)
+    axes.u.put([5.0, 6.0, 7.0])
+    axes.cycle()
+    assert axes.y.value.tolist() == [1.0, 6.0, 10.0]
+    with pytest.raises(TypeError, match="enabled is bool, not int64"):
+        made("Axes", enabled=[0, 1, 1])
+    with pytest.raises(ValueError, match="no axis"):
+        made("Axes", enabled=False, plan=False)
+
+
 def test_a_fault_is_an_exception() -> None:
     failing = made("Failing", way=4, after=1)
     with pytest.raises(Fault, match="no reply from the drive"):

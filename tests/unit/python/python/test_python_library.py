@@ -4,12 +4,14 @@ import os
 import re
 import select
 import subprocess
+import sys
 import textwrap
 from pathlib import Path
 from typing import Any
 
 import pytest
 from daemon_process import BUILD_TREE
+from rtcf_compile import main
 from rtcf_compile.library import log_text, messages
 from rtcf_compile.rewriting.logs import LogCall
 from rtcf_compile.source.mistake import Mistake
@@ -64,6 +66,37 @@ def test_a_crash_of_the_compiler_is_one_line(tmp_path: Path) -> None:
         "rtcf-compile: crashing.py: the compiler ended with SIGSEGV: "
         "write this function in another way\n"
     )
+
+
+def test_a_failure_of_the_compiler_is_one_line(tmp_path: Path) -> None:
+    file = tmp_path / "failing.py"
+    file.write_text(f"{RELAY.format(name='Failing')}\n\nimport numba\n\nnumba.njit = None\n")
+    done = subprocess.run(
+        [COMMAND, "failing.py", "--verify"],
+        cwd=tmp_path, capture_output=True, text=True, timeout=DEADLINE_S,
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert re.fullmatch(
+        r"rtcf-compile: failing\.py:.*: the compiler failed at \w+\.py:\d+: "
+        r"TypeError: 'NoneType' object is not callable: write this function in another way\n",
+        done.stderr,
+    ), done.stderr
+
+
+def test_numba_is_needed_only_to_compile(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setitem(sys.modules, "numba", None)
+    file, library = tmp_path / "relay.py", tmp_path / "relay.so"
+    file.write_text(RELAY.format(name="Relay"))
+    assert main.main([str(file), "-o", str(library)]) == main.REFUSED
+    needs = "rtcf-compile: needs numba: sudo apt install python3-numba\n"
+    assert capsys.readouterr() == ("", needs)
+    assert not library.exists()
+    # Errors that need no compiler are reported first.
+    file.write_text("x = 1\n")
+    assert main.main([str(file), "-o", str(library)]) == main.REFUSED
+    assert "has no component" in capsys.readouterr().err
 
 
 def test_the_compiler_ends_with_its_parent(tmp_path: Path) -> None:

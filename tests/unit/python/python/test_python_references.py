@@ -127,7 +127,7 @@ class Programs:
             said = self._update(record)
         if raised or said:
             return f"{said} compiled, {raised} in NumPy"
-        for name in ("y", "z", "a", "b", "c", "m", "k", "s"):
+        for name in ("y", "z", "a", "_b", "c", "m", "k", "s"):
             ours, theirs = record[f"{name}{number}"], getattr(model, f"{name}{number}")
             theirs = getattr(theirs, "value", theirs)
             if not np.isfinite(theirs).all() or np.max(np.abs(theirs)) > 1e100:
@@ -278,7 +278,7 @@ def test_statements_mean_what_they_mean_in_numpy(tmp_path: Path, compiler: Any) 
         body = "".join(f"        {line}\n" for line in text.split("\n"))
         whole = METHODS + f"    def program(self):\n{body}"
         members = r"self\.([abcmksyz])\b(?!\()"
-        whole = re.sub(members, rf"self.\g<1>{number}", whole)
+        whole = re.sub(members, rf"self.\g<1>{number}", whole).replace("self.b", "self._b")
         names = r"\b(now|halved|stepped|set_m|set_a|get_m|same|program)\b"
         programs[number] = Program(re.sub(names, rf"\g<1>_{number}", whole))
     found = Programs(programs, tmp_path, compiler)
