@@ -393,11 +393,11 @@ class _Operations(CommonRewriting):
         return False
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
-        target, first = resolve(node.func, self.source), node.args[:1]
+        target, of = resolve(node.func, self.source), node.args[0] if node.args else None
         if target is sum:
             self.scope["rtcf_sum_in_order"] = _sum_in_order
             node.func = like(node.func, ast.Name("rtcf_sum_in_order", ast.Load()))
-        if target is sum or isinstance(first and first[0], ast.GeneratorExp | ast.ListComp):
+        if target is sum or isinstance(of, ast.GeneratorExp | ast.ListComp):
             return self.generic_visit(node)
         return super().visit_Call(node)
 

@@ -488,7 +488,11 @@ def _row_of_any() -> Any:
 def _refuse_loss(target: Any, new: Any) -> None:
     """Reject elements set to floats or complex numbers that they cannot store."""
     is_complex = isinstance(target.dtype, types.Complex)
-    if isinstance(new, types.Float) and not is_complex and not isinstance(target.dtype, types.Float):
+    if (
+        isinstance(new, types.Float)
+        and not is_complex
+        and not isinstance(target.dtype, types.Float)
+    ):
         raise TypingError(f"RTCF:elements of {target.dtype} are set to {new}:round them first")
     if isinstance(new, types.Complex) and not is_complex:
         raise TypingError(f"RTCF:elements of {target.dtype} are set to {new}:{_PART}")

@@ -922,8 +922,8 @@ def is_number(kind: np.dtype[Any]) -> bool:
 
 
 def _is_constant(value: Any) -> bool:
-    numbers = bool | int | float | complex | np.generic
-    return isinstance(value, numbers | str | tuple | list | np.ndarray)
+    numbers = (bool, int, float, complex, np.generic)
+    return isinstance(value, (*numbers, str, tuple, list, np.ndarray))
 
 
 def _number_in(node: ast.Call) -> float | None:

@@ -307,7 +307,19 @@ def _constant(node: ast.Name, value: Any, source: Source) -> None:
         raise at(source.file, node, f"is {what} of the module", "use a tuple or np.array(…)")
     if isinstance(value, np.ndarray) and not is_number(value.dtype):
         raise at(source.file, node, f"is an array of {value.dtype}", "use an array of numbers")
-    known = (bool, int, float, complex, str, tuple, np.ndarray, np.generic, type, ModuleType, type(None))
+    known = (
+        bool,
+        int,
+        float,
+        complex,
+        str,
+        tuple,
+        np.ndarray,
+        np.generic,
+        type,
+        ModuleType,
+        type(None),
+    )
     if isinstance(value, known) or callable(value) or isinstance(value, enum.Enum):
         return
     if dataclasses.is_dataclass(value):

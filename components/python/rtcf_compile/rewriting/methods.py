@@ -117,7 +117,7 @@ def _is_of_decorator(value: Any, owner: type) -> bool:
     if inspect.isfunction(value):
         is_own = value.__qualname__.startswith(f"{owner.__qualname__}.")
         return not is_own and "<locals>" in value.__qualname__ and bool(value.__code__.co_freevars)
-    others = staticmethod | classmethod | property | functools.cached_property | type
+    others = (staticmethod, classmethod, property, functools.cached_property, type)
     if isinstance(value, others):
         return False
     return hasattr(value, "__wrapped__") or (callable(value) and is_of_user(type(value)))

@@ -80,7 +80,17 @@ _MOST_STATES = 12  # different bindings at one place, before they are merged
 # Functions and methods whose result refers to their first argument, in NumPy.
 _SAME = (np.asarray, np.ascontiguousarray)
 _VIEWS = (
-    *(np.real, np.imag, np.reshape, np.ravel, np.transpose, np.flip, np.squeeze, np.flipud, np.fliplr),
+    *(
+        np.real,
+        np.imag,
+        np.reshape,
+        np.ravel,
+        np.transpose,
+        np.flip,
+        np.squeeze,
+        np.flipud,
+        np.fliplr,
+    ),
     *(np.broadcast_to, np.expand_dims, np.atleast_1d, np.atleast_2d, np.atleast_3d),
 )
 _VIEW_METHODS = ("reshape", "ravel", "transpose", "squeeze", "view", "swapaxes")

@@ -168,7 +168,11 @@ class _Flow:
     def _used(self, node: ast.expr, known: frozenset[str]) -> frozenset[str]:
         """Check an expression; return the assigned variables after it."""
         if isinstance(node, ast.Name):
-            if isinstance(node.ctx, ast.Load) and node.id in self._variables - known and not node.id.startswith("rtcf_"):
+            if (
+                isinstance(node.ctx, ast.Load)
+                and node.id in self._variables - known
+                and not node.id.startswith("rtcf_")
+            ):
                 raise at(self._source.file, node, *self._without_value(node.id))
             return known
         if isinstance(node, ast.NamedExpr):

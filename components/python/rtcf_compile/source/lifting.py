@@ -2,8 +2,9 @@
 that they use as arguments (Johnsson, "Lambda Lifting", 1985).
 
 A nested function may only be called: its variables then have the values that Python gives them at
-each call. A comprehension becomes a call in its place, which keeps the order of effects: a loop that
-sums, compares or searches, or one that fills an array where a list and an array are the same.
+each call. A comprehension becomes a call in its place, which keeps the order of effects: that of a
+loop that sums, compares or searches, or of one that fills an array where a list and an array are
+the same.
 """
 
 import ast
@@ -59,9 +60,7 @@ def _first(function: Any, test: str, end: str) -> _Reduction:
 
 
 def _extreme(function: Any, sign: str) -> _Reduction:
-    text = (
-        "rtcf_is_first = True\nLOOP\nif rtcf_is_first:\n    {}\nreturn rtcf_each"
-    )
+    text = "rtcf_is_first = True\nLOOP\nif rtcf_is_first:\n    {}\nreturn rtcf_each"
     step = (
         "rtcf_value = VALUE\n"
         "if rtcf_is_first:\n"
@@ -157,7 +156,9 @@ class _Lifting(ast.NodeTransformer):
             if isinstance(value, list) and value and isinstance(value[0], ast.stmt):
                 self.block(value)
             elif isinstance(value, list):
-                value[:] = [self.visit(each) if isinstance(each, ast.AST) else each for each in value]
+                value[:] = [
+                    self.visit(each) if isinstance(each, ast.AST) else each for each in value
+                ]
             elif isinstance(value, ast.AST):
                 setattr(node, field, self.visit(value))
         return node
@@ -173,10 +174,10 @@ class _Lifting(ast.NodeTransformer):
                 remedy = "declare a State, or return the value"
                 raise self._mistake(each, "nonlocal is not compiled", remedy)
         given = nested.args
-        for each in (*given.defaults, *given.kw_defaults):
-            if each is not None and free(each) & self._variables:
+        for default in (*given.defaults, *given.kw_defaults):
+            if default is not None and free(default) & self._variables:
                 what = f"a default of {name} is a variable"
-                raise self._mistake(each, what, f"use the variable in {name} itself")
+                raise self._mistake(default, what, f"use the variable in {name} itself")
         body = nested.body
         if not isinstance(body, list):
             body = [ast.copy_location(ast.Return(body), body)]
@@ -200,9 +201,9 @@ class _Lifting(ast.NodeTransformer):
         is_hidden = self._first in bound(tree)
         return [self._first, *others] if self._first and not is_hidden else others
 
-    def _add(self, name: str, tree: ast.FunctionDef, node: ast.AST) -> None:
+    def _add(self, name: str, tree: ast.FunctionDef, node: ast.expr | ast.stmt) -> None:
         """Make a function that can be called by its name."""
-        key = self._outer.__code__, name, node.lineno, node.col_offset  # type: ignore[attr-defined]
+        key = self._outer.__code__, name, node.lineno, node.col_offset
         if key not in _made:
             _made[key] = self._compiled(tree)
             if name.startswith("rtcf_"):
@@ -315,9 +316,10 @@ class _Lifting(ast.NodeTransformer):
             and (one.id in self._lists or one.id.startswith(("rtcf_value", "rtcf_of_")))
         ):  # fmt: skip
             node.targets = [self.visit(each) for each in node.targets]
-            is_generator = names and isinstance(node.value, ast.GeneratorExp)
-            filled = self._filled if is_generator else self._as_array
-            node.value = filled(node.value)  # type: ignore[operator]
+            if names and isinstance(node.value, ast.GeneratorExp):
+                node.value = self._filled(node.value)
+            else:
+                node.value = self._as_array(node.value)
             return node
         return self.generic_visit(node)
 
@@ -340,7 +342,9 @@ class _Lifting(ast.NodeTransformer):
         if len(node.generators) > 1 or node.generators[0].ifs:
             if (elements := self._written_out(node)) is not None:
                 return self.visit(_located(ast.List(elements, ast.Load()), node))  # type: ignore[no-any-return]
-            remedy = "use np.where, or a loop that counts" if node.generators[0].ifs else "use a loop"
+            remedy = (
+                "use np.where, or a loop that counts" if node.generators[0].ifs else "use a loop"
+            )
             raise self._mistake(node, "the size of this list is not fixed", remedy)
         first = node.generators[0]
         before: list[ast.stmt] = []
@@ -557,9 +561,13 @@ def _nested(node: ast.AST) -> Iterator[tuple[str, ast.FunctionDef | ast.Lambda]]
     """Yield the name and the function of a statement that defines one."""
     if isinstance(node, ast.FunctionDef):
         yield node.name, node
-    elif isinstance(node, ast.Assign) and isinstance(node.value, ast.Lambda):
-        if len(node.targets) == 1 and isinstance(node.targets[0], ast.Name):
-            yield node.targets[0].id, node.value
+    elif (
+        isinstance(node, ast.Assign)
+        and isinstance(node.value, ast.Lambda)
+        and len(node.targets) == 1
+        and isinstance(node.targets[0], ast.Name)
+    ):
+        yield node.targets[0].id, node.value
 
 
 def _sets(node: ast.AST, name: str) -> bool:
@@ -615,7 +623,11 @@ def _placed(
     """Return the statements of a text with expressions, and a loop, in the places of names."""
     found: list[ast.stmt] = []
     for each in ast.parse(text).body:
-        if isinstance(each, ast.Expr) and isinstance(each.value, ast.Name) and each.value.id == "LOOP":
+        if (
+            isinstance(each, ast.Expr)
+            and isinstance(each.value, ast.Name)
+            and each.value.id == "LOOP"
+        ):
             found += loop or []
             continue
         for part in ast.walk(each):

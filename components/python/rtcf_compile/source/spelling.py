@@ -43,7 +43,7 @@ class _Spelling(ast.NodeTransformer):
     def visit(self, node: ast.AST) -> Any:
         field = _NAMES.get(type(node))
         name = getattr(node, field, None) if field else None
-        if self._prefix and name and name.startswith("__") and not name.endswith("__"):
+        if field and self._prefix and name and name.startswith("__") and not name.endswith("__"):
             setattr(node, field, self._prefix + name)
         return super().visit(node)
 

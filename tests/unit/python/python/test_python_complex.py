@@ -40,26 +40,41 @@ WAYS = {
     "powers": "self.y.write((z**2).real + (z**3).imag + abs(z**0.5) + (z**-1).real)",
     "power of a variable": "self.y.write((z ** (self.n.value % 5)).real)",
     "power of a complex number": "self.y.write((z ** (0.1 + 0.2j)).imag)",
-    "sum and product in place": "z += 1j\n        z *= 2.0 - 1j\n        self.y.write(z.real - z.imag)",
+    "sum and product in place": """
+        z += 1j
+        z *= 2.0 - 1j
+        self.y.write(z.real - z.imag)""",
     "comparison": "self.y.write(1.0 if z == complex(v[0], u) or not z else (-z).imag)",
     "parts": "self.y.write(abs(z) + z.conjugate().imag + np.real(z) - np.imag(z))",
-    "polar": "r, phi = cmath.polar(z)\n        self.y.write(cmath.rect(r, phi).real + cmath.phase(z))",
+    "polar": """
+        r, phi = cmath.polar(z)
+        self.y.write(cmath.rect(r, phi).real + cmath.phase(z))""",
     "exp": "self.y.write(cmath.exp(0.01 * z).real)",
     "log": "self.y.write(cmath.log(complex(round(u), round(v[0]))).imag)",
-    "roots and angles": "self.y.write(cmath.sqrt(z).real + cmath.atan(z).imag + cmath.asinh(z).real)",
+    "roots and angles": """
+        self.y.write(cmath.sqrt(z).real + cmath.atan(z).imag + cmath.asinh(z).real)""",
     "trigonometry": "self.y.write(cmath.sin(0.01 * z).real + cmath.tanh(0.01 * z).imag)",
     "float or complex": "x = u if u > 0.0 else 1j * u\n        self.y.write(abs(x))",
     "function": "self.y.write(turned(z, v[1]).real)",
     "goertzel": """
         s = sum(x * cmath.exp(-2j * math.pi * k / 4) for k, x in enumerate(v))
         self.y.write(abs(s))""",
-    "array of zeros": "a = np.zeros(4, complex)\n        a[0] = z\n        a[1:] = 2.0\n        self.w.write(a.real)",
-    "array of values": "a = np.array([z, 1j, u, 2.0])\n        a *= 1j\n        self.w.write(a.imag)",
+    "array of zeros": """
+        a = np.zeros(4, complex)
+        a[0] = z
+        a[1:] = 2.0
+        self.w.write(a.real)""",
+    "array of values": """
+        a = np.array([z, 1j, u, 2.0])
+        a *= 1j
+        self.w.write(a.imag)""",
     "array of a comprehension": "self.w.write(np.array([x * J**k for k, x in enumerate(v)]).imag)",
     "functions of arrays": """
         a = np.exp(1j * v) * PHASES
         self.w.write(np.abs(a + 1.0) + np.angle(a) + np.conj(a).imag + a.conj().real)""",
-    "sums": "a = v * PHASES\n        self.y.write(np.sum(a).imag + a.mean().real + np.where(v > 0.0, a, 1j).sum().real)",
+    "sums": """
+        a = v * PHASES
+        self.y.write(np.sum(a).imag + a.mean().real + np.where(v > 0.0, a, 1j).sum().real)""",
     "products": "self.y.write((v @ PHASES).imag + np.vdot(PHASES, PHASES * u).real)",
     "matrix": "m = np.outer(PHASES, v)\n        self.w.write((m @ PHASES).real + m.T[0].imag)",
     "part of an array that changes": """

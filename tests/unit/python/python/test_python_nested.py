@@ -114,7 +114,9 @@ WAYS = {
     "sum with a start": "self.y.write(sum((x for x in v), 10.0) + sum((x for x in v), start=u))",
     "sum of a list": "self.y.write(sum([x * x for x in v]))",
     "sum of ints": "self.n = sum(i * i for i in range(COUNT)); self.y.write(u / (1 + self.n))",
-    "sum of rows": "self.y.write(sum(row[0] + sum(x for x in row) for row in self.m)); self.m[0] += v",
+    "sum of rows": """
+        self.y.write(sum(row[0] + sum(x for x in row) for row in self.m))
+        self.m[0] += v""",
     "sum with conditions": "self.y.write(sum(x for x in v if x > 0.0 if x < u))",
     "sum of two loops": "self.y.write(sum(x * y for x in v for y in LIMITS if y > x))",
     "product": "self.y.write(math.prod(x for x in v) + math.prod((i for i in range(4)), start=2))",
@@ -139,9 +141,14 @@ WAYS = {
     "rows of a matrix": "self.m[:] = [[x for x in v], [x * x for x in v]]",
     "written list": "self.w.write([min(x, top) for x, top in zip(v, LIMITS)])",
     "member": "self.a = [0.5 * x + 0.5 * old for x, old in zip(v, self.a)]; self.w.write(self.a)",
-    "a member that the elements read": "self.a = [self.norm() + x for x in v]; self.w.write(self.a)",
+    "a member that the elements read": """
+        self.a = [self.norm() + x for x in v]
+        self.w.write(self.a)""",
     "part of a member": "self.a[:2] = [x for x in v[1:]]; self.w.write(self.a)",
-    "unpacked": "a, b, c = (2.0 * x for x in v); d, e = [x for x in (u, a)]; self.y.write(a + b * c + e)",
+    "unpacked": """
+        a, b, c = (2.0 * x for x in v)
+        d, e = [x for x in (u, a)]
+        self.y.write(a + b * c + e)""",
     "iterated list": """
         for k, x in enumerate([x * x for x in v]):
             self.a[k] += x
@@ -151,7 +158,9 @@ WAYS = {
         self.a = v
         errors[0] = 0.0
         self.y.write(sum(errors) + errors[1] * len(errors) + max(abs(x) for x in errors))""",
-    "list of a few numbers": "pair = [k * u for k in (1.0, 2.0)] + [3.0]; self.y.write(pair[0] + pair[2])",
+    "list of a few numbers": """
+        pair = [k * u for k in (1.0, 2.0)] + [3.0]
+        self.y.write(pair[0] + pair[2])""",
     "tuple": "self.y.write(sum(tuple(k * u for k in LIMITS)))",
     "function of NumPy": "self.y.write(np.mean([x * x for x in v]) + np.max([abs(x) for x in v]))",
     "norm": "self.y.write(np.linalg.norm([x - 1.0 for x in v]))",
@@ -224,7 +233,8 @@ REJECTED = {
         "a function cannot be a value: write name = lambda …, then call name(…)",
     ),
     "recursion": (
-        "def f(x):  # here\n            return f(x - 1.0) if x > 0.0 else 0.0\n        self.y.write(f(u))",
+        "def f(x):  # here\n            return f(x - 1.0) if x > 0.0 else 0.0\n"
+        "        self.y.write(f(u))",
         "f calls itself: use a loop",
     ),
     "a function before its definition": (
@@ -248,11 +258,13 @@ REJECTED = {
         "a default of f is a variable: use the variable in f itself",
     ),
     "a variable of the function around it": (
-        "def f(x):\n            nonlocal u  # here\n            u = x\n        f(1.0)\n        self.y.write(u)",
+        "def f(x):\n            nonlocal u  # here\n            u = x\n        f(1.0)\n"
+        "        self.y.write(u)",
         "nonlocal is not compiled: declare a State, or return the value",
     ),
     "a decorator": (
-        "@staticmethod  # here\n        def f(x):\n            return x\n        self.y.write(f(u))",
+        "@staticmethod  # here\n        def f(x):\n            return x\n"
+        "        self.y.write(f(u))",
         "a decorator is not compiled: remove it",
     ),
     "a list whose size changes": (
