@@ -26,7 +26,7 @@ from numba.core.typed_passes import NopythonTypeInference
 
 from rtcf_compile.machine_code.number_types import Operand, operand, plain_of, together
 from rtcf_compile.rewriting import helpers, numpy_functions, operators
-from rtcf_compile.rewriting.functions import WRITTEN_CODE
+from rtcf_compile.rewriting.functions import INT_BOUNDS, WRITTEN_CODE
 from rtcf_compile.source.mistake import Mistake
 
 _LARGEST = 2**53  # floats represent all ints up to this
@@ -133,6 +133,7 @@ class Numbers:
         """Read a function in numba's intermediate representation."""
         self._file = function.loc.filename
         self._is_own = WRITTEN_CODE in vars(function.func_id.func)
+        self.bounds: dict[str, int] = vars(function.func_id.func).get(INT_BOUNDS, {})
         self._types = types_of
         self._assigned: dict[str, list[Any]] = {}
         self._statements: list[Any] = []
@@ -590,6 +591,8 @@ class Bounds:
             return float(abs(given)) if type(given) in (int, bool) else None
         if isinstance(value, ir.Var):
             return self._of(value)
+        if isinstance(value, ir.Arg) and isinstance(kind, types.Integer | types.Boolean):
+            return float(self._numbers.bounds.get(value.name, _by_type(number.dtype)))
         bound = self._of_expression(value) if isinstance(value, ir.Expr) else None
         if bound is None and number is not None and not number.is_array:
             return _by_type(number.dtype)

@@ -280,10 +280,31 @@ def _array_of(value: Any, count: Any) -> Any:
     return lambda value, count: np.empty((count, value.size), element)
 
 
-@compiled_as(helpers.rtcf_looked_up)
-def _looked_up(keys: Any, values: Any, key: Any) -> Any:
+def _check_table(values: Any, key: Any) -> None:
     if not isinstance(key, types.Integer | types.Boolean | types.IntEnumMember):
         raise TypingError(f"RTCF:a key of a dict is {words(key)}:give it an int or an enum")
+    numbers = types.Number | types.Boolean | types.IntEnumMember
+    if not isinstance(values, types.UniTuple) or not isinstance(values.dtype, numbers):
+        raise TypingError("RTCF:the values of a dict are not numbers of one type:use if and elif")
+
+
+@compiled_as(helpers.rtcf_looked_up_or)
+def _looked_up_or(keys: Any, values: Any, key: Any, default: Any) -> Any:
+    _check_table(values, key)
+
+    def look(keys: Any, values: Any, key: Any, default: Any) -> Any:
+        number = helpers.rtcf_int(key)
+        for place in range(len(keys)):
+            if keys[place] == number:
+                return values[place]
+        return default
+
+    return look
+
+
+@compiled_as(helpers.rtcf_looked_up)
+def _looked_up(keys: Any, values: Any, key: Any) -> Any:
+    _check_table(values, key)
 
     def look(keys: Any, values: Any, key: Any) -> Any:
         number = helpers.rtcf_int(key)

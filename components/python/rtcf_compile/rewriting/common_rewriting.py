@@ -473,6 +473,12 @@ class CommonRewriting(ast.NodeTransformer):
         if target in (max, min, sum) and node.keywords:
             remedy = f"use np.{target.__name__}, np.argmax or a loop"
             raise self.mistake(node, f"{target.__name__} takes no {node.keywords[0].arg}", remedy)
+        if isinstance(node.func, ast.Attribute) and node.func.attr == "get":
+            table = resolve(node.func.value, self.source)
+            if isinstance(table, dict) and table and len(node.args) == 2 and not node.keywords:
+                return self._looked_up_or(node, node.func.value, table)
+        if target is enumerate and [each.arg for each in node.keywords] == ["start"]:
+            node.args.append(node.keywords.pop().value)
         if isinstance(node.func, ast.Attribute) and (
             target is None or isinstance(resolve(node.func.value, self.source), np.ndarray)
         ):
@@ -635,6 +641,22 @@ class CommonRewriting(ast.NodeTransformer):
                 what = f"{name} has no {node.slice.value!r}"
                 raise self.mistake(node, what, f"use one of {keys}")
             return self._named_constant(node, table[node.slice.value])
+        parts = self._table(node, name, table)
+        return like(node, call_of("rtcf_looked_up", *parts, self.visit(node.slice)))
+
+    def _looked_up_or(self, node: ast.Call, of: ast.expr, table: dict[Any, Any]) -> ast.AST:
+        """Rewrite `SPEEDS.get(key, default)` of a dict of the module."""
+        key, default = node.args
+        if isinstance(key, ast.Constant):
+            if key.value not in table:
+                return self.visit(default)  # type: ignore[no-any-return]
+            element = like(node, ast.Subscript(of, key, ast.Load()))
+            return self._named_constant(element, table[key.value])
+        parts = [*self._table(node, ast.unparse(of), table), self.visit(key), self.visit(default)]
+        return like(node, call_of("rtcf_looked_up_or", *parts))
+
+    def _table(self, node: ast.expr, name: str, table: dict[Any, Any]) -> list[ast.expr]:
+        """Return the keys and values of a dict of numbers as constants."""
         numbers = all(isinstance(each, int) for each in table)
         if not numbers or not all(isinstance(each, int | float) for each in table.values()):
             remedy = "use ints or enums as keys, and numbers as values"
@@ -643,8 +665,7 @@ class CommonRewriting(ast.NodeTransformer):
         self.constants[keys] = tuple(map(int, table))
         kind = int if all(isinstance(each, int) for each in table.values()) else float
         self.constants[values] = tuple(map(kind, table.values()))
-        parts = [ast.Name(each, ast.Load()) for each in (keys, values)]
-        return like(node, call_of("rtcf_looked_up", *parts, self.visit(node.slice)))
+        return [ast.Name(each, ast.Load()) for each in (keys, values)]
 
     def _is_tuple(self, node: ast.Subscript) -> bool:
         """Tell whether a node is an element of a tuple or list with a variable index."""

@@ -31,6 +31,8 @@ Compiler = Callable[[FunctionType], Any]
 # Attributes of rewritten functions: the name of the original function, such as `Observer.update`,
 # and its code.
 WRITTEN_NAME, WRITTEN_CODE = "rtcf_written_name", "rtcf_written_code"
+# Attribute: the largest absolute ints of arguments, by their names.
+INT_BOUNDS = "rtcf_int_bounds"
 
 
 class Functions:
@@ -174,7 +176,16 @@ class Functions:
         for number, call in enumerate(self.logs.calls):
             scope[f"rtcf_log_{number}"] = _log(number, call.count)
         self._making.pop()
-        return made(tree, scope, source)
+        return self._with_bounds(made(tree, scope, source), source)
+
+    def _with_bounds(self, function: FunctionType, source: Source) -> FunctionType:
+        """Attach the largest absolute ints of the arguments that are constants in all calls."""
+        bounds = self._references.constants.items()
+        code = source.function.__code__
+        vars(function)[INT_BOUNDS] = {
+            name: bound for (of, name), bound in bounds if of is code and bound is not None
+        }
+        return function
 
     def _begin(self, function: FunctionType, source: Source) -> None:
         if function in self._making:
@@ -230,7 +241,7 @@ class Functions:
         drop_types(source.tree)
         self._note_calls(rewriting)
         plain = made(source.tree, self._scope(source, source.tree, rewriting.constants), source)
-        own = self._compiler(plain)
+        own = self._compiler(self._with_bounds(plain, source))
         self._making.pop()
         self._made[function] = own
         return own

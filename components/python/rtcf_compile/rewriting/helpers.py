@@ -305,6 +305,14 @@ def rtcf_looked_up(keys: Any, values: Any, key: Any) -> Any:
     raise KeyError("no such key")
 
 
+def rtcf_looked_up_or(keys: Any, values: Any, key: Any, default: Any) -> Any:
+    """Return an element of a dict of numbers, or a default."""
+    for number in range(len(keys)):
+        if keys[number] == key:
+            return values[number]
+    return default
+
+
 def rtcf_store(target: Any, value: Any) -> None:
     """Set all elements of a member to a number or to an array of its shape."""
     if np.shape(value) not in (target.shape, ()):
@@ -454,6 +462,7 @@ BY_NAME = {
             rtcf_view,
             rtcf_copied,
             rtcf_looked_up,
+            rtcf_looked_up_or,
             rtcf_array_of,
             rtcf_store,
             rtcf_maybe,

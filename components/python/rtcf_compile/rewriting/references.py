@@ -108,10 +108,12 @@ class References:
     def __init__(self, description: Description, methods: Methods) -> None:
         """Follow the hooks of a class; raise Mistake for a change that would differ."""
         self.copies: set[Site] = set()
+        # The largest absolute int that calls pass for an argument as a constant; None: another value.
+        self.constants: dict[tuple[CodeType, str], int | None] = {}
         found = -1
         while len(self.copies) > found:
             found = len(self.copies)
-            _Followed(description, methods, self.copies).hooks()
+            _Followed(description, methods, self.copies, self.constants).hooks()
 
     def mark(self, source: Source) -> None:
         """Mark the expressions of a function that must be copied, see `is_copied`."""
@@ -273,9 +275,15 @@ class _Frame:
 class _Followed:
     """One pass through the hooks of a class."""
 
-    def __init__(self, description: Description, methods: Methods, copies: set[Site]) -> None:
+    def __init__(
+        self,
+        description: Description,
+        methods: Methods,
+        copies: set[Site],
+        ints: dict[tuple[CodeType, str], int | None],
+    ) -> None:
         self._members, self._constants = description.members, description.constants
-        self._methods, self._copies = methods, copies
+        self._methods, self._copies, self._ints = methods, copies, ints
         self._names = {*description.members, *description.constants, *methods.names()}
         self._frames: list[_Frame] = []
         self._sources: dict[CodeType, Source] = {}
@@ -1149,6 +1157,7 @@ class _Followed:
         state: Bindings,
     ) -> Value:
         """Follow a call of a method or a function, while the rest of the statement waits."""
+        self._note_constants(called, values, node)
         frame = self._frame
         live = frame.live
         frame.live = frame.names.outside(node)
@@ -1170,6 +1179,37 @@ class _Followed:
         state.clear()
         state.update(merged)
         return result
+
+    def _note_constants(self, called: Any, values: list[Value], node: ast.expr) -> None:
+        """Note which arguments of a function are constant ints in all of its calls."""
+        if not isinstance(node, ast.Call):
+            return
+        is_method = isinstance(called, Method) and called.kind != "static method"
+        function = called.function if isinstance(called, Method) else called
+        if function is None:
+            return
+        code = function.__code__
+        names = code.co_varnames[int(is_method) : code.co_argcount + code.co_kwonlyargcount]
+        # The source does not contain self.
+        given = dict(zip(names, node.args[len(node.args) - len(values) :], strict=False))
+        given |= {str(each.arg): each.value for each in node.keywords}
+        defaults = dict(zip(reversed(names), reversed(defaults_of(function) or ()), strict=False))
+        for name in names:
+            value = self._number(given[name]) if name in given else defaults.get(name)
+            known = self._ints.get((code, name), 0)
+            is_known = known is not None and isinstance(value, int | float)
+            size = abs(value) if isinstance(value, int) else 0
+            self._ints[code, name] = max(known or 0, size) if is_known else None
+
+    def _number(self, node: ast.expr) -> Any:
+        """Return the value of a constant, or None."""
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+            return self._number(node.operand)
+        if isinstance(node, ast.Constant):
+            return node.value
+        if isinstance(node, ast.Attribute) and self._is_self(node.value):
+            return self._constants.get(node.attr)
+        return resolve(node, self._frame.source)
 
     def _method_call(self, node: ast.Call, called: ast.Attribute, state: Bindings) -> Value | None:
         """Follow `self.method(…)`, `self.x.write(…)`, `super().method(…)`; None for others."""

@@ -128,6 +128,7 @@ class _Lifting(ast.NodeTransformer):
         self._nested = {name for each in ast.walk(tree) for name, _ in _nested(each)} - {tree.name}
         self._variables = bound(tree) - self._nested
         self._lists = self._arrays_for_lists()
+        self._dicts = dict(self._local_dicts())
         known = _trees.get(function.__code__)
         self.functions: dict[str, FunctionType] = dict(known[1]) if known else {}
         # The nested functions that may be called here: how they are called, and their variables.
@@ -181,7 +182,7 @@ class _Lifting(ast.NodeTransformer):
         body = nested.body
         if not isinstance(body, list):
             body = [ast.copy_location(ast.Return(body), body)]
-        tree = _located(ast.FunctionDef(name, given, body, []), nested)
+        tree = _located(ast.FunctionDef(name, _without_types(given), body, []), nested)
         signature = inspect.signature(self._compiled(_signature_only(tree)))
         tree = copy.deepcopy(tree)
         _Passing(self._known, self._mistake).visit(tree)
@@ -238,6 +239,8 @@ class _Lifting(ast.NodeTransformer):
             for keyword in new.keywords:
                 keyword.value = self.visit(keyword.value)
             return new
+        if isinstance(node.func, ast.Attribute) and (table := self._table(node.func.value)):
+            return self._looked_up(node, table, node.args)
         target = self._target(node.func)
         if (reduced := self._reduced(node, target)) is not None:
             return reduced
@@ -322,6 +325,60 @@ class _Lifting(ast.NodeTransformer):
                 node.value = self._as_array(node.value)
             return node
         return self.generic_visit(node)
+
+    def visit_Dict(self, node: ast.Dict) -> ast.AST:
+        """Replace a dict that is only looked up by the tuple of its values."""
+        if not any(node is each for each in self._dicts.values()):
+            return node  # rejected, see checks.py
+        numbers = [each.value for each in node.values if isinstance(each, ast.Constant)]
+        if len(numbers) == len(node.values) and {type(each) for each in numbers} == {int, float}:
+            for each in node.values:
+                each.value = float(each.value)  # type: ignore[attr-defined]
+        values = [self.visit(each) for each in node.values]
+        return _located(ast.Tuple(values, ast.Load()), node)
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
+        """Replace `table[key]` of a dict."""
+        table = self._table(node.value)
+        if table is None:
+            return self.generic_visit(node)
+        return self._looked_up(node, table, [node.slice])
+
+    def _table(self, node: ast.expr) -> ast.Dict | None:
+        return self._dicts.get(node.id) if isinstance(node, ast.Name) else None
+
+    def _looked_up(self, node: ast.expr, table: ast.Dict, given: list[ast.expr]) -> ast.AST:
+        """Return the call that looks up a key, perhaps with a default."""
+        constants = [each.value for each in table.keys if isinstance(each, ast.Constant)]
+        values: ast.expr = node.func.value if isinstance(node, ast.Call) else node.value  # type: ignore[attr-defined]
+        if isinstance(given[0], ast.Constant) and len(constants) == len(table.keys):
+            if given[0].value in constants:
+                place = ast.Constant(constants.index(given[0].value))
+                return _located(ast.Subscript(values, place, ast.Load()), node)
+            if len(given) > 1:
+                return given[1]
+            has = ", ".join(map(repr, constants))
+            name = ast.unparse(values)
+            raise self._mistake(node, f"{name} has no {given[0].value!r}", f"use one of {has}")
+        keys = [ast.Call(_name("rtcf_int"), [copy.deepcopy(each)], []) for each in table.keys if each]
+        function = "rtcf_looked_up" if len(given) == 1 else "rtcf_looked_up_or"
+        parts = [ast.Tuple(keys, ast.Load()), values, *(self.visit(each) for each in given)]
+        return _located(ast.Call(_name(function), parts, []), node)
+
+    def _local_dicts(self) -> Iterator[tuple[str, ast.Dict]]:
+        """Yield the variables that are set once, to a dict with constant keys, and only looked up."""
+        for each in ast.walk(self._tree):
+            if not isinstance(each, ast.Assign) or not isinstance(each.value, ast.Dict):
+                continue
+            target, keys = each.targets[0], each.value.keys
+            if len(each.targets) > 1 or not isinstance(target, ast.Name) or not keys:
+                continue
+            is_constant = [isinstance(key, ast.Constant) or _is_dotted(key) for key in keys]
+            names = [name for name in ast.walk(self._tree) if isinstance(name, ast.Name)
+                     and name.id == target.id]  # fmt: skip
+            uses = [of for of in ast.walk(self._tree) if _is_look_up(of, target.id)]
+            if all(is_constant) and len(names) == 1 + len(uses):
+                yield target.id, each.value
 
     def visit_For(self, node: ast.For) -> ast.AST:
         """Fill an array that is iterated."""
@@ -577,10 +634,32 @@ def _sets(node: ast.AST, name: str) -> bool:
     return isinstance(node, ast.FunctionDef) and node.name == name
 
 
+def _is_dotted(node: ast.AST | None) -> bool:
+    """Tell whether a node is a name of the module, such as `Mode.RUN`."""
+    while isinstance(node, ast.Attribute):
+        node = node.value
+    return isinstance(node, ast.Name) and node.id != "self"
+
+
+def _is_look_up(node: ast.AST, name: str) -> bool:
+    """Tell whether a node is `name[key]` or `name.get(key, default)`."""
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute):
+        is_whole = node.func.attr == "get" and len(node.args) == 2 and not node.keywords
+        return is_whole and isinstance(node.func.value, ast.Name) and node.func.value.id == name
+    return (
+        isinstance(node, ast.Subscript)
+        and isinstance(node.ctx, ast.Load)
+        and isinstance(node.value, ast.Name)
+        and node.value.id == name
+    )
+
+
 def _passed(node: ast.Call, known: Any, mistake: Any) -> ast.Call:
     """Return a call of a nested function that passes the function's variables."""
     assert isinstance(node.func, ast.Name)
     signature, names = known[node.func.id]
+    if any(isinstance(each, ast.Starred) for each in node.args):
+        raise mistake(node, "* unpacks a value that has no fixed size", "write the elements")
     given = [None] * len(node.args)
     try:
         signature.bind(*given, **{str(each.arg): None for each in node.keywords})
@@ -593,13 +672,18 @@ def _passed(node: ast.Call, known: Any, mistake: Any) -> ast.Call:
 
 
 def _signature_only(tree: ast.FunctionDef) -> ast.FunctionDef:
-    """Return a function without annotations that does nothing."""
+    """Return a function that does nothing."""
     new = copy.deepcopy(tree)
     new.body = [ast.Pass()]
-    for each in (*new.args.posonlyargs, *new.args.args, *new.args.kwonlyargs):
-        each.annotation = None
-    new.returns = None
     return ast.fix_missing_locations(new)
+
+
+def _without_types(given: ast.arguments) -> ast.arguments:
+    """Return arguments without annotations."""
+    new = copy.deepcopy(given)
+    for each in (*new.posonlyargs, *new.args, *new.kwonlyargs):
+        each.annotation = None
+    return new
 
 
 def _with_first(names: Sequence[str], given: ast.arguments) -> ast.arguments:

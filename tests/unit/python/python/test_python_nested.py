@@ -114,6 +114,11 @@ WAYS = {
     "sum with a start": "self.y.write(sum((x for x in v), 10.0) + sum((x for x in v), start=u))",
     "sum of a list": "self.y.write(sum([x * x for x in v]))",
     "sum of ints": "self.n = sum(i * i for i in range(COUNT)); self.y.write(u / (1 + self.n))",
+    "sum of bools": "self.n = sum(x > u for x in v) + sum([x > 0.0 for x in v]); self.y.write(self.n)",
+    "annotated nested function": """
+        def half(x: float, by: "float" = 2.0) -> float:
+            return x / by
+        self.y.write(half(u) + half(u, by=4.0))""",
     "sum of rows": """
         self.y.write(sum(row[0] + sum(x for x in row) for row in self.m))
         self.m[0] += v""",
