@@ -34,7 +34,7 @@ REALTIME_HOOKS = ("update", "safe")  # in the real-time thread
 LOG_LEVELS = ("debug", "info", "warn", "error", "fatal")
 # A class keeps the value that was assigned to a declaration under another name.
 ASSIGNED = "__declared_"
-_RESERVED = {*TIME_FIELDS, *HOOKS, *LOG_LEVELS, "configure", "stop", "cleanup", "fault"}
+_RESERVED = {*TIME_FIELDS, *HOOKS, "configure", "stop", "cleanup", "fault"}
 
 
 class MemberAttribute:

@@ -212,6 +212,8 @@ class _Plain:
             for name, member in description.members.items()
             if member.kind in kinds
         }
+        for name in set(LOG_LEVELS) & set(vars(self)[_PORTS]):
+            vars(self)[name] = vars(self)[_PORTS][name]  # hides the method
 
     def __getattr__(self, name: str) -> Any:
         port = vars(self)[_PORTS].get(name)
@@ -400,6 +402,11 @@ class _Operations(CommonRewriting):
         if target is sum or isinstance(of, ast.GeneratorExp | ast.ListComp):
             return self.generic_visit(node)
         return super().visit_Call(node)
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
+        if isinstance(resolve(node.value, self.source), type(np.r_) | type(np.c_)):
+            return self.generic_visit(node)
+        return super().visit_Subscript(node)
 
     def visit_If(self, node: ast.If) -> ast.AST:
         return self._counted(node)

@@ -591,8 +591,8 @@ class Bounds:
             return float(abs(given)) if type(given) in (int, bool) else None
         if isinstance(value, ir.Var):
             return self._of(value)
-        if isinstance(value, ir.Arg) and isinstance(kind, types.Integer | types.Boolean):
-            return float(self._numbers.bounds.get(value.name, _by_type(number.dtype)))
+        if isinstance(value, ir.Arg) and value.name in self._numbers.bounds:
+            return float(self._numbers.bounds[value.name])
         bound = self._of_expression(value) if isinstance(value, ir.Expr) else None
         if bound is None and number is not None and not number.is_array:
             return _by_type(number.dtype)

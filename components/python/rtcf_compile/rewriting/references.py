@@ -108,7 +108,7 @@ class References:
     def __init__(self, description: Description, methods: Methods) -> None:
         """Follow the hooks of a class; raise Mistake for a change that would differ."""
         self.copies: set[Site] = set()
-        # The largest absolute int that calls pass for an argument as a constant; None: another value.
+        # The largest absolute int that calls pass for an argument; None: also other values.
         self.constants: dict[tuple[CodeType, str], int | None] = {}
         found = -1
         while len(self.copies) > found:

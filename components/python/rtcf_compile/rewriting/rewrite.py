@@ -182,7 +182,7 @@ class Hook(Ports):
         if own is not None and node.args and self._is_self(node.args[0]):
             return self._nested(node, own)
         if isinstance(called, ast.Attribute) and self._is_self(called.value):
-            is_log = called.attr in LOG_LEVELS and self._methods.find(called.attr) is None
+            is_log = called.attr in LOG_LEVELS and called.attr not in self._own_names()
             if is_log:
                 arguments = [self.visit(each) for each in node.args[1:]]
                 number = self._logs.add(called.attr, node, self.source)
@@ -256,7 +256,7 @@ class Hook(Ports):
         """Return a log call of an enum's name as one call per name; None for other statements."""
         if not isinstance(call.func, ast.Attribute) or call.func.attr not in LOG_LEVELS:
             return None
-        if self._methods.find(call.func.attr) is not None:
+        if call.func.attr in self._own_names():
             return None
         for number, each in enumerate(call.args[1:]):
             if not isinstance(each, ast.Attribute) or each.attr != "name":
@@ -277,6 +277,10 @@ class Hook(Ports):
                 result = [like(node, ast.If(copy.deepcopy(test), [statement], result))]
             return result[0]
         return None
+
+    def _own_names(self) -> set[str]:
+        """Return the names that hide the methods of Component."""
+        return {*self._methods.names(), *self._description.members}
 
     def _of_super(self, node: ast.Attribute) -> Method:
         method = self._methods.find(node.attr, behind=self._owner)

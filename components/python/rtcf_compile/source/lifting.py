@@ -18,6 +18,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from rtcf_compile.source.mistake import at
+from rtcf_compile.source.port_loops import by_port, leaves
 from rtcf_compile.source.scopes import bound, free
 
 _Node = TypeVar("_Node", bound=ast.AST)
@@ -146,10 +147,37 @@ class _Lifting(ast.NodeTransformer):
             nested = next(_nested(node), None)
             if nested is not None:
                 self._define(node, *nested)
-            else:
-                new.append(self.visit(node))
+                continue
+            for each in self._simpler(node):
+                new.append(self.visit(each))
         body[:] = new or [ast.copy_location(ast.Pass(), body[0])]
         self._known = outside
+
+    def _simpler(self, node: ast.stmt) -> list[ast.stmt]:
+        """Return the body of `with np.errstate(…)`, which has no meaning when compiled, and of a
+        loop over ports once for each of them; other statements as they are.
+        """
+        if isinstance(node, ast.With) and all(map(self._is_errstate, node.items)):
+            return [part for each in node.body for part in self._simpler(each)]
+        if isinstance(node, ast.For) and not node.orelse and not leaves(node.body):
+            rounds = by_port(node.target, node.iter, node.body)
+            if rounds is not None:
+                return [
+                    part
+                    for ports, before in rounds
+                    for each in [*before, *node.body]
+                    for part in self._simpler(_Named(ports).visit(copy.deepcopy(each)))
+                ]
+        return [node]
+
+    def _is_errstate(self, item: ast.withitem) -> bool:
+        call = item.context_expr
+        return (
+            isinstance(call, ast.Call)
+            and self._target(call.func) is np.errstate
+            and item.optional_vars is None
+            and all(getattr(each.value, "value", "") == "ignore" for each in call.keywords)
+        )
 
     def generic_visit(self, node: ast.AST) -> ast.AST:
         """Visit the parts of a node, and the statements of its blocks in order."""
@@ -233,6 +261,8 @@ class _Lifting(ast.NodeTransformer):
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
         """Pass variables to nested functions; replace comprehensions as arguments."""
+        if any(isinstance(each, ast.Starred) for each in node.args):
+            node = self._without_star(node)
         if isinstance(node.func, ast.Name) and node.func.id in self._known:
             new = _passed(node, self._known, self._mistake)
             new.args = [self.visit(each) for each in new.args]
@@ -249,8 +279,9 @@ class _Lifting(ast.NodeTransformer):
             elements = self._written_out(first)
             if elements is not None:
                 return self.visit(_located(ast.Tuple(elements, ast.Load()), node))  # type: ignore[no-any-return]
-        if len(node.args) == 1 and not node.keywords and isinstance(first, ast.ListComp) and (
-            any(target is each for each in _ARRAYS)
+        is_array = any(target is each for each in _ARRAYS) and not node.keywords
+        if is_array and len(node.args) == 1 and isinstance(first, ast.ListComp) and (
+            self._of_ports(first) is None
         ):  # fmt: skip
             return self._filled(first)
         if self._is_neutral(node.func, target):
@@ -260,6 +291,44 @@ class _Lifting(ast.NodeTransformer):
                 keyword.value = self.visit(keyword.value)
             return node
         return self.generic_visit(node)
+
+    def _without_star(self, node: ast.Call) -> ast.Call:
+        """Return a call with the elements of `*values`, if their number is known."""
+        target, known = self._target(node.func), self._known.get(ast.unparse(node.func))
+        if target in (max, min) and len(node.args) == 1 and isinstance(node.args[0], ast.Starred):
+            return _located(ast.Call(node.func, [node.args[0].value], node.keywords), node)
+        stars = [each for each in node.args if isinstance(each, ast.Starred)]
+        if known is not None:
+            takes = known[0].parameters.values()
+        elif isinstance(target, FunctionType):
+            takes = inspect.signature(target).parameters.values()
+        else:
+            return node  # rejected, see checks.py
+        named = {each.arg for each in node.keywords}
+        left = [each for each in takes if each.name not in named]
+        # With defaults, the number of values would decide which arguments are given.
+        is_open = any(each.default is not each.empty or each.kind is each.VAR_POSITIONAL
+                      for each in left)  # fmt: skip
+        count = len(left) - len(node.args) + 1
+        if len(stars) > 1 or count < 1 or is_open:
+            return node
+        names = [f"rtcf_of_{number}" for number in range(len(node.args) + count - 1)]
+        before: list[ast.stmt] = []
+        place = 0
+        for each in node.args:
+            target_of: ast.expr = ast.Name(names[place], ast.Store())
+            value, size = each, 1
+            if isinstance(each, ast.Starred):
+                size, value = count, each.value
+                parts: list[ast.expr] = [
+                    ast.Name(name, ast.Store()) for name in names[place : place + count]
+                ]
+                target_of = ast.Tuple(parts, ast.Store())
+            before.append(_located(ast.Assign([target_of], value), each))
+            place += size
+        call = ast.Call(node.func, [_name(each) for each in names], node.keywords)
+        before.append(_located(ast.Return(_located(call, node)), node))
+        return self._own_function(node, "star", before)
 
     def _is_neutral(self, called: ast.expr, target: Any) -> bool:
         """Tell whether a call takes a list and an array alike."""
@@ -284,6 +353,14 @@ class _Lifting(ast.NodeTransformer):
         """Return the call of a loop for `sum(x for x in …)` and its like, or None."""
         reduction = next((each for each in _REDUCTIONS if each.function is target), None)
         of = node.args[0] if node.args else None
+        if isinstance(of, ast.ListComp | ast.GeneratorExp) and target in (sum, any, all, max, min):
+            ports = self._of_ports(of)
+            if ports is not None and not of.generators[0].ifs:
+                if target in (any, all):
+                    sign = ast.Or() if target is any else ast.And()
+                    return self.visit(_located(ast.BoolOp(sign, ports), node))  # type: ignore[no-any-return]
+                node.args[0] = _located(ast.Tuple(ports, ast.Load()), of)
+                return self.generic_visit(node)
         if reduction is None or not isinstance(of, reduction.takes):
             return None
         given = [*node.args[1:], *(each.value for each in node.keywords)]
@@ -339,10 +416,24 @@ class _Lifting(ast.NodeTransformer):
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
         """Replace `table[key]` of a dict."""
+        joined = self._joined(node)
+        if joined is not None:
+            return self.visit(_located(joined, node))  # type: ignore[no-any-return]
         table = self._table(node.value)
         if table is None:
             return self.generic_visit(node)
         return self._looked_up(node, table, [node.slice])
+
+    def _joined(self, node: ast.Subscript) -> ast.Call | None:
+        """Return `np.r_[a, b]` or `np.c_[a, b]` as a call of a function, or None."""
+        of = self._target(node.value)
+        name = "hstack" if of is np.r_ else "column_stack" if of is np.c_ else ""
+        parts = node.slice.elts if isinstance(node.slice, ast.Tuple) else []
+        if not name or not parts or any(isinstance(each, ast.Slice) for each in parts):
+            return None
+        assert isinstance(node.value, ast.Attribute)
+        called = ast.Attribute(node.value.value, name, ast.Load())
+        return ast.Call(called, [node.slice], [])
 
     def _table(self, node: ast.expr) -> ast.Dict | None:
         return self._dicts.get(node.id) if isinstance(node, ast.Name) else None
@@ -360,13 +451,15 @@ class _Lifting(ast.NodeTransformer):
             has = ", ".join(map(repr, constants))
             name = ast.unparse(values)
             raise self._mistake(node, f"{name} has no {given[0].value!r}", f"use one of {has}")
-        keys = [ast.Call(_name("rtcf_int"), [copy.deepcopy(each)], []) for each in table.keys if each]
+        keys = [
+            ast.Call(_name("rtcf_int"), [copy.deepcopy(each)], []) for each in table.keys if each
+        ]
         function = "rtcf_looked_up" if len(given) == 1 else "rtcf_looked_up_or"
         parts = [ast.Tuple(keys, ast.Load()), values, *(self.visit(each) for each in given)]
         return _located(ast.Call(_name(function), parts, []), node)
 
     def _local_dicts(self) -> Iterator[tuple[str, ast.Dict]]:
-        """Yield the variables that are set once, to a dict with constant keys, and only looked up."""
+        """Yield the variables that are set once, to a dict of constant keys, and only looked up."""
         for each in ast.walk(self._tree):
             if not isinstance(each, ast.Assign) or not isinstance(each.value, ast.Dict):
                 continue
@@ -395,7 +488,9 @@ class _Lifting(ast.NodeTransformer):
         return self.visit(node)  # type: ignore[no-any-return]
 
     def _filled(self, node: _Comprehension) -> ast.expr:
-        """Return the call of a loop that fills an array."""
+        """Return the call of a loop that fills an array; a list for a comprehension over ports."""
+        if not node.generators[0].ifs and (ports := self._of_ports(node)) is not None:
+            return self.generic_visit(_located(ast.List(ports, ast.Load()), node))  # type: ignore[return-value]
         if len(node.generators) > 1 or node.generators[0].ifs:
             if (elements := self._written_out(node)) is not None:
                 return self.visit(_located(ast.List(elements, ast.Load()), node))  # type: ignore[no-any-return]
@@ -456,9 +551,12 @@ class _Lifting(ast.NodeTransformer):
             for test in reversed(each.ifs):
                 body = [_located(ast.If(test, body, []), test)]
             body = [_located(ast.For(each.target, each.iter, body, []), node)]
+        return self._own_function(node, kind, [*before, *_placed(texts[0], node, given, loop=body)])
+
+    def _own_function(self, node: ast.expr, kind: str, body: list[ast.stmt]) -> ast.Call:
+        """Return the call of a function with these statements."""
         name = f"rtcf_{kind}_{node.lineno}_{node.col_offset}"
-        tree = ast.FunctionDef(name, _arguments([]), [], [])
-        tree.body = [*before, *_placed(texts[0], node, given, loop=body)]
+        tree = ast.FunctionDef(name, _arguments([]), body, [])
         tree = copy.deepcopy(_located(tree, node))
         _Passing(self._known, self._mistake).visit(tree)
         names = self._taken(tree)
@@ -467,8 +565,19 @@ class _Lifting(ast.NodeTransformer):
         call = ast.Call(_name(name), [_name(each) for each in names], [])
         return _located(call, node)
 
+    def _of_ports(self, node: _Comprehension) -> list[ast.expr] | None:
+        """Return the elements of a comprehension over ports, or None."""
+        first, conditions = node.generators[0], node.generators[0].ifs
+        used = [ast.Expr(each) for each in (node.elt, *conditions)]
+        rounds = by_port(first.target, first.iter, used)
+        if len(node.generators) > 1 or rounds is None or any(before for _, before in rounds):
+            return None
+        return [_Named(ports).visit(copy.deepcopy(node.elt)) for ports, _ in rounds]
+
     def _written_out(self, node: _Comprehension) -> list[ast.expr] | None:
-        """Return the elements of a comprehension over a few constants or names, or None."""
+        """Return the elements of a comprehension over a few constants, names or ports, or None."""
+        if not node.generators[0].ifs and (ports := self._of_ports(node)) is not None:
+            return ports
         if any(isinstance(each, ast.NamedExpr) for each in ast.walk(node)):
             return None
         found: list[dict[str, ast.expr]] = [{}]
