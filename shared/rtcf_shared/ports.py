@@ -15,7 +15,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 _STATE = re.compile(
-    r"^(bool|float|double|u?int(?:8|16|32|64))(?:\[(\d+)(?:x(\d+)(,RowMajor)?)?\])?$"
+    r"^(bool|float|double|u?int(?:8|16|32|64))"
+    r"(?:\[(\d+)(?:x(\d+)(,RowMajor)?)?\]|\[(\d+)x(\d+)x(\d+)\])?$"
 )
 _FORMATS = {"bool": "?", "float": "<f4", "double": "<f8"}
 
@@ -244,9 +245,11 @@ def _signals(number: int, name: str, column: ports_pb2.PortColumn) -> Iterator[S
     match = _STATE.match(column.type)
     if match is None:
         return  # a structure with unknown fields
-    kind, rows, columns, by_rows = match.groups()
+    kind, rows, columns, by_rows, *three = match.groups()
     form = _FORMATS.get(kind) or f"<{'u' if kind[0] == 'u' else 'i'}{int(kind.strip('uint')) // 8}"
-    if rows is None:
+    if three[0] is not None:
+        yield Signal(name, column.unit, number, form, tuple(map(int, three)), 0)
+    elif rows is None:
         yield Signal(name, column.unit, number, form, (), 0)
     elif columns is None or "1" in (rows, columns):
         yield Signal(name, column.unit, number, form, (int(rows) * int(columns or 1),), 0)

@@ -121,6 +121,7 @@ class Faulty(Component):
     mode: State[Mode]
     g: State[np.float32, 2]
     h: State[np.uint8, 2]
+    s: State[np.float64, 2, 2, 2]
     LIMIT = 2.0
 """
 
@@ -201,7 +202,27 @@ UPDATE: dict[str, tuple[str, str]] = {
     "determinant of a vector": ("self.f = np.linalg.det(self.z)", "matri"),
     "trace of a vector": ("self.f = np.trace(self.z)", "matri"),
     "reshape to another size": ("self.m[:] = self.z.reshape(2, 2)", "reshape"),
-    "reshape to three sizes": ("a = self.m.reshape(1, 2, 2)", "one or two"),
+    "reshape to four sizes": ("a = self.m.reshape(1, 1, 2, 2)", "one to three"),
+    "part of three dimensions in another shape": (
+        "a = self.s[:, 1:].reshape(4)",
+        "copy it first",
+    ),
+    "part of a matrix in three dimensions": (
+        "a = self.m[:, 1:].reshape(1, 1, 2)",
+        "copy it first",
+    ),
+    "matrix kept in three dimensions": ("self.s = self.m", "3 dimensions"),
+    "vector added to three dimensions": ("self.s[:] = self.s + np.zeros(3)", "(3,)"),
+    "product of three dimensions": ("a = self.s @ self.z", "use its matrices"),
+    "inverse of three dimensions": ("a = np.linalg.inv(self.s)", "a matrix"),
+    "sort of three dimensions": ("a = np.sort(self.s)", "3 dimensions"),
+    "sort of three dimensions in place": ("self.s.sort()", "3 dimensions"),
+    "sums of three dimensions along an axis": ("a = np.cumsum(self.s, axis=1)", "3 dimensions"),
+    "three dimensions joined": ("a = np.concatenate((self.s, self.s))", "3 dimensions"),
+    "trace of three dimensions": ("self.f = np.trace(self.s)", "3 dimensions"),
+    "array as an index of three dimensions": ("a = self.s[[0, 1]]", "a whole mask"),
+    "mask of rows of three dimensions": ("self.s[self.z > 0.0] = 0.0", "a whole mask"),
+    "new axis of a matrix": ("a = self.m[None]", "a new axis"),
     "hstack of other heights": ("a = np.hstack((self.m, B))", "fit"),
     "ragged array": ("a = np.array([[1.0, 2.0], [3.0]])", "rows"),
     "ragged constant": ("a = np.array(POINTS)", "rows"),
@@ -226,6 +247,9 @@ UPDATE: dict[str, tuple[str, str]] = {
     "constant index of a parameter": ("self.f = self.gains[2]", "2 elements"),
     "constant row beyond the size": ("self.f = self.m[2, 0]", "2 rows"),
     "constant column beyond the size": ("self.f = self.m[0, 2]", "2 columns"),
+    "constant index along the last axis": ("self.f = self.s[0, 0, 2]", "2 elements along axis 2"),
+    "constant index along the first axis": ("self.m[:] = self.s[2]", "2 elements along axis 0"),
+    "four indices": ("self.f = self.s[0, 0, 0, 0]", "3 dimensions"),
     "constant index of a constant": ("self.f = TABLE[3]", "3 elements"),
     "constant index of a tuple": ("self.f = LIMITS[2]", "2 elements"),
     "constant index set": ("self.c[3] = 1", "3 elements"),
@@ -587,7 +611,11 @@ CLASS: dict[str, tuple[str, str]] = {
     "size in another bracket": ("v: State[np.float64][3]", "two pairs of brackets"),
     "size of 0": ("v: State[np.float64, 0]", "size"),
     "size as a float": ("v: State[np.float64, 2.0]", "size"),
-    "three sizes": ("v: State[np.float64, 2, 2, 2]", "size"),
+    "four sizes": ("v: State[np.float64, 2, 2, 2, 2]", "one to three sizes"),
+    "three sizes of an input": ("v: Input[np.float64, 2, 2, 2]", "at most two"),
+    "three sizes of an output": ("v: Output[np.float64, 2, 2, 2]", "at most two"),
+    "three sizes of a parameter": ("v: Parameter[np.float64, 2, 2, 2] = 0.0", "at most two"),
+    "three sizes of a queue": ("v: Queue[np.float64, 2, 2, 2] = Queue(size=2)", "at most two"),
     "size before the type": ("v: State[3, np.float64]", "size"),
     "complex state": ("v: State[complex]", "complex"),
     "any as a state": ("v: State[Any]", "Any"),

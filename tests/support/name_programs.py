@@ -48,6 +48,7 @@ MEMBERS = """\
     c{n}: State[np.float64, 4]
     m{n}: State[np.float64, 4, 4]
     k{n}: State[np.float64, 4, 4]
+    t{n}: State[np.float64, 2, 4, 4]
     s{n}: State[float]
 """
 PLAIN = """\
@@ -80,18 +81,20 @@ class Plain:
         self.y{n}, self.z{n} = Out(4), Out((4, 4))
         self.a{n}, self._b{n}, self.c{n} = np.zeros(4), np.zeros(4), np.zeros(4)
         self.m{n}, self.k{n} = np.zeros((4, 4)), np.zeros((4, 4))
+        self.t{n} = np.zeros((2, 4, 4))
         self.s{n} = 0.0
 """
 
 
 @dataclass
 class _Scope:
-    """The local names of a function: vectors, matrices, pairs and nested functions; `outside`: the
-    vectors of the function around it.
+    """The local names of a function: vectors, matrices, arrays of three dimensions, pairs and nested
+    functions; `outside`: the vectors of the function around it.
     """
 
     vectors: list[str] = field(default_factory=list)
     matrices: list[str] = field(default_factory=list)
+    blocks: list[str] = field(default_factory=list)
     pairs: list[str] = field(default_factory=list)
     depth: int = 0
     has_methods: bool = True
@@ -101,8 +104,8 @@ class _Scope:
     def inner(self) -> "_Scope":
         """Return the scope of a block that may not run."""
         return _Scope(
-            list(self.vectors), list(self.matrices), list(self.pairs), self.depth + 1,
-            self.has_methods, list(self.functions), self.outside,
+            list(self.vectors), list(self.matrices), list(self.blocks), list(self.pairs),
+            self.depth + 1, self.has_methods, list(self.functions), self.outside,
         )  # fmt: skip
 
     def nested(self) -> "_Scope":
@@ -213,6 +216,8 @@ class _Drawn:
             "transposed": lambda: f"{self._member(MATRICES)}.T[{index}]",
             "reversed": lambda: f"{simple()}[::-1]",
             "whole slice": lambda: f"{simple()}[:]",
+            "row of a block": lambda: f"{self._block_view(scope)}[{index % 2}, {index}]",
+            "column of a block": lambda: f"{self._block_view(scope)}[{index % 2}, :, {index}]",
             "output": lambda: f"self.y{n}.value",
             "input": lambda: f"self.{self._one('v', 'w')}.value",
             "diagonal": lambda: f"np.diag({matrix()})",
@@ -292,11 +297,21 @@ class _Drawn:
     def _matrix_view(self, scope: _Scope) -> str:
         draw = self._draw
         ways: list[Callable[[], str]] = [lambda: self._member(MATRICES)] * 4
+        ways += [
+            lambda: self._feature(
+                "matrix of a block", f"{self._block_view(scope)}[{draw.randrange(2)}]"
+            )
+        ]
         if scope.matrices:
             ways += [lambda: draw.choice(scope.matrices)] * 3
         ways += [lambda n=n: self._feature("matrix method", f"self.{n}()")
                  for n in self._calls("matrix", scope)] * 2  # fmt: skip
         return draw.choice(ways)()
+
+    def _block_view(self, scope: _Scope) -> str:
+        if scope.blocks and self._likely(0.4):
+            return self._draw.choice(scope.blocks)
+        return f"self.t{self._n}"
 
     def _matrix(self, scope: _Scope, depth: int = 0) -> str:
         if depth > 1 or self._likely(0.4):
@@ -336,6 +351,7 @@ class _Drawn:
             *("element", "element of a name", "slice", "in place", "in place name", "swap", "swap"),
             *("swap by a name", "pair", "unpacked", "output", "output in place", "scalar", "call"),
             *("row set", "chain", "matrix in place", "fill", "nested function"),
+            *("block name", "block member", "block part set", "block in place"),
             *(("member of a member",) if self._likely(0.4) else ()),
             *(("if", "for", "for rows", "while") if scope.depth < 2 else ()),
         )
@@ -368,6 +384,21 @@ class _Drawn:
             return [indent + self._feature(kind, text)]
         if kind == "row set":
             text = f"{self._matrix_view(scope)}[{i}] = {self._vector(scope)}"
+            return [indent + self._feature(kind, text)]
+        if kind == "block name":
+            given = self._block_view(scope)
+            if self._likely(0.3):
+                given = f"0.5 * {given}"
+            return [f"{indent}{self._feature(kind, self._target(scope.blocks, 'd'))} = {given}"]
+        if kind == "block member":
+            given = f"0.5 * {self._block_view(scope)} + {self._matrix(scope, 1)}"
+            return [indent + self._feature(kind, f"self.t{n} = {given}")]
+        if kind == "block part set":
+            part, given = self._one(f"{i % 2}", ":"), self._vector(scope, 1)
+            text = f"{self._block_view(scope)}[{part}{self._one('', f', {i}', f', :, {i}')}]"
+            return [indent + self._feature(kind, f"{text} {self._one('=', '+=')} {given}")]
+        if kind == "block in place":
+            text = f"{self._block_view(scope)} {self._one('*=', '-=')} 0.5"
             return [indent + self._feature(kind, text)]
         if kind == "fill":
             return [indent + self._feature(kind, f"{self._simple(scope)}.fill({i}.0)")]
@@ -475,7 +506,8 @@ class _Drawn:
         i = self._draw.randrange(SIZE)
         return self._one(
             f"{self._simple(scope)}[{i}]", f"self.s{self._n} + 1.0", f"self.v.value[{i}]",
-            f"np.sum({self._vector_view(scope)})", f"{i}.0", self._reduced(scope),
+            f"np.sum({self._vector_view(scope)})", f"{i}.0", f"self.t{self._n}[{i % 2}, {i}, 0]",
+            f"np.sum({self._block_view(scope)}, axis={i % 3})[0, 1]", self._reduced(scope),
         )  # fmt: skip
 
     def _reduced(self, scope: _Scope) -> str:

@@ -320,6 +320,11 @@ def _member(owner: type, name: str, annotation: object, line: int) -> Member:
             remedy = "set it in prepare" if kind is Derived else "remove the value"
             raise DeclarationError(f"is {_a(kind)}, which has no initial value: {remedy}")
         initial = given
+    if len(declared.shape) > 2 and kind not in (State, Derived):
+        raise DeclarationError(
+            f"has {len(declared.shape)} dimensions, but {_a(kind)} has at most two: "
+            f"declare one or two sizes, or a State"
+        )
     if declared.optional and kind is not State:
         raise DeclarationError("may be None, but only a State may be None: use .valid of an Input")
     if kind is Parameter and initial is None:

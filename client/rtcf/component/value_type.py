@@ -85,8 +85,8 @@ def value_type(declared: Any) -> ValueType:
             raise DeclarationError(
                 f"has the size {given}: use an integer above 0, as in np.float64, 3"
             )
-    if len(sizes) > 2:
-        raise DeclarationError(f"has {len(sizes)} dimensions: declare one or two sizes")
+    if len(sizes) > 3:
+        raise DeclarationError(f"has {len(sizes)} dimensions: declare one to three sizes")
     if isinstance(element, type) and issubclass(element, enum.IntEnum):
         if sizes:
             raise DeclarationError("is an array of enums: declare an array of np.int64")

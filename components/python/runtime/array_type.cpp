@@ -18,7 +18,8 @@ namespace rtcf::python {
 namespace {
 
 std::size_t countOf(const TypeTable& type) noexcept {
-    return static_cast<std::size_t>(type.rows * type.columns);
+    return static_cast<std::size_t>(std::max<std::int64_t>(type.depth, 1) * type.rows *
+                                    type.columns);
 }
 
 /// Eigen aligns a matrix to the largest power of two that divides its size, within bounds.
@@ -130,6 +131,12 @@ Described describe(const TypeTable& type) {
 template <typename T>
 std::uint64_t identityOfState(const TypeTable& type) {
     std::uint64_t hash = StateType<T>::identity();
+    if (type.depth > 0) {
+        for (const std::int64_t size : {type.columns, type.rows, type.depth})
+            hash = detail::stateHash(static_cast<std::uint64_t>(size),
+                                     detail::stateHash("array", hash));
+        return hash;
+    }
     if (!isMatrix(type))
         return detail::stateHash(std::uint64_t{countOf(type)}, detail::stateHash("array", hash));
     hash = detail::stateHash(static_cast<std::uint64_t>(type.rows), hash);
@@ -139,6 +146,10 @@ std::uint64_t identityOfState(const TypeTable& type) {
 
 template <typename T>
 std::string nameOfState(const TypeTable& type) {
+    if (type.depth > 0) {
+        return fmt::format("{}[{}x{}x{}]", StateType<T>::name(), type.depth, type.rows,
+                           type.columns);
+    }
     if (!isMatrix(type)) return fmt::format("{}[{}]", StateType<T>::name(), countOf(type));
     return fmt::format("{}[{}x{}{}]", StateType<T>::name(), type.rows, type.columns,
                        isTransposed(type) ? ",RowMajor" : "");
@@ -326,7 +337,17 @@ std::string rtcf_python_print_state(const TypeTable* type, const void* value) {
         // The bytes may be unaligned.
         const auto elements = std::make_unique<T[]>(countOf(*type));
         std::memcpy(elements.get(), value, sizeOf(*type));
-        if constexpr (std::is_floating_point_v<T>) {
+        if (type->depth > 0) {
+            const auto row = static_cast<std::size_t>(type->columns);
+            const auto matrix = static_cast<std::size_t>(type->rows) * row;
+            for (std::size_t i = 0; i < countOf(*type); ++i) {
+                const char* before = i % row == 0 ? "; " : ", ";
+                if (i % matrix == 0) before = i == 0 ? "[[" : "], [";
+                text += before;
+                StateType<T>::print(elements[i], text);
+            }
+            text += "]]";
+        } else if constexpr (std::is_floating_point_v<T>) {
             detail::printMatrix(matrixOf<T, ByRows<T>>(*type, elements.get()), text);
         } else {
             text += '[';

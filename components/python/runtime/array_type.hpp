@@ -1,7 +1,8 @@
 /// @file
 /// Arrays of any size as types of ports and of state. A table describes each type, which is
 /// identical to a type of C++ components: Eigen::Matrix for float and double, std::array for other
-/// elements. The functions are real-time safe if TypeInfo requires it.
+/// elements. An array of three dimensions is only a state, identical to a std::array of arrays of
+/// arrays. The functions are real-time safe if TypeInfo requires it.
 #pragma once
 
 #include <cstddef>
@@ -15,7 +16,7 @@ namespace rtcf::python {
 
 /// @return whether the type is an Eigen::Matrix for C++ components
 inline bool isMatrix(const TypeTable& type) noexcept {
-    return type.scalar == Scalar::Float || type.scalar == Scalar::Double;
+    return type.depth == 0 && (type.scalar == Scalar::Float || type.scalar == Scalar::Double);
 }
 
 /// @return whether a port stores the elements column by column; the record stores them row by row

@@ -223,6 +223,29 @@ class Axes(Component):
         self.y.write(self.total)
 
 
+class Window(Component):
+    """Weighs the last three matrices."""
+
+    u: Input[np.float64, 2, 2]
+    y: Output[np.float64, 2, 2]
+    share: Parameter[float] = Parameter(0.5, min=0.0, max=1.0)
+    samples: State[np.float64, 3, 2, 2] = State(0.5, unit="m", doc="the latest first")
+    counts: State[np.int16, 3, 2, 2]
+    weights: Derived[np.float64, 3, 2, 2]
+
+    def prepare(self):
+        """Weigh older samples less."""
+        self.weights[:] = self.share
+        self.weights[0] = 1.0
+
+    def update(self):
+        """Shift the samples."""
+        self.samples[1:] = self.samples[:-1]
+        self.samples[0] = np.clip(self.u.value, -1e6, 1e6)
+        self.counts[:, 1, 0] += 1
+        self.y.write(np.sum(self.weights * self.samples, axis=0))
+
+
 class Integrator(Component):
     """Has private members, beside a port of the same name."""
 

@@ -253,6 +253,33 @@ def test_an_array_of_bools_is_set_by_its_elements(daemon: Daemon, client: rtcf.C
     assert refused.returncode == 1 and "no axis" in refused.stderr
 
 
+def test_a_state_has_three_dimensions(tmp_path: Path, daemon: Daemon, client: rtcf.Client) -> None:
+    client.load(rtcf.component("py", "Window", name="window"))
+    found = {each.name: each for each in client.get_component("window").states}
+    types = {name: (each.type, each.unit) for name, each in found.items()}
+    assert types == {"samples": ("double[3x2x2]", "m"), "counts": ("int16[3x2x2]", "")}
+    assert found["samples"].initial == "[[0.5, 0.5; 0.5, 0.5], " * 2 + "[0.5, 0.5; 0.5, 0.5]]"
+    assert daemon.ctl("write", "window.u", "[[1, 2], [3, 4]]").returncode == 0
+    with client.watch_ports(["/window.*"]) as stream:
+        client.step(2)
+        batch = next(iter(stream))
+        samples = batch["/window.samples"]
+    assert samples.shape[1:] == (3, 2, 2)
+    assert samples[-1].tolist() == [[[1.0, 2.0], [3.0, 4.0]]] * 2 + [[[0.5, 0.5], [0.5, 0.5]]]
+    after = _states(client, "window")
+    assert after["counts"] == "[[0, 0; 2, 0], [0, 0; 2, 0], [0, 0; 2, 0]]"
+    snapshot = str(tmp_path / "snapshot")
+    assert daemon.ctl("snapshot", snapshot).returncode == 0
+    client.step(3)
+    assert _states(client, "window") != after
+    assert daemon.ctl("restore", snapshot).returncode == 0
+    assert _states(client, "window") == after
+    client.replace("window", rtcf.component("py", "Window", name="window"))
+    assert _states(client, "window") == after
+    assert daemon.ctl("reset", "window").returncode == 0
+    assert _states(client, "window")["samples"] == found["samples"].initial
+
+
 def test_private_states_lose_their_underscore_outside(
     tmp_path: Path, daemon: Daemon, client: rtcf.Client
 ) -> None:

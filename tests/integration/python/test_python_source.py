@@ -220,6 +220,27 @@ def test_a_saved_source_that_differs_does_not_change_the_loop(
         assert _states(client) == {"count": "1030"}
 
 
+def test_a_state_made_private_keeps_its_value_and_its_snapshots(
+    tmp_path: Path, daemon: Daemon, client: rtcf.Client
+) -> None:
+    source, snapshot = tmp_path / "counts.py", str(tmp_path / "snapshot")
+    plain = COUNTS.replace("STEP", "1")
+    _save(source, plain)
+    with Watching(daemon, str(source), "Counts") as watching:
+        watching.wait_for("loaded /Counts")
+        client.step(10)
+        assert daemon.ctl("snapshot", snapshot).returncode == 0
+        client.step(10)
+        _save(source, plain.replace(" count:", " _count:").replace("self.count", "self._count"))
+        watching.wait_for("reloaded /Counts")
+        client.step(1)
+        assert _states(client) == {"count": "21"}
+        done = daemon.ctl("restore", snapshot)
+        assert done.returncode == 0, done.stderr
+        client.step(1)
+        assert _states(client) == {"count": "11"}
+
+
 @pytest.fixture
 def calls(tmp_path: Path, own_cache: Path) -> Path:
     """Return a file that lists the calls of a compiler of the build tree `tmp_path`."""

@@ -37,8 +37,9 @@ enum class Scalar : std::int64_t {
 /// its functions.
 struct TypeTable {
     Scalar scalar;
-    std::int64_t rows;     ///< 0: a single number
-    std::int64_t columns;  ///< 1: a vector
+    std::int64_t rows;       ///< 0: a single number
+    std::int64_t columns;    ///< 1: a vector
+    std::int64_t depth = 0;  ///< matrices of a state of three dimensions; 0: at most two
     decltype(TypeInfo::make_slot) make_slot = nullptr;
     decltype(TypeInfo::copy) copy = nullptr;
     decltype(TypeInfo::exchange) exchange = nullptr;

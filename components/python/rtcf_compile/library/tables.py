@@ -73,7 +73,7 @@ class _Library:
 
     def __init__(self) -> None:
         self.data = Data()
-        self._types: dict[tuple[str, int, int], Value] = {}
+        self._types: dict[tuple[str, int, int, int], Value] = {}
         self._messages: dict[str, Value] = {}
         self._components = 0
         self.data.add("declare hidden i8* @rtcf_python_create(i8*, i8*)")
@@ -244,17 +244,18 @@ class _Library:
 
     def _type(self, kind: ValueType) -> Value:
         """Return the address of the table of a type."""
-        rows, columns = (*kind.shape, 1)[:2] if kind.shape else (0, 0)
-        if kind.shape and not kind.is_float:
+        depth = kind.shape[0] if len(kind.shape) == 3 else 0
+        rows, columns = (*kind.shape[-2:], 1)[:2] if kind.shape else (0, 0)
+        if kind.shape and not depth and not kind.is_float:
             rows, columns = kind.count, 1
-        key = (kind.scalar.name, rows, columns)
+        key = (kind.scalar.name, rows, columns, depth)
         if key not in self._types:
             name = f"rtcf_type_{len(self._types)}"
             functions = [
                 pointer_to(f"{name}_{each}", _kind(result, taken)) if rows else NULL
                 for each, result, taken in _FUNCTIONS
             ]
-            table = self.data.struct(SCALARS[key[0]], rows, columns, *functions)
+            table = self.data.struct(SCALARS[key[0]], rows, columns, depth, *functions)
             self._types[key] = self.data.name(name, table)
             if rows:
                 for each, result, taken in _FUNCTIONS:

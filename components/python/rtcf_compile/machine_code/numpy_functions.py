@@ -1,4 +1,5 @@
-"""The numba overloads of NumPy functions, for numbers, vectors and matrices.
+"""The numba overloads of NumPy functions, for numbers, vectors and matrices; many also for arrays
+of three dimensions.
 
 Import this only to compile: it imports numba.
 """
@@ -28,6 +29,7 @@ from rtcf_compile.rewriting.operators import is_narrow
 _Numbers = types.Number | types.Boolean
 _lower, _higher = operators.OF[np.minimum], operators.OF[np.maximum]
 _minus = operators.OF[operator.sub]
+_ALL = (1, 2, 3)  # dimensions of arrays
 _LONG = 128  # up to this size, NumPy sums with eight accumulators; it halves longer arrays
 
 
@@ -40,8 +42,9 @@ def _needs(kind: Any, what: str, dimensions: tuple[int, ...] = (1, 2)) -> None:
     """Reject values other than an array of these dimensions."""
     if isinstance(kind, types.Array) and kind.ndim in dimensions:
         return
-    names: dict[tuple[int, ...], str] = {(1,): "a vector", (2,): "a matrix"}
-    raise TypingError(f"RTCF:{what} of {words(kind)}:give it {names.get(dimensions, 'an array')}")
+    names: dict[tuple[int, ...], str] = {(1,): "a vector", (2,): "a matrix", _ALL: "an array"}
+    wanted = names.get(dimensions, "a vector or a matrix")
+    raise TypingError(f"RTCF:{what} of {words(kind)}:give it {wanted}")
 
 
 # Making arrays.
@@ -109,6 +112,17 @@ def _array(object: Any, dtype: Any) -> Any:
                 return result
 
             return vector
+        if object.ndim == 3:
+
+            def matrices(object: Any, dtype: Any) -> Any:
+                result = np.empty(object.shape, wanted)
+                for i in range(object.shape[0]):
+                    for j in range(object.shape[1]):
+                        for k in range(object.shape[2]):
+                            result[i, j, k] = object[i, j, k]
+                return result
+
+            return matrices
 
         def matrix(object: Any, dtype: Any) -> Any:
             result = np.empty(object.shape, wanted)
@@ -127,7 +141,7 @@ def _array(object: Any, dtype: Any) -> Any:
             return lambda object, dtype: own.rtcf_array(own.rtcf_stack(object, 0), dtype)
         return lambda object, dtype: own.rtcf_stack(object, 0)
     shape, leaves = _leaves(object)
-    if not 1 <= len(shape) <= 2 or 0 in shape:
+    if not 1 <= len(shape) <= 3 or 0 in shape:
         raise TypingError(f"RTCF:an array of {words(object)}:give it rows of numbers")
     wanted = _wanted(leaves, dtype)
 
@@ -246,11 +260,11 @@ def _sizes(wanted: Any, count: Any) -> Any:
 
 @compiled_as(own.rtcf_reshape, arrays=("a",))
 def _reshape(a: Any, newshape: Any) -> Any:
-    _needs(a, "np.reshape")
+    _needs(a, "np.reshape", _ALL)
     if isinstance(newshape, types.Integer):
         return lambda a, newshape: own.rtcf_reshape(a, (newshape,))
-    if not isinstance(newshape, types.UniTuple) or newshape.count > 2:
-        raise TypingError(f"RTCF:np.reshape to {words(newshape)}:give one or two sizes")
+    if not isinstance(newshape, types.UniTuple) or newshape.count > 3:
+        raise TypingError(f"RTCF:np.reshape to {words(newshape)}:give one to three sizes")
     if a.layout == "C":
 
         def view(a: Any, newshape: Any) -> Any:
@@ -258,6 +272,9 @@ def _reshape(a: Any, newshape: Any) -> Any:
             return _viewed(a, shape, _strides(shape, a.itemsize))
 
         return view
+    if a.ndim == 3 or (a.ndim == 2 and newshape.count == 3):
+        # NumPy returns a view for some strides, and a copy for others.
+        raise TypingError(f"RTCF:np.reshape of a part of {words(a)}:copy it first: x.copy()")
 
     def reshape(a: Any, newshape: Any) -> Any:
         shape = _filled(newshape, _sizes(newshape, a.size))
@@ -286,6 +303,12 @@ def _filled(shape: Any, rest: Any) -> Any:
 def _filled_in(shape: Any, rest: Any) -> Any:
     if shape.count == 1:
         return lambda shape, rest: (rest if shape[0] < 0 else shape[0],)
+    if shape.count == 3:
+        return lambda shape, rest: (
+            rest if shape[0] < 0 else shape[0],
+            rest if shape[1] < 0 else shape[1],
+            rest if shape[2] < 0 else shape[2],
+        )
     return lambda shape, rest: (
         rest if shape[0] < 0 else shape[0],
         rest if shape[1] < 0 else shape[1],
@@ -300,6 +323,8 @@ def _strides(shape: Any, step: Any) -> Any:
 def _strides_of(shape: Any, step: Any) -> Any:
     if shape.count == 1:
         return lambda shape, step: (step,)
+    if shape.count == 3:
+        return lambda shape, step: (step * shape[1] * shape[2], step * shape[2], step)
     return lambda shape, step: (step * shape[1], step)
 
 
@@ -360,9 +385,11 @@ def _any_layout(typing: Any, array: Any) -> Any:
 
 @compiled_as(own.rtcf_ravel, arrays=("a",))
 def _ravel(a: Any) -> Any:
-    _needs(a, "np.ravel")
+    _needs(a, "np.ravel", _ALL)
     if a.ndim == 1:
         return lambda a: own.rtcf_contiguous(a)
+    if a.ndim == 3:
+        return lambda a: _viewed(own.rtcf_contiguous(a), (a.size,), (a.itemsize,))
     return lambda a: own.rtcf_reshape(own.rtcf_contiguous(a), (a.size,))
 
 
@@ -379,7 +406,7 @@ def _is_contiguous(a: Any) -> Any:
 
 @compiled_as(own.rtcf_contiguous, arrays=("a",))
 def _contiguous(a: Any) -> Any:
-    _needs(a, "np.ascontiguousarray")
+    _needs(a, "np.ascontiguousarray", _ALL)
     if a.layout == "C":
         return lambda a: a
     return lambda a: _any_layout(a) if _is_contiguous(a) else _any_layout(a.copy())
@@ -387,9 +414,11 @@ def _contiguous(a: Any) -> Any:
 
 @compiled_as(own.rtcf_flatten, arrays=("a",))
 def _flatten(a: Any) -> Any:
-    _needs(a, "flatten")
+    _needs(a, "flatten", _ALL)
     if a.ndim == 1:
         return lambda a: own.rtcf_array(a, None)
+    if a.ndim == 3:
+        return lambda a: own.rtcf_array(own.rtcf_ravel(a), None)
 
     def flatten(a: Any) -> Any:
         result = np.empty(a.size, a.dtype)
@@ -463,7 +492,7 @@ def _arrays_of(name: str, given: Any, what: str, helper: str, numbers: bool, res
     """Return None if a tuple has only arrays, else a function that converts its rows and numbers to
     arrays and calls the helper again.
     """
-    if isinstance(given, types.Array) and given.ndim == 2:
+    if isinstance(given, types.Array) and given.ndim > 1:
         raise TypingError(f"RTCF:{what} of one matrix:give it several arrays")
     if not isinstance(given, types.BaseTuple) or not given.count:
         raise TypingError(f"RTCF:{what} of {words(given)}:give it a tuple of arrays")
@@ -478,7 +507,7 @@ def _arrays_of(name: str, given: Any, what: str, helper: str, numbers: bool, res
         elif isinstance(each, _Numbers) and numbers:
             parts.append(f"array(({name}[{k}],), None)")
         else:
-            raise TypingError(f"RTCF:{what} of {words(each)}:give it arrays")
+            raise TypingError(f"RTCF:{what} of {words(each)}:give it vectors or matrices")
     more = "".join(f", {each}" for each in rest.split(", ") if each)
     text = f"def again({name}{more}):\n    return helper(({', '.join(parts)},){more})\n"
     scope = {"array": own.rtcf_array, "helper": getattr(own, helper)}
@@ -543,8 +572,10 @@ def _stack(arrays: Any, axis: Any) -> Any:
     again = _arrays_of("arrays", arrays, "np.stack", "rtcf_stack", False, "axis")
     if again is not None:
         return again
+    if all(each.ndim == 2 for each in arrays.types):
+        return _stacked_matrices(arrays.types)
     if any(each.ndim != 1 for each in arrays.types):
-        raise TypingError("RTCF:np.stack of matrices:use np.vstack, or parts of a larger array")
+        raise TypingError("RTCF:np.stack of vectors and matrices:give all the same dimensions")
     below = plain(_joined("arrays", arrays.types, 0))
     beside = plain(_joined("arrays", arrays.types, 1))
 
@@ -556,6 +587,31 @@ def _stack(arrays: Any, axis: Any) -> Any:
         return beside(arrays)
 
     return stack
+
+
+def _stacked_matrices(parts: Any) -> Any:
+    """Return the function that makes an array of three dimensions from matrices."""
+    result = np.result_type(*(_dtype(each) for each in parts))
+    count = len(parts)
+    places = {0: "{k}", 1: ":, {k}", 2: ":, :, {k}"}
+    shapes = {0: f"({count}, n, m)", 1: f"(n, {count}, m)", 2: f"(n, m, {count})"}
+    lines = ["def stacked(arrays, axis):", "    n, m = arrays[0].shape"]
+    for k in range(1, count):
+        lines += [
+            f"    if arrays[{k}].shape != arrays[0].shape:",
+            '        raise ValueError("arrays to join do not fit")',
+        ]
+    for axis in range(3):
+        lines += [
+            f"    if axis == {axis} or axis == {axis - 3}:",
+            f"        result = np.empty({shapes[axis]}, wanted)",
+            *(f"        assign(result[{places[axis].format(k=k)}], arrays[{k}])"
+              for k in range(count)),
+            "        return result",
+        ]  # fmt: skip
+    lines.append('    raise ValueError("np.stack: axis is out of bounds")')
+    scope = {"np": np, "wanted": result, "assign": helpers.rtcf_assign}
+    return _function("\n".join(lines), "stacked", scope)
 
 
 @compiled_as(own.rtcf_roll, arrays=("a",))
@@ -574,9 +630,11 @@ def _roll(a: Any, shift: Any) -> Any:
 
 @compiled_as(own.rtcf_flip, arrays=("m",))
 def _flip(m: Any) -> Any:
-    _needs(m, "np.flip")
+    _needs(m, "np.flip", _ALL)
     if m.ndim == 1:
         return lambda m: m[::-1]
+    if m.ndim == 3:
+        return lambda m: m[::-1, ::-1, ::-1]
     return lambda m: m[::-1, ::-1]
 
 
@@ -651,9 +709,11 @@ def _kron(a: Any, b: Any) -> Any:
 
 @compiled_as(own.rtcf_diff, arrays=("a",))
 def _diff(a: Any) -> Any:
-    _needs(a, "np.diff")
+    _needs(a, "np.diff", _ALL)
     if a.ndim == 1:
         return lambda a: a[1:] - a[:-1]
+    if a.ndim == 3:
+        return lambda a: a[:, :, 1:] - a[:, :, :-1]
     return lambda a: a[:, 1:] - a[:, :-1]
 
 
@@ -866,9 +926,10 @@ def _product_of(a: Any) -> Any:
 def _reduction(
     helper: Any, name: str, whole: Any, column: Any = None, result: Any = None, keeps: bool = False
 ) -> None:
-    """Register a reduction of an array, or of each row or column.
+    """Register a reduction of an array, or along one axis.
 
-    `whole`: reduces a vector. `column`: reduces a column of a matrix (default: `whole`).
+    `whole`: reduces a vector. `column`: reduces along an axis other than the last (default:
+    `whole`).
     `result`: returns the element type of the result for that of the array.
     """
     column = column or whole
@@ -876,7 +937,7 @@ def _reduction(
     def choose(a: Any, axis: Any, keepdims: Any) -> Any:
         if isinstance(a, _Numbers):
             return lambda a, axis, keepdims: whole(own.rtcf_array((a,), None))
-        _needs(a, name)
+        _needs(a, name, _ALL)
         if isinstance(axis, types.BaseTuple):
             raise TypingError(f"RTCF:{name} along several axes:leave axis out")
         dtype = _dtype(a) if result is None else result(_dtype(a))
@@ -894,11 +955,17 @@ def _reduction(
 
             return one_axis
         if isinstance(axis, types.NoneType):
+            if stays and a.ndim == 3:
+                return lambda a, axis, keepdims: own.rtcf_array(
+                    (((whole(own.rtcf_ravel(a)),),),), None
+                )
             if stays:
                 return lambda a, axis, keepdims: own.rtcf_array(
                     ((whole(own.rtcf_ravel(a)),),), None
                 )
             return lambda a, axis, keepdims: whole(own.rtcf_ravel(a))
+        if a.ndim == 3:
+            return _along_three(whole, column, dtype, stays)
 
         def along(a: Any, axis: Any, keepdims: Any) -> Any:
             if axis == 1 or axis == -1:
@@ -939,6 +1006,52 @@ def _reduction(
     compiled_as(helper, arrays=("a",))(without)
 
 
+def _along_three(whole: Any, column: Any, dtype: Any, stays: bool) -> Any:
+    """Return the reduction of an array of three dimensions along an axis."""
+
+    def along(a: Any, axis: Any, keepdims: Any) -> Any:
+        # NumPy reduces the last axis of more than one element as a vector.
+        if axis == 2 or axis == -1:
+            found = np.empty((a.shape[0], a.shape[1]), dtype)
+            for i in range(a.shape[0]):
+                for j in range(a.shape[1]):
+                    found[i, j] = whole(a[i, j])
+        elif axis == 1 or axis == -2:
+            found = np.empty((a.shape[0], a.shape[2]), dtype)
+            for i in range(a.shape[0]):
+                for k in range(a.shape[2]):
+                    if a.shape[2] == 1:
+                        found[i, k] = whole(a[i, :, k])
+                    else:
+                        found[i, k] = column(a[i, :, k])
+        elif axis == 0 or axis == -3:
+            found = np.empty((a.shape[1], a.shape[2]), dtype)
+            for j in range(a.shape[1]):
+                for k in range(a.shape[2]):
+                    if a.shape[1] * a.shape[2] == 1:
+                        found[j, k] = whole(a[:, j, k])
+                    else:
+                        found[j, k] = column(a[:, j, k])
+        else:
+            raise ValueError("axis is out of bounds")
+        return found
+
+    if not stays:
+        return along
+    plainly = plain(along)
+
+    def kept(a: Any, axis: Any, keepdims: Any) -> Any:
+        found = plainly(a, axis, None)
+        n, m = found.shape
+        if axis == 2 or axis == -1:
+            return own.rtcf_reshape(found, (n, m, 1))
+        if axis == 1 or axis == -2:
+            return own.rtcf_reshape(found, (n, 1, m))
+        return own.rtcf_reshape(found, (1, n, m))
+
+    return kept
+
+
 def _with_two(function: Any) -> Any:
     return lambda a, axis: function(a, axis, None)
 
@@ -962,7 +1075,7 @@ _reduction(own.rtcf_all, "np.all", _is_all, result=lambda _: np.dtype(np.bool_))
 
 @compiled_as(own.rtcf_ptp, arrays=("a",))
 def _ptp(a: Any, axis: Any) -> Any:
-    _needs(a, "np.ptp")
+    _needs(a, "np.ptp", _ALL)
     if _dtype(a).kind == "b":
         raise TypingError("RTCF:np.ptp of bools:convert them: x.astype(int)")
     return lambda a, axis: _minus(own.rtcf_max(a, axis, None), own.rtcf_min(a, axis, None))
@@ -995,7 +1108,7 @@ def _elements_along(a: Any, axis: Any) -> Any:
 def _mean(a: Any, axis: Any, keepdims: Any) -> Any:
     if isinstance(a, _Numbers):
         return lambda a, axis, keepdims: helpers.rtcf_to_float(a)
-    _needs(a, "np.mean")
+    _needs(a, "np.mean", _ALL)
     return lambda a, axis, keepdims: _divided(
         own.rtcf_sum(_as_floats(a), axis, keepdims), _elements(a, axis)
     )
@@ -1018,7 +1131,7 @@ def _divided_by(total: Any, count: Any) -> Any:
 
 @compiled_as(own.rtcf_var, arrays=("a",))
 def _var(a: Any, axis: Any, ddof: Any) -> Any:
-    _needs(a, "np.var")
+    _needs(a, "np.var", _ALL)
 
     def var(a: Any, axis: Any, ddof: Any) -> Any:
         values = _as_floats(a)
@@ -1047,7 +1160,7 @@ def _std(a: Any, axis: Any, ddof: Any) -> Any:
 
 @compiled_as(own.rtcf_count_nonzero, arrays=("a",))
 def _count_nonzero(a: Any) -> Any:
-    _needs(a, "np.count_nonzero")
+    _needs(a, "np.count_nonzero", _ALL)
 
     def count(a: Any) -> Any:
         found = 0
@@ -1062,7 +1175,7 @@ def _count_nonzero(a: Any) -> Any:
 
 @compiled_as(own.rtcf_median, arrays=("a",))
 def _median(a: Any) -> Any:
-    _needs(a, "np.median")
+    _needs(a, "np.median", _ALL)
     to = np.float32 if _dtype(a) == np.float32 else np.float64
 
     def median(a: Any) -> Any:
@@ -1088,7 +1201,7 @@ def _running(helper: Any, name: str, step: Any) -> None:
 
     @compiled_as(helper, arrays=("a",))
     def _run(a: Any, axis: Any) -> Any:
-        _needs(a, name)
+        _needs(a, name, _ALL if isinstance(axis, types.NoneType) else (1, 2))
         dtype = _wide(_dtype(a))
 
         def vector(a: Any) -> Any:
@@ -1196,7 +1309,7 @@ def _sort_in_place(a: Any, axis: Any) -> Any:
 
 @compiled_as(own.rtcf_sort, arrays=("a",))
 def _sort(a: Any, axis: Any) -> Any:
-    _needs(a, "np.sort")
+    _needs(a, "np.sort", _ALL if isinstance(axis, types.NoneType) else (1, 2))
     if isinstance(axis, types.NoneType):
         return lambda a, axis: own.rtcf_sort(own.rtcf_flatten(a), -1)
 
@@ -1342,7 +1455,7 @@ def _all_of_values(values: Any) -> Any:
 
 @compiled_as(own.rtcf_astype)
 def _astype(a: Any, dtype: Any) -> Any:
-    _needs(a, "astype")
+    _needs(a, "astype", _ALL)
     wanted = _dtype(dtype.dtype if isinstance(dtype, types.DTypeSpec) else dtype.instance_type)
     if wanted.kind == "b":
         return lambda a, dtype: a != 0
@@ -1407,8 +1520,8 @@ def _allclose(a: Any, b: Any, rtol: Any, atol: Any, equal_nan: Any) -> Any:
 
 @compiled_as(own.rtcf_array_equal, arrays=("a1", "a2"))
 def _array_equal(a1: Any, a2: Any) -> Any:
-    _needs(a1, "np.array_equal")
-    _needs(a2, "np.array_equal")
+    _needs(a1, "np.array_equal", _ALL)
+    _needs(a2, "np.array_equal", _ALL)
     if a1.ndim != a2.ndim:
         return lambda a1, a2: False
 
@@ -1674,7 +1787,7 @@ def _inner(a: Any, b: Any) -> Any:
 
 @compiled_as(own.rtcf_norm, arrays=("x",), refused="f")
 def _norm(x: Any, ord: Any, axis: Any) -> Any:
-    _needs(x, "np.linalg.norm")
+    _needs(x, "np.linalg.norm", _ALL)
     default = isinstance(ord, types.NoneType)
     if isinstance(axis, types.NoneType):
         if default:
@@ -1687,7 +1800,7 @@ def _norm(x: Any, ord: Any, axis: Any) -> Any:
                 return np.sqrt(total)
 
             return of_all
-        if x.ndim == 2:
+        if x.ndim > 1:
             raise TypingError("RTCF:this norm of a matrix is not compiled:leave ord out")
 
         def of_vector(x: Any, ord: Any, axis: Any) -> Any:

@@ -274,10 +274,12 @@ def _array_of(value: Any, count: Any) -> Any:
             raise TypingError(f"RTCF:an array of {words(value)}:use numbers or vectors")
         kind = number.dtype.type
         return lambda value, count: np.empty(count, kind)
-    if value.ndim != 1:
-        raise TypingError(f"RTCF:an array of {words(value)}:use numbers or vectors")
     element = value.dtype
-    return lambda value, count: np.empty((count, value.size), element)
+    if value.ndim == 1:
+        return lambda value, count: np.empty((count, value.size), element)
+    if value.ndim == 2:
+        return lambda value, count: np.empty((count, value.shape[0], value.shape[1]), element)
+    raise TypingError(f"RTCF:an array of {words(value)}:use numbers, vectors or matrices")
 
 
 def _check_table(values: Any, key: Any) -> None:
@@ -394,6 +396,8 @@ def _require_fit(columns: Any, rows: Any) -> None:
 def _matmul(a: Any, b: Any) -> Any:
     if not isinstance(a, types.Array) or not isinstance(b, types.Array):
         raise TypingError(f"RTCF:@ of {words(a)} and {words(b)}:use * for numbers")
+    if max(a.ndim, b.ndim) > 2:
+        raise TypingError(f"RTCF:@ of {words(a)} and {words(b)}:use its matrices, x[i]")
     if not any(isinstance(each.dtype, types.Float | types.Complex) for each in (a, b)):
         raise TypingError(
             f"RTCF:@ of {words(a)} and {words(b)}:convert one to floats: x.astype(float)"
@@ -665,7 +669,15 @@ def _filling(dimensions: int) -> Any:
             for j in range(target.shape[1]):
                 target[i, j] = value
 
-    return fill_all
+    if dimensions == 2:
+        return fill_all
+    fill_matrix = plain(fill_all)
+
+    def fill_matrices(target: Any, value: Any) -> None:
+        for i in range(target.shape[0]):
+            fill_matrix(target[i], value)
+
+    return fill_matrices
 
 
 def _copying(of_target: int, of_value: int) -> Any:
@@ -699,8 +711,28 @@ def _copying(of_target: int, of_value: int) -> Any:
             for j in range(target.shape[1]):
                 target[i, j] = value[i * down, j * along]
 
+    if of_target == 3:
+        return plain(_copying_matrices(of_value))
     chosen = {(1, 1): vector, (2, 1): rows, (2, 2): matrix}[of_target, of_value]
     return plain(chosen)
+
+
+def _copying_matrices(of_value: int) -> Any:
+    """Return the function that copies to an array of three dimensions, matrix by matrix."""
+    copying = _copying(2, min(of_value, 2))
+
+    def same(target: Any, value: Any) -> None:
+        for i in range(target.shape[0]):
+            copying(target[i], value)
+
+    def each(target: Any, value: Any) -> None:
+        step = 0 if value.shape[0] == 1 else 1
+        if step and target.shape[0] != value.shape[0]:
+            raise ValueError("an array is set to one of another shape")
+        for i in range(target.shape[0]):
+            copying(target[i], value[i * step])
+
+    return each if of_value == 3 else same
 
 
 @compiled_as(helpers.rtcf_get, checked=True)
@@ -727,7 +759,8 @@ def _get(base: Any, index: Any) -> Any:
     if kinds == ("array", "slice"):
         return lambda base, index: _gathered(base[:, index[1]], index[0])
     if kinds == ("mask",):
-        return lambda base, index: _where_true(base, index[0])
+        where_true = _where_true if base.ndim == 2 else _where_true_of_matrices
+        return lambda base, index: where_true(base, index[0])
     if kinds == ("int", "array"):
         return lambda base, index: _gathered(base[index[0]], index[1])
     if kinds == ("array", "int"):
@@ -802,14 +835,17 @@ def _by_values(parameters: str, call: str, index: Any) -> Any:
 
 
 def _kinds(base: Any, index: Any) -> tuple[str, ...]:
-    """Return the kinds of the parts of an index: int, slice, array, or mask (two dimensions)."""
+    """Return the kinds of the parts of an index: int, slice, array, or mask of all elements (two or
+    three dimensions).
+    """
     kinds: list[str] = []
     for each in index.types:
         if isinstance(each, types.Array):
             if not isinstance(each.dtype, types.Integer | types.Boolean):
                 raise TypingError(f"RTCF:an index is {words(each)}:use ints or bools")
-            whole = each.ndim == base.ndim == 2 and isinstance(each.dtype, types.Boolean)
-            kinds.append("array" if each.ndim == 1 else "mask" if whole else "")
+            whole = each.ndim == base.ndim and isinstance(each.dtype, types.Boolean)
+            selects = each.ndim == 1 and base.ndim < 3
+            kinds.append("array" if selects else "mask" if whole else "")
         elif isinstance(each, types.Integer):
             kinds.append("int")
         elif isinstance(each, types.SliceType | types.EllipsisType):
@@ -820,9 +856,8 @@ def _kinds(base: Any, index: Any) -> tuple[str, ...]:
     several = len(kinds) > 1 and ("mask" in kinds or (rest and "array" in kinds))
     if len(kinds) > base.ndim or "" in kinds or several:
         given = ", ".join(words(each) for each in index.types)
-        raise TypingError(
-            f"RTCF:{words(base)} cannot be indexed by {given}:use ints, slices and arrays"
-        )
+        use = "ints, slices and arrays" if base.ndim < 3 else "ints, slices and a whole mask"
+        raise TypingError(f"RTCF:{words(base)} cannot be indexed by {given}:use {use}")
     return tuple(kinds)
 
 
@@ -897,6 +932,23 @@ def _where_true(base: Any, mask: Any) -> Any:
             if mask[i, j]:
                 result[k] = base[i, j]
                 k += 1
+    return result
+
+
+@plain
+def _where_true_of_matrices(base: Any, mask: Any) -> Any:
+    """The same for an array of three dimensions."""
+    if mask.shape != base.shape:
+        raise IndexError("the mask and the array have different shapes")
+    count = 0
+    for i in range(mask.shape[0]):
+        count += _count(mask[i])
+    result = np.empty(count, base.dtype)
+    k = 0
+    for place in np.ndindex(mask.shape):
+        if mask[place]:
+            result[k] = base[place]
+            k += 1
     return result
 
 
@@ -1111,7 +1163,20 @@ def _set_where(base: Any, mask: Any, value: Any) -> Any:
                     base[i, j] = _item(value, k)
                     k += step
 
-    return where
+    def where_in_matrices(base: Any, mask: Any, value: Any) -> None:
+        if mask.shape != base.shape:
+            raise IndexError("the mask and the array have different shapes")
+        count = 0
+        for i in range(mask.shape[0]):
+            count += _count(mask[i])
+        step = _step(value, count)
+        k = 0
+        for place in np.ndindex(mask.shape):
+            if mask[place]:
+                base[place] = _item(value, k)
+                k += step
+
+    return where if base.ndim == 2 else where_in_matrices
 
 
 def _step(value: Any, count: Any) -> Any:
@@ -1579,6 +1644,9 @@ def _element_or_number(value: Any, place: Any) -> Any:
 
 @compiled_as(helpers.rtcf_solve, refused="f")
 def _solve(a: Any, b: Any) -> Any:
+    _require_matrix("np.linalg.solve", a)
+    if isinstance(b, types.Array) and b.ndim > 2:
+        raise TypingError(f"RTCF:np.linalg.solve for {words(b)}:give it a vector or a matrix")
     if b.ndim == 1:
 
         def vector(a: Any, b: Any) -> Any:
@@ -1589,6 +1657,11 @@ def _solve(a: Any, b: Any) -> Any:
 
         return vector
     return lambda a, b: _eliminated(a, b)
+
+
+def _require_matrix(name: str, a: Any) -> None:
+    if isinstance(a, types.Array) and a.ndim > 2:
+        raise TypingError(f"RTCF:{name} of {words(a)}:give it a matrix")
 
 
 def _eliminated(a: Any, b: Any) -> Any:
@@ -1639,11 +1712,14 @@ def _eliminate(a: Any, b: Any) -> Any:
 
 @compiled_as(helpers.rtcf_inv, refused="f")
 def _inv(a: Any) -> Any:
+    _require_matrix("np.linalg.inv", a)
     return lambda a: _eliminated(a, np.eye(a.shape[0]))
 
 
 @compiled_as(helpers.rtcf_cholesky, refused="f")
 def _cholesky(a: Any) -> Any:
+    _require_matrix("np.linalg.cholesky", a)
+
     def cholesky(a: Any) -> Any:
         n = a.shape[0]
         if a.shape[1] != n:

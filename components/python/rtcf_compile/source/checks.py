@@ -433,7 +433,9 @@ def _slice(node: ast.Slice, file: str) -> None:
 def check_index(node: ast.Subscript, shape: Sequence[int], name: str, file: str) -> None:
     """Reject constant indices beyond the size of an array or a list."""
     parts = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
-    words = ("elements",) if len(shape) == 1 else ("rows", "columns")
+    words = {1: ("elements",), 2: ("rows", "columns")}.get(
+        len(shape), tuple(f"elements along axis {axis}" for axis in range(len(shape)))
+    )
     for part, size, word in zip(parts, shape, words, strict=False):
         try:
             index = ast.literal_eval(part)
@@ -452,7 +454,7 @@ def _indexed(node: ast.Subscript, source: Source) -> None:
             what = f"{ast.unparse(node.value)} is not an array"
             raise at(source.file, node, what, "make it an array with np.array(…), or use x[i][k]")
         check_index(node, (len(owner),), ast.unparse(node.value), source.file)
-    elif isinstance(owner, np.ndarray) and owner.ndim in (1, 2):
+    elif isinstance(owner, np.ndarray) and owner.ndim in (1, 2, 3):
         check_index(node, owner.shape, ast.unparse(node.value), source.file)
     if isinstance(owner, type) and issubclass(owner, enum.Enum):
         first = next(iter(owner.__members__), "X")

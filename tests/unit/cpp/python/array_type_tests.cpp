@@ -86,9 +86,21 @@ struct Table {
     }
 };
 template <typename Shape>
-const TypeTable Table<Shape>::table{
-    scalarOf<Element>(), Shape::kRows, Shape::kColumns, &makeSlot, &copy,   &exchange, &length,
-    &serialize,          &deserialize, &print,          &finite,   &sample, &copies,   &printState};
+const TypeTable Table<Shape>::table{scalarOf<Element>(),
+                                    Shape::kRows,
+                                    Shape::kColumns,
+                                    0,
+                                    &makeSlot,
+                                    &copy,
+                                    &exchange,
+                                    &length,
+                                    &serialize,
+                                    &deserialize,
+                                    &print,
+                                    &finite,
+                                    &sample,
+                                    &copies,
+                                    &printState};
 
 template <typename Shape>
 class PythonArray : public testing::Test {
@@ -255,6 +267,28 @@ TYPED_TEST(PythonArray, IsRowMajorInTheRecord) {
     Slot<typename TypeParam::Port> back;
     copy.toPort(&back.value, record.data());
     EXPECT_EQ(this->bytesOf(this->real_, back), this->bytesOf(this->real_, this->real_slot_));
+}
+
+TEST(PythonArrayOfThreeDimensions, EqualsANestedArrayOfCpp) {
+    using Real = std::array<std::array<std::array<double, 4>, 3>, 2>;
+    TypeTable table = Table<Matrix<double, 3, 4>>::table;
+    table.depth = 2;
+    const StateDeclaration ours = python::stateOf(table);
+    EXPECT_EQ(ours.type, "double[2x3x4]");
+    EXPECT_EQ(ours.identity, StateType<Real>::identity());
+    EXPECT_EQ(ours.size, sizeof(Real));
+    std::swap(table.depth, table.rows);
+    EXPECT_NE(python::stateOf(table).identity, StateType<Real>::identity());
+}
+
+TEST(PythonArrayOfThreeDimensions, IsPrintedMatrixByMatrix) {
+    TypeTable table = Table<Numbers<std::int16_t, 4>>::table;
+    table.depth = table.rows = table.columns = 2;
+    const std::array<std::int16_t, 8> values{1, 2, 3, 4, 5, 6, 7, -8};
+    EXPECT_EQ(rtcf_python_print_state(&table, values.data()), "[[1, 2; 3, 4], [5, 6; 7, -8]]");
+    const std::array<bool, 8> flags{true};
+    table.scalar = Scalar::Bool;
+    EXPECT_EQ(rtcf_python_print_state(&table, flags.data()), "[[1, 0; 0, 0], [0, 0; 0, 0]]");
 }
 
 template <typename T>

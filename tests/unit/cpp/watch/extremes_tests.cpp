@@ -91,6 +91,7 @@ TEST(NumberFields, RejectAMessageThatContradictsItsDefinition) {
 TEST(NumberFields, OfStates) {
     EXPECT_EQ(count(numbersOfState("double[3x1]", 24)), 3U);
     EXPECT_EQ(count(numbersOfState("uint8[2x3,RowMajor]", 6)), 6U);
+    EXPECT_EQ(count(numbersOfState("float[2x3x4]", 96)), 24U);
     EXPECT_EQ(numbersOfState("quaternion", 16).front().kind, NumberKind::Float32);
     EXPECT_EQ(count(numbersOfState("transform", 128)), 16U);
     EXPECT_TRUE(numbersOfState("{a: double}", 8).empty());

@@ -127,7 +127,7 @@ class Programs:
             said = self._update(record)
         if raised or said:
             return f"{said} compiled, {raised} in NumPy"
-        for name in ("y", "z", "a", "_b", "c", "m", "k", "s"):
+        for name in ("y", "z", "a", "_b", "c", "m", "k", "t", "s"):
             ours, theirs = record[f"{name}{number}"], getattr(model, f"{name}{number}")
             theirs = getattr(theirs, "value", theirs)
             if not np.isfinite(theirs).all() or np.max(np.abs(theirs)) > 1e100:
@@ -239,6 +239,12 @@ STATEMENTS = {
     "input sorted": "self.v.value.sort()\nself.a = self.v.value",
     "match": "match int(self.v.value[0]):\n    case 0:\n        x, y = self.a, self.b\n"
     "    case _:\n        x, y = self.b, self.a\nself.a = self.a + self.v.value\nself.c = x - y",
+    "matrix of a block": "x = self.t[1]\nself.t = self.t + self.v.value\nself.m = x - self.t[1]",
+    "column of a block": "x = self.t[0, :, 1]\nself.t[0, 2] = self.v.value\nself.a = x + 1.0",
+    "row of a name": "x = self.t\nself.t = 0.5 * self.t + self.v.value\nself.a = x[1, 2] - 1.0",
+    "blocks in a loop": "for x in self.t:\n    self.t = self.t + self.v.value\n    self.k = x",
+    "block as a vector": "x = self.t.reshape(-1)\nx[3] += 4.0\nself.s = x[3]",
+    "block transposed": "x = self.t.T\nx[1, 1] = self.v.value[:2]\nself.m = self.t[0] + 1.0",
     "view of a new array": "x = self.v.value + 1.0\nhead = x[:2]\nhead[0] = 9.0\nself.a = x",
 }
 METHODS = """\
@@ -277,7 +283,7 @@ def test_statements_mean_what_they_mean_in_numpy(tmp_path: Path, compiler: Any) 
     for number, text in enumerate(STATEMENTS.values()):
         body = "".join(f"        {line}\n" for line in text.split("\n"))
         whole = METHODS + f"    def program(self):\n{body}"
-        members = r"self\.([abcmksyz])\b(?!\()"
+        members = r"self\.([abcmkstyz])\b(?!\()"
         whole = re.sub(members, rf"self.\g<1>{number}", whole).replace("self.b", "self._b")
         names = r"\b(now|halved|stepped|set_m|set_a|get_m|same|program)\b"
         programs[number] = Program(re.sub(names, rf"\g<1>_{number}", whole))

@@ -79,6 +79,14 @@ def test_a_row_major_matrix_is_not_transposed(tmp_path: Path) -> None:
         assert as_list(recording["/c.s"]) == expected.reshape(2, -1).tolist()
 
 
+def test_a_state_of_three_dimensions_keeps_its_shape(tmp_path: Path) -> None:
+    expected = np.arange(48.0).reshape(2, 2, 3, 4)
+    told = batch(schema(state("double[2x3x4]", 192)), 0, expected.tobytes())
+    assert told["/c.s"].tolist() == expected.tolist()
+    with recorded(tmp_path / "x.mcap", told) as recording:
+        assert recording["/c.s"].tolist() == expected.reshape(2, -1).tolist()
+
+
 def test_an_output_and_a_state_of_the_same_name_are_separate(tmp_path: Path) -> None:
     made = output("float64 data\n", "1", bytes(8), name="s")
     for columns in ((made, state("double", 8)), (state("double", 8), made)):
