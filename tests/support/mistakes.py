@@ -617,7 +617,7 @@ CLASS: dict[str, tuple[str, str]] = {
     "three sizes of a parameter": ("v: Parameter[np.float64, 2, 2, 2] = 0.0", "at most two"),
     "three sizes of a queue": ("v: Queue[np.float64, 2, 2, 2] = Queue(size=2)", "at most two"),
     "size before the type": ("v: State[3, np.float64]", "size"),
-    "complex state": ("v: State[complex]", "complex"),
+    "complex output": ("v: Output[complex]", "use two floats"),
     "any as a state": ("v: State[Any]", "Any"),
     "enum of texts as a state": ("v: State[Colour]", "Colour"),
     "class as a state": ("v: State[Filter]", "Filter"),

@@ -327,6 +327,8 @@ def _member(owner: type, name: str, annotation: object, line: int) -> Member:
         )
     if declared.optional and kind is not State:
         raise DeclarationError("may be None, but only a State may be None: use .valid of an Input")
+    if declared.is_complex and kind not in (State, Derived):
+        raise DeclarationError("is complex, as only a State or Derived may be: use two floats")
     if kind is Parameter and initial is None:
         raise DeclarationError(f"has no default: write {name}: Parameter[…] = Parameter(1.0)")
     if kind is Parameter and declared.enumeration and {"min", "max"} & set(options):
@@ -499,7 +501,8 @@ def _initial(declared: ValueType, given: Any) -> np.ndarray[Any, Any]:
 def _number(declared: ValueType) -> str:
     """Return the name of a scalar type with its article, Python's name if it has one."""
     name = declared.scalar.name
-    return {"float64": "a float", "int64": "an int", "bool": "a bool"}.get(name, f"a {name}")
+    names = {"float64": "a float", "int64": "an int", "bool": "a bool", "complex128": "complex"}
+    return names.get(name, f"a {name}")
 
 
 def _check_bounds(initial: Any, options: dict[str, Any]) -> None:

@@ -114,8 +114,10 @@ def checked(value: Any, kind: ValueType, name: str) -> Any:
     if new.shape not in (kind.shape, ()):
         raise ValueError(f"{name} has shape {kind.shape}, not {new.shape}")
     scalar = kind.scalar
-    if (new.dtype.kind == "f" and scalar.kind != "f") or (
-        (new.dtype.kind == "b") != (scalar.kind == "b")
+    if (
+        (new.dtype.kind == "f" and scalar.kind not in "fc")
+        or (new.dtype.kind == "c" and scalar.kind != "c")
+        or ((new.dtype.kind == "b") != (scalar.kind == "b"))
     ):
         raise TypeError(f"{name} is {scalar.name}, not {new.dtype.name}")
     if new.dtype.kind == "O":

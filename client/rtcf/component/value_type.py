@@ -1,4 +1,6 @@
-"""Types of ports, parameters and states: numbers, bools, enums, and arrays of numbers or bools."""
+"""Types of ports, parameters and states: numbers, bools, enums, and arrays of numbers or bools; also
+complex numbers of states.
+"""
 
 import enum
 import types
@@ -13,7 +15,7 @@ class DeclarationError(Exception):
     """A wrong declaration; the text contains a remedy."""
 
 
-_PYTHON = {float: np.float64, int: np.int64, bool: np.bool_}
+_PYTHON = {float: np.float64, int: np.int64, bool: np.bool_, complex: np.complex128}
 _CPP = {
     "bool": "bool",
     "int8": "std::int8_t",
@@ -48,6 +50,16 @@ class ValueType:
     def is_float(self) -> bool:
         """Return True if the elements are floating-point numbers."""
         return self.scalar.kind == "f"
+
+    @property
+    def is_complex(self) -> bool:
+        """Return True if the elements are complex numbers."""
+        return self.scalar.kind == "c"
+
+    @property
+    def stored(self) -> "ValueType":
+        """Return the type of the same memory in C++: complex numbers are pairs of doubles."""
+        return ValueType(np.dtype(np.float64), (2 * self.count,)) if self.is_complex else self
 
     @property
     def is_bool(self) -> bool:
@@ -114,7 +126,7 @@ def _check_members(enumeration: type[enum.IntEnum]) -> None:
 def _scalar(element: Any) -> np.dtype[Any]:
     if isinstance(element, type):
         element = _PYTHON.get(element, element)
-        if issubclass(element, np.generic) and np.dtype(element).name in _CPP:
+        if issubclass(element, np.generic) and np.dtype(element).name in (*_CPP, "complex128"):
             return np.dtype(element)
     if element in (list, np.ndarray):
         raise DeclarationError("is an array without element type and size: write np.float64, 3")

@@ -267,15 +267,16 @@ class _Comparing:
         result = self.result
         nearby: list[Any] = []
         for name in mine.dtype.names:
-            far = ulp(mine[name], theirs[name])
+            one, other = _floats(mine[name]), _floats(theirs[name])
+            far = ulp(one, other)
             result.largest_ulp = max(result.largest_ulp, far if far <= LARGEST_ULP else 0)
             if far <= LARGEST_ULP:
                 continue
             nearby = nearby or self._nearby(hook)
-            if _is_rounding(mine[name], theirs[name], [each[name] for each in nearby]):
+            if _is_rounding(one, other, [_floats(each[name]) for each in nearby]):
                 result.rounded += 1
                 continue
-            element, ours, pythons = _farthest(mine[name], theirs[name])
+            element, ours, pythons = _farthest(one, other)
             distance = f" ({far} ulp)" if far < 2**62 else ""
             self._differ(
                 hook,
@@ -367,6 +368,12 @@ def _is_rounding(mine: Any, theirs: Any, nearby: list[Any]) -> bool:
         apart = np.abs(ours - pythons)
     near = finite & (apart <= _ROUNDING * spread)
     return bool((same | near).all())
+
+
+def _floats(value: Any) -> Any:
+    """Return complex numbers as pairs of floats, other numbers as they are."""
+    is_complex = value.dtype.kind == "c"
+    return np.stack([value.real, value.imag], axis=-1) if is_complex else value
 
 
 def _farthest(mine: Any, theirs: Any) -> tuple[str, Any, Any]:

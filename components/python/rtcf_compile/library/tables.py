@@ -233,7 +233,7 @@ class _Library:
     def _state(self, member: Member, record: np.ndarray) -> Value:  # type: ignore[type-arg]
         offset = _offset(record, member.name)
         live = int(bool(member.options.get("live", False)))
-        kind = self._type(member.type)
+        kind = self._type(member.type.stored)
         return self.data.struct(member.outer_name, *_texts(member), kind, offset, live)
 
     def _lines(self, compiled: Compiled) -> list[Value]:

@@ -360,6 +360,13 @@ def _float(value: Any) -> Any:
     raise TypingError(f"RTCF:a number is set to {words(value)}:{remedy}")
 
 
+@compiled_as(helpers.rtcf_complex)
+def _complex(value: Any) -> Any:
+    if isinstance(value, types.Complex | types.Float | types.Integer):
+        return lambda value: complex(value)
+    raise TypingError(f"RTCF:a complex number is set to {words(value)}:give it a number")
+
+
 @compiled_as(helpers.rtcf_int)
 def _int(value: Any) -> Any:
     if isinstance(value, types.IntEnumMember):

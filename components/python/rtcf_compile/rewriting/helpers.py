@@ -262,6 +262,11 @@ def rtcf_float(value: Any) -> Any:
     return float(value)
 
 
+def rtcf_complex(value: Any) -> Any:
+    """Return a number as a complex number."""
+    return complex(value)
+
+
 def rtcf_int(value: Any) -> Any:
     """Return an int or an enum as an int."""
     return int(value)
@@ -456,7 +461,16 @@ INSTEAD: dict[Callable[..., Any], Callable[..., Any]] = {
 BY_NAME = {
     each.__name__: each
     for each in (
-        *(rtcf_matmul, rtcf_assign, rtcf_get, rtcf_set, rtcf_float, rtcf_int, rtcf_bool),
+        *(
+            rtcf_matmul,
+            rtcf_assign,
+            rtcf_get,
+            rtcf_set,
+            rtcf_float,
+            rtcf_int,
+            rtcf_bool,
+            rtcf_complex,
+        ),
         *(
             rtcf_equal,
             rtcf_view,

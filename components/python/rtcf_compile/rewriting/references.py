@@ -36,7 +36,7 @@ from rtcf_compile.rewriting.live_names import LiveNames
 from rtcf_compile.rewriting.methods import Method, Methods, nested
 from rtcf_compile.source.assigned import matches_all
 from rtcf_compile.source.checks import check, resolve
-from rtcf_compile.source.mistake import at
+from rtcf_compile.source.mistake import at, written
 from rtcf_compile.source.modules import Source, is_own, read
 from rtcf_compile.source.spelling import defaults_of
 
@@ -603,6 +603,11 @@ class _Followed:
     def _site(self, node: ast.expr) -> Site:
         return self._frame.source.function.__code__, key_of(node)
 
+    def _text(self, node: ast.expr) -> str:
+        """Return an expression as the user wrote it; empty for a long one with nested functions."""
+        text = ast.unparse(node)
+        return text if "rtcf_" not in text else written(self._frame.source.file, node)
+
     def _hold(self, value: Value, node: ast.expr, state: Bindings, may_copy: bool = True) -> Cell:
         """Hold the value of an operand while the rest of an expression is computed."""
         others = (name[1] for kind, name in state if kind == "held")
@@ -612,7 +617,7 @@ class _Followed:
             return cell
         site = self._site(node) if may_copy else None
         if site is not None:
-            self._written.setdefault(site, (node.lineno, "", ast.unparse(node)))
+            self._written.setdefault(site, (node.lineno, "", self._text(node)))
         self._bound(cell, value, site, state)
         return cell
 
@@ -628,7 +633,7 @@ class _Followed:
         """Bind a variable."""
         value = _computed(value)
         if given is not None:
-            self._written[site] = (given.lineno, name, ast.unparse(given))
+            self._written[site] = (given.lineno, name, self._text(given))
         elif site not in self._written:
             self._written[site] = (self._frame.source.tree.lineno, name, name)
         if not isinstance(given, ast.Constant):
@@ -714,7 +719,7 @@ class _Followed:
         if not self._is_array(name):
             return
         place, refs, site = ("self", name), _flat(_computed(value)), self._site(given)
-        self._written[site] = (given.lineno, target, ast.unparse(given))
+        self._written[site] = (given.lineno, target, self._text(given))
         now = self._of_member(name, state)
         things = {ref.thing for ref in now}
         if (
@@ -1329,6 +1334,8 @@ def _is_other_power(node: ast.Call) -> bool:
 
 def _copy_of(text: str) -> str:
     """Return an expression with .copy()."""
+    if not text:
+        return "….copy()"
     node = ast.parse(text, mode="eval").body
     if isinstance(node, ast.Tuple | ast.List):
         return f"({', '.join(_copy_of(ast.unparse(each)) for each in node.elts)})"

@@ -517,7 +517,8 @@ class Hook(Ports):
         if kind.enumeration:
             member = call_of("rtcf_enum", value, self._enum(kind.enumeration))
             return like(node, ast.Assign([self._field(name)], call_of("rtcf_int", member)))
-        convert = "rtcf_float" if kind.is_float else "rtcf_bool" if kind.is_bool else "rtcf_int"
+        of = {"f": "float", "b": "bool", "c": "complex"}.get(kind.scalar.kind, "int")
+        convert = f"rtcf_{of}"
         return like(node, ast.Assign([self._field(name)], call_of(convert, value)))
 
     def _fault(self, node: ast.Expr, call: ast.Call) -> ast.stmt:

@@ -12,7 +12,7 @@ import cmath
 import math
 
 import numpy as np
-from rtcf.component import Component, Input, Output, State
+from rtcf.component import Component, Derived, Input, Output, State
 
 PHASES = np.exp(2j * np.pi * np.arange(4) / 4)
 J = 1j
@@ -28,6 +28,14 @@ class Waves(Component):
     v: Input[np.float64, 4]
     y: Output[float]
     w: Output[np.float64, 4]
+    phase: State[complex] = 1.0 + 0.5j
+    waves: State[np.complex128, 4]
+    pairs: State[np.complex128, 2, 2]
+    last: State[complex | None]
+    turns: Derived[np.complex128, 4]
+
+    def prepare(self):
+        self.turns = np.exp(0.5j * np.arange(4))
 
     def update(self):
         u, v = self.u.value, self.v.value
@@ -77,6 +85,26 @@ WAYS = {
         self.y.write(np.sum(a).imag + a.mean().real + np.where(v > 0.0, a, 1j).sum().real)""",
     "products": "self.y.write((v @ PHASES).imag + np.vdot(PHASES, PHASES * u).real)",
     "matrix": "m = np.outer(PHASES, v)\n        self.w.write((m @ PHASES).real + m.T[0].imag)",
+    "state": """
+        self.phase *= cmath.exp(0.1j)
+        self.phase += 0.1 * z
+        self.y.write(self.phase.real + abs(self.phase))""",
+    "state set to a float": "self.y.write(self.phase.imag)\n        self.phase = u",
+    "array of states": """
+        self.waves = 0.9 * self.turns * self.waves + z
+        self.waves[1] = 2.0
+        self.waves[2:] += 1j
+        self.pairs[0] = self.waves[:2]
+        self.pairs[1, 0] *= 1j
+        self.w.write(self.waves.real + np.abs(self.pairs.ravel()))""",
+    "old array of states": """
+        old = self.waves
+        self.waves = self.waves * self.turns + v
+        self.w.write((self.waves - old).imag)""",
+    "optional state": """
+        if self.last is not None:
+            self.y.write(abs(z - self.last))
+        self.last = z if u > 0.0 else None""",
     "part of an array that changes": """
         a = v + 1j
         part = a.imag
