@@ -599,6 +599,102 @@ UPDATE: dict[str, tuple[str, str]] = {
     "number set to a vector of a message": ("self.p.value.pose.position = self.z", "number"),
     "element of a message's vector": ("self.f = self.t.value.linear[0]", "number"),
     "float to a message's int": ("self.p.value.header.seq = 0.5", "float"),
+    "list of as many elements as a state counts": (
+        "self.z = [self.kp * i for i in range(self.n)]",
+        "shape",
+    ),
+    "state set to a list of another size": ("self.z = [self.kp * i for i in range(3)]", "(3,)"),
+    "rows compared in any": ("self.on = any(row > 0.0 for row in self.m)", "np.any"),
+    "comprehension as a loop": ("[self.y.write(each) for each in self.z]", "loop"),
+    "variable of a comprehension after it": (
+        "self.f = sum(each for each in self.z)\nself.f -= each  # here",
+        "each is",
+    ),
+    "elements counted without enumerate": (
+        "for i, each in self.z:  # here\n    self.z[i] = 2.0 * each",
+        "enumerate",
+    ),
+    "port in zip": ("self.f = sum(k * e for k, e in zip(self.gains, self.w))", "self.w.value"),
+    "function from a dict by an enum": (
+        "LAWS = {Mode.OFF: abs, Mode.RUN: math.sqrt}\n---\nself.f = LAWS[self.mode](self.f)",
+        "numbers as values",
+    ),
+    "nested function passed to a function": (
+        "def applied(rule, x):\n    return rule(x)\n---\ndef double(x):\n    return 2.0 * x\n"
+        "\nself.f = applied(double, self.f)  # here",
+        "function",
+    ),
+    "nested function with self": (
+        "def scaled(self, x):\n    return self.kp * x\n\nself.f = scaled(self.f)  # here",
+        "takes",
+    ),
+    "nested function called as a method": (
+        "def scaled(x):\n    return self.kp * x\n\nself.f = self.scaled(self.f)  # here",
+        "write scaled",
+    ),
+    "nested function that increases a variable of update": (
+        "total = 0.0\n\ndef add(x):\n    total += x  # here\n\nadd(self.f)\nself.f = total",
+        "return",
+    ),
+    "function with a handle of MATLAB": (
+        "double = @(x) 2.0 * x  # here\nself.f = double(self.f)",
+        "syntax",
+    ),
+    "argument that is given only by name": (
+        "def held_at(x, *, top=1.0):\n    return min(x, top)\n---\nself.f = held_at(self.f, 2.0)",
+        "top=",
+    ),
+    "imaginary unit of MATLAB": ("s = 2i * math.pi\nself.f = abs(s)", "syntax"),
+    "imaginary unit without its factor": ("self.f = abs(1.0 + 2.0 * j)", "1j"),
+    "method of NumPy's complex numbers": (
+        "s = 1j * self.f\nself.f = abs(s.conj())  # here",
+        "conjugate",
+    ),
+    "float of a complex number": ("self.f = float(1j * self.f)", ".real"),
+    "matrix of zeros as in MATLAB": ("a = np.zeros(2, 2)", "((2, 2))"),
+    "largest of two numbers by np.max": ("self.f = np.max(self.f, 0.0)", "np.maximum"),
+    "largest of two vectors by max": ("self.z = max(self.z, self.held)", "np.maximum"),
+    "vector as the condition of a value": ("a = 1.0 if self.z > 0.0 else 0.0", "np.any"),
+    "vector sorted as a value": ("self.z = self.z.sort()", "None"),
+    "column minus row": ("self.z[:] = self.z.reshape(2, 1) - self.z", "a matrix"),
+    "bounds of another size": (
+        "TOP = np.ones(4)\n---\nself.x.write(np.clip(self.w.value, -1.0, TOP))",
+        "(4,)",
+    ),
+    "einsum of too few dimensions": ("a = np.einsum('ij,jk->ik', self.m, self.z)", "einsum"),
+    "exchanged arguments of solve": ("self.z[:] = np.linalg.solve(self.z, self.m)", "matri"),
+    "exchanged matrices of c2d": (
+        "from rtcf.linear import c2d\n---\nad, bd = c2d(B, A, 0.001)",
+        "shapes fit",
+    ),
+    "half of a length as a range": (
+        "for i in range(len(self.z) / 2):  # here\n    self.z[i] = 0.0",
+        "//",
+    ),
+    "power as in MATLAB": ("self.f = self.f ^ 2", "**"),
+    "enum as in C++": ("self.mode = Mode::RUN", "syntax"),
+    "parameter of the class": ("self.f = Faulty.kp", "self.kp"),
+    "mode compared with a text": ("if self.mode == 'RUN':  # here\n    self.n = 1", "Mode.RUN"),
+    "case of a mode without its enum": (
+        "match self.mode:\n    case RUN:  # here\n        self.n = 1\n    case OFF:\n"
+        "        self.n = 0",
+        "unreachable",
+    ),
+    "dict by the name of a mode": (
+        "SPEEDS = {'OFF': 0.0, 'RUN': 1.0}\n---\nself.f = SPEEDS[self.mode.name]",
+        "enum",
+    ),
+    "input compared with None": ("if self.u.value is None:  # here\n    return", "self.u.valid"),
+    "input with an underscore": ("self.f = self._u.value", "self.u"),
+    "queue as a condition": (
+        "while self.q:  # here\n    self.f += self.q.front\n    self.q.pop()",
+        "self.q.size",
+    ),
+    "front of a queue called": ("self.f = self.q.front()", "front"),
+    "update of the base by its name": ("Component.update(self)", "self"),
+    "text from a table in a log": ("self.info(f'at {NAMES[self.n]}')", "text"),
+    "digits from a state in a log": ("self.info(f'f {self.f:.{self.n}f}')", "log with"),
+    "stamped message that is not stamped": ("self.f = self.t.value.twist.linear.x", "angular"),
 }
 
 # In the class, before `update`.
@@ -790,6 +886,42 @@ CLASS: dict[str, tuple[str, str]] = {
         "        n += 1\n    more()",
         "nonlocal",
     ),
+    "constant of the class in a comprehension": (
+        "SCALE = 2.0\n"
+        "v: Parameter[np.float64, 2] = Parameter([SCALE * each for each in (1.0, 2.0)])  # here",
+        "SCALE",
+    ),
+    "type that NumPy removed": ("v: State[np.float, 2]", "np.float64"),
+    "name of a type": ("v: State['float']", "use float"),
+    "equals in place of a colon": ("v = State[float]", "v: State"),
+    "unit without its name": ("v: Output[float] = Output('rad')", "unit="),
+    "bounds without their names": ("v: Parameter[float] = Parameter(1.0, 0.0, 9.0)", "min="),
+    "initial value of a derived member": ("v: Derived[float] = 0.0", "prepare"),
+    "member of an enum as a type": ("v: State[Mode.RUN]", "State[Mode]"),
+    "vector or None": ("v: State[np.float64, 2 | None]", "None"),
+    "state without its underscore": (
+        "_sum: State[float]\n\ndef safe(self):\n    self.sum = 0.0  # here",
+        "self._sum",
+    ),
+    "private name of a parameter outside": (
+        "v: Parameter[float] = Parameter(1.0, name='_v')",
+        "letter",
+    ),
+    "method with the name of a state": ("v: State[float]\n\ndef v(self):\n    return 1.0", "State"),
+    "static method that uses self": (
+        "@staticmethod\ndef k(x):\n    return self.kp * x  # here\n\ndef safe(self):\n"
+        "    self.f = self.k(1.0)",
+        "staticmethod",
+    ),
+    "numbers set to bools": (
+        "v: State[bool, 2]\n\ndef safe(self):\n    self.v[:] = self.z  # here",
+        "bool",
+    ),
+    "positions of another number of joints": (
+        "v: Output[JointState, 2]\n\ndef safe(self):\n"
+        "    self.v.value.position[:] = np.zeros(3)  # here",
+        "(3,)",
+    ),
 }
 
 # At the head of the module, before the class.
@@ -810,4 +942,22 @@ HEAD: dict[str, tuple[str, str]] = {
     "declaration without brackets": ("SPEED = Input(float)", "annotation"),
     "message that is not there": ("from geometry_msgs.msg import Twists", "Twists"),
     "attribute of NumPy": ("C = np.eyes(2)", "eyes"),
+    "two classes of one name": (
+        "class Motor(Component):\n    k: State[float]\n\n    def update(self):\n"
+        "        self.k = 1.0\n\n\nclass Motor(Component):  # here\n    k: State[int]\n\n"
+        "    def update(self):\n        self.k = 1",
+        "defined twice",
+    ),
+    "base classes in the wrong order": (
+        "class Base(Component):\n    k: State[float]\n\n\n"
+        "class Motor(Component, Base):  # here\n    def update(self):\n        self.k = 1.0",
+        "Base",
+    ),
+    "component as a dataclass": (
+        "@dataclass  # here\nclass Motor(Component):\n    k: State[float]\n\n"
+        "    def update(self):\n        self.k = 1.0",
+        "dataclass",
+    ),
+    "message from its package": ("from geometry_msgs import Twist", "geometry_msgs.msg"),
+    "Component from the client library": ("from rtcf import Component", "rtcf.component"),
 }

@@ -88,8 +88,8 @@ class Plain:
 
 @dataclass
 class _Scope:
-    """The local names of a function: vectors, matrices, arrays of three dimensions, pairs and nested
-    functions; `outside`: the vectors of the function around it.
+    """The local names of a function: vectors, matrices, arrays of three dimensions, pairs, and
+    nested functions; `outside`: the vectors of the function around it.
     """
 
     vectors: list[str] = field(default_factory=list)

@@ -12,6 +12,7 @@ import typing
 import unicodedata
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
+from types import FunctionType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -63,7 +64,7 @@ class Declarable:
         """Return the annotation; describe() checks it with the class."""
         return Declared(cls, declared)
 
-    def __init__(self, initial: Any = None, **options: Any) -> None:
+    def __init__(self, initial: Any = None, *others: Any, **options: Any) -> None:
         """Set the initial value, if the kind has one, and the options.
 
         Raises DeclarationError for an unknown option, or an initial value of a port or of Derived.
@@ -72,6 +73,15 @@ class Declarable:
             own, of = _a(type(self)), getattr(initial, "__name__", "float")
             raise DeclarationError(
                 f"{own} has its type in its annotation: write name: {type(self).__name__}[{of}]"
+            )
+        if others:
+            names = "=…, ".join(self.allowed)
+            raise DeclarationError(
+                f"{type(self).__name__} has options without their names: write {names}=…"
+            )
+        if isinstance(initial, str) and type(self) in PORTS and "unit" in self.allowed:
+            raise DeclarationError(
+                f"{_a(type(self))} takes options by name: write unit={initial!r}"
             )
         for option in options:
             if option not in self.allowed:
@@ -257,6 +267,14 @@ def describe(cls: type) -> Description:
                 continue
             if isinstance(value, MemberAttribute):
                 continue
+            if isinstance(value, Declared):
+                kind = value.kind.__name__
+                raise _at(
+                    DeclarationError(f"is set to a type: write `{name}: {kind}[…]`"),
+                    base,
+                    lines.get(name, 0),
+                    name,
+                )
             if isinstance(value, Declarable):
                 kind, written = type(value).__name__, written_name(base, name)
                 own = written if written == name else private_name(written)
@@ -305,6 +323,8 @@ def _member(owner: type, name: str, annotation: object, line: int) -> Member:
     given = vars(owner).get(ASSIGNED + name, vars(owner).get(name))
     if isinstance(given, MemberAttribute):
         given = None
+    if isinstance(given, FunctionType):
+        raise DeclarationError(f"is {_a(kind)} and also a method: rename one")
     options, initial = {}, None
     if isinstance(given, Declarable):
         if type(given) is not kind:

@@ -1,5 +1,5 @@
-"""Types of ports, parameters and states: numbers, bools, enums, and arrays of numbers or bools; also
-complex numbers of states.
+"""Types of ports, parameters and states: numbers, bools, enums, and arrays of numbers or bools;
+states may also be complex.
 """
 
 import enum
@@ -124,6 +124,10 @@ def _check_members(enumeration: type[enum.IntEnum]) -> None:
 
 
 def _scalar(element: Any) -> np.dtype[Any]:
+    if isinstance(element, enum.Enum):
+        raise DeclarationError(
+            f"has {element} as its type: write its enum, State[{type(element).__name__}]"
+        )
     if isinstance(element, type):
         element = _PYTHON.get(element, element)
         if issubclass(element, np.generic) and np.dtype(element).name in (*_CPP, "complex128"):

@@ -72,6 +72,11 @@ _KNOWN: tuple[tuple[str, str, str], ...] = (
         "write a function of the module, called with the enum",
     ),
     (
+        r"Unknown attribute 'conj' of type complex",
+        "a complex number has no conj",
+        "write z.conjugate()",
+    ),
+    (
         r"Unknown attribute '(\w+)' of type ([^\n]*)",
         "{kind1} has no compiled attribute {0}",
         "use NumPy functions on numbers and arrays",
@@ -110,6 +115,11 @@ _KNOWN: tuple[tuple[str, str, str], ...] = (
         r"undecided|Type of variable '([\w.]+)' cannot be determined",
         "has no type",
         "give it a value before its use",
+    ),
+    (
+        r"failed to unpack ([^\n]*)|typing of exhaust iter",
+        "unpacks a number into several names",
+        "write `for i, x in enumerate(…)`, or one name",
     ),
     (r"tuple index out of range", "an index is out of range", "use an index from 0 to size - 1"),
     (
@@ -197,6 +207,8 @@ def _no_implementation(name: str, arguments: list[str], source: str) -> tuple[st
     if short in ("zeros", "ones", "empty", "full", "eye", "identity", "arange"):
         return f"{name} of {of}", "convert its sizes to ints: int(…)"
     remedy = "give it an array or a tuple" if short in ("len", "sum", "min", "max") else ""
+    if short in ("min", "max") and len(kinds) > 1:
+        remedy = f"use np.{short}imum for elements, np.{short} for one array"
     return f"{name} of {of}", remedy or "give it numbers or arrays of a suitable type"
 
 
@@ -212,6 +224,8 @@ def _operator(operator: str, kinds: list[str]) -> tuple[str, str]:
         return joined, "make it an array: np.array([…])"
     if operator == "not":
         return joined, "use np.any(…) or np.all(…)"
+    if operator == "^" and "a float" in kinds:
+        return joined, "write ** for a power; ^ is for ints and bools"
     if operator in _BITS:
         return joined, "use ints, bools, or arrays of them; join conditions with `and`, `or`, `not`"
     return joined, "use numbers and arrays"

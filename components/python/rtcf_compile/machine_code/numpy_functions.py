@@ -935,6 +935,9 @@ def _reduction(
     column = column or whole
 
     def choose(a: Any, axis: Any, keepdims: Any) -> Any:
+        if isinstance(axis, types.Float | types.Array):
+            remedy = "use max(a, b) of numbers, np.maximum(a, b) of arrays"
+            raise TypingError(f"RTCF:{name} with {words(axis)} as its axis:{remedy}")
         if isinstance(a, _Numbers):
             return lambda a, axis, keepdims: whole(own.rtcf_array((a,), None))
         _needs(a, name, _ALL)

@@ -1535,7 +1535,7 @@ def _index(value: Any) -> Any:
         return lambda value: value.value
     if isinstance(value, types.Integer | types.Boolean):
         return lambda value: value
-    raise TypingError(f"RTCF:range of {words(value)}:convert it: int(…)")
+    raise TypingError(f"RTCF:range of {words(value)}:use //, or convert it: int(…)")
 
 
 @compiled_as(helpers.rtcf_items)

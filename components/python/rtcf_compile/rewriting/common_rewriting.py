@@ -603,6 +603,8 @@ class CommonRewriting(ast.NodeTransformer):
             scalar = np.dtype(object)
         if not is_number(scalar):
             remedy = "use float, int, bool or complex"
+            if isinstance(value, int):
+                remedy = "write sizes in parentheses: np.zeros((2, 2))"
             raise self.mistake(node, "is not a number type", remedy)
         name = f"rtcf_dtype_{scalar.name}"
         self.constants[name] = scalar.type

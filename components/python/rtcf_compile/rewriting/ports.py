@@ -22,7 +22,7 @@ from rtcf.component.value_type import ValueType
 
 from rtcf_compile.rewriting.common_rewriting import CommonRewriting, call_of, like, loaded
 from rtcf_compile.rewriting.operators import is_narrow
-from rtcf_compile.source.checks import check_index
+from rtcf_compile.source.checks import check_index, resolve
 from rtcf_compile.source.modules import Source
 
 _INPUT_FIELDS = {"value": "", "new": "__new", "valid": "__valid", "age": "__age"}
@@ -39,6 +39,13 @@ class Ports(CommonRewriting):
         """Rewrite a method of a class with these members; see CommonRewriting."""
         self._description = description
         self._self = source.tree.args.args[0].arg if source.tree.args.args else ""
+        self._arguments = {
+            each.arg: kind
+            for each in source.tree.args.args
+            if each.annotation is not None
+            and isinstance(kind := resolve(each.annotation, source), type)
+            and issubclass(kind, enum.IntEnum)
+        }
         super().__init__(source, functions)
         self.used: set[str] = set()
         self.touched: dict[str, ast.AST] = {}
@@ -59,7 +66,11 @@ class Ports(CommonRewriting):
                 check_index(node, member.type.shape, ast.unparse(base), self.source.file)
 
     def _enum_of(self, node: ast.expr) -> type[enum.IntEnum] | None:
-        """Return the declared enum of a member or of the value of a port, or None."""
+        """Return the declared enum of a member, of the value of a port, or of an argument with an
+        annotation; None for others.
+        """
+        if isinstance(node, ast.Name):
+            return self._arguments.get(node.id)
         is_value = isinstance(node, ast.Attribute) and node.attr == "value"
         owner = node.value if is_value else node  # type: ignore[attr-defined]
         if not isinstance(owner, ast.Attribute) or not self._is_self(owner.value):
@@ -231,7 +242,9 @@ class Ports(CommonRewriting):
             return self.mistake(node, f"{name} is a list of messages", "read it in C++")
         if below := message.below(path):
             return self.mistake(node, f"{name} is not a number", f"use .{', .'.join(below)}")
-        has = ", .".join(message.below(path[:-1]))
+        while not message.below(path[:-1]):
+            path = path[:-1]
+        has, name = ", .".join(message.below(path[:-1])), ".".join((message.name, *path))
         return self.mistake(node, f"{name} does not exist", f"use .{has}")
 
     def _queue(self, node: ast.Attribute, port: Member) -> ast.AST:

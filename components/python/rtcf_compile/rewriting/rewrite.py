@@ -13,6 +13,7 @@ from types import FunctionType
 from typing import Any
 
 import numpy as np
+from rtcf.component import Component
 from rtcf.component.declaration import (
     HOOKS,
     LOG_LEVELS,
@@ -132,6 +133,11 @@ class Hook(Ports):
         if message is not None:
             return self._part(node, message, path)
         self._plain_member(node)
+        owner = resolve(node.value, self.source)
+        is_component = isinstance(owner, type) and issubclass(owner, Component)
+        if is_component and node.attr in self._description.members:
+            what = f"{node.attr} belongs to each object of {owner.__name__}"
+            raise self.mistake(node, what, f"write self.{node.attr}")
         port = self._member(node.value)
         if port is not None and port.kind in PORTS:
             return self._queue(node, port) if port.kind is Queue else self._port(node, port)
@@ -146,6 +152,10 @@ class Hook(Ports):
     def visit_Compare(self, node: ast.Compare) -> ast.AST:
         """Rewrite comparisons of an optional state, such as `self.last is None`."""
         if len(node.ops) == 1 and _is_none(node.comparators[0]):
+            port = self._member(getattr(node.left, "value", node.left))
+            if port is not None and port.kind is Input and isinstance(node.left, ast.Attribute):
+                what, remedy = "an input always has a value", f"use self.{port.name}.valid"
+                raise self.mistake(node, what, remedy)
             member = self._optional(node.left)
             if member is not None and isinstance(node.ops[0], ast.Is | ast.Eq):
                 return like(node, ast.UnaryOp(ast.Not(), self._field(member.known, ast.Load())))
@@ -437,7 +447,10 @@ class Hook(Ports):
         if written != node.attr:
             own = private_name(written)
             remedy = f"write `{own}: State[float]` in the class, and self.{own}"
-        elif near := difflib.get_close_matches(node.attr, words, 1, 0.75):
+        elif near := (
+            [each for each in names if each.strip("_") == node.attr.strip("_")]
+            or difflib.get_close_matches(node.attr, words, 1, 0.75)
+        ):
             remedy = f"correct its name (self.{near[0]}), or {remedy}"
         return self.mistake(node, "is not declared", remedy)
 
@@ -457,6 +470,8 @@ class Hook(Ports):
         if name in HOOKS:
             remedy = "call a method that both hooks use"
             raise self.mistake(node, f"{name} is a hook, which the loop calls", remedy)
+        if name in self.source.lifted:
+            raise self.mistake(node, f"{name} is a nested function", f"write {name}(…)")
         if method is None and name not in (*HOOKS, *LOG_LEVELS, "fault"):
             near = difflib.get_close_matches(name, (*self._methods.names(), *LOG_LEVELS), 1, 0.6)
             written = written_name(self._owner, name)
@@ -539,8 +554,10 @@ class Hook(Ports):
             if member.kind is State:
                 self._touch(node, name)
             if member.kind in PORTS:
-                value = "front" if member.kind is Queue else "value"
-                raise self.mistake(node, f"is {a_kind(member)}", f"write self.{name}.{value}")
+                remedy = f"write self.{name}.value"
+                if member.kind is Queue:
+                    remedy = f"write self.{name}.front, or self.{name}.size for their number"
+                raise self.mistake(node, f"is {a_kind(member)}", remedy)
             return self._value(node, name, member)
         if name in self._description.constants:
             return self._named_constant(node, self._description.constants[name])

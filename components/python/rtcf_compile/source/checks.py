@@ -179,6 +179,10 @@ def check(source: Source, members: Collection[str] = ()) -> None:
             node.id in known or node.id.startswith("rtcf_")
         ):  # fmt: skip
             raise _undefined(node, source, members, known)
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.ListComp):
+            raise at(file, node, "a list that is not used", "write a loop: for … in …:")
+        if isinstance(node, ast.Compare):
+            _compared(node, file)
         if isinstance(node, ast.Raise):
             _raised(node, file)
         if isinstance(node, ast.Slice):
@@ -204,8 +208,13 @@ def _undefined(
         return at(source.file, node, f"{name} is a variable of {around}", remedy)
     given = ", ".join(["self", *(each.arg for each in tree.args.args)])
     if name == "self":
-        return at(source.file, node, f"{tree.name} has no self", f"write def {tree.name}({given}):")
+        remedy = f"write def {tree.name}({given}):"
+        if any(ast.unparse(each) == "staticmethod" for each in tree.decorator_list):
+            remedy = f"remove @staticmethod, and {remedy}"
+        return at(source.file, node, f"{tree.name} has no self", remedy)
     remedy = "define it, or correct its name"
+    if name in ("i", "j"):
+        remedy = "define it, or write 1j for the imaginary unit"
     if name in members:
         remedy = f"write self.{name}"
     elif near := difflib.get_close_matches(name, [*members, *known], 1, 0.75):
@@ -403,6 +412,14 @@ def check_arguments(
         name, words = ast.unparse(node.func), ", ".join(map(str, takes))
         what = f"{name} takes {words}" if words else f"{name} takes no arguments"
         raise at(file, node, what, f"write {name}({words})") from None
+
+
+def _compared(node: ast.Compare, file: str) -> None:
+    """Reject comparisons with texts, which no value of a component equals."""
+    for each in (node.left, *node.comparators):
+        if _is_text(each) and all(isinstance(of, ast.Eq | ast.NotEq) for of in node.ops):
+            remedy = "compare with a member of its enum: self.mode == Mode.RUN"
+            raise at(file, node, "is compared with a text, which differs from all values", remedy)
 
 
 def _raised(node: ast.Raise, file: str) -> None:

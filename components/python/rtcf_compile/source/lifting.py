@@ -18,7 +18,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from rtcf_compile.source.mistake import at
-from rtcf_compile.source.port_loops import by_port, leaves
+from rtcf_compile.source.port_loops import by_port, is_member, leaves
 from rtcf_compile.source.scopes import bound, free
 
 _Node = TypeVar("_Node", bound=ast.AST)
@@ -116,6 +116,7 @@ def lift(tree: ast.FunctionDef, function: FunctionType, file: str) -> dict[str, 
     """
     lifting = _Lifting(tree, function, file)
     lifting.block(tree.body)
+    lifting.drop_tuples()
     return lifting.functions
 
 
@@ -130,6 +131,7 @@ class _Lifting(ast.NodeTransformer):
         self._variables = bound(tree) - self._nested
         self._lists = self._arrays_for_lists()
         self._dicts = dict(self._local_dicts())
+        self._port_tuples = dict(self._tuples_of_ports())
         known = _trees.get(function.__code__)
         self.functions: dict[str, FunctionType] = dict(known[1]) if known else {}
         # The nested functions that may be called here: how they are called, and their variables.
@@ -160,7 +162,7 @@ class _Lifting(ast.NodeTransformer):
         if isinstance(node, ast.With) and all(map(self._is_errstate, node.items)):
             return [part for each in node.body for part in self._simpler(each)]
         if isinstance(node, ast.For) and not node.orelse and not leaves(node.body):
-            rounds = by_port(node.target, node.iter, node.body)
+            rounds = by_port(node.target, self._ports(node.iter), node.body)
             if rounds is not None:
                 return [
                     part
@@ -199,6 +201,11 @@ class _Lifting(ast.NodeTransformer):
         if sum(_sets(each, name) for each in ast.walk(self._tree)) > 1:
             raise self._mistake(node, f"{name} is set twice", "use two names")
         for each in ast.walk(nested):
+            if isinstance(each, ast.AugAssign) and isinstance(each.target, ast.Name):
+                changed = each.target.id
+                if changed in self._variables and changed not in _set_before(nested, each):
+                    what = f"{changed} belongs to the function around {name}"
+                    raise self._mistake(each.target, what, "return the new value, or use a State")
             if isinstance(each, ast.Nonlocal):
                 remedy = "declare a State, or return the value"
                 raise self._mistake(each, "nonlocal is not compiled", remedy)
@@ -569,10 +576,45 @@ class _Lifting(ast.NodeTransformer):
         """Return the elements of a comprehension over ports, or None."""
         first, conditions = node.generators[0], node.generators[0].ifs
         used = [ast.Expr(each) for each in (node.elt, *conditions)]
-        rounds = by_port(first.target, first.iter, used)
+        rounds = by_port(first.target, self._ports(first.iter), used)
         if len(node.generators) > 1 or rounds is None or any(before for _, before in rounds):
             return None
         return [_Named(ports).visit(copy.deepcopy(node.elt)) for ports, _ in rounds]
+
+    def drop_tuples(self) -> None:
+        """Drop tuples of ports whose loops are written out."""
+        read = {each.id for each in ast.walk(self._tree)
+                if isinstance(each, ast.Name) and isinstance(each.ctx, ast.Load)}  # fmt: skip
+        for each in ast.walk(self._tree):
+            if isinstance(each, ast.Assign) and any(
+                isinstance(target, ast.Name) and target.id in set(self._port_tuples) - read
+                for target in each.targets
+            ):
+                each.value = ast.copy_location(ast.Constant(0), each.value)
+
+    def _ports(self, node: ast.expr) -> ast.expr:
+        """Return an iterable with variables that are tuples of ports replaced by these."""
+        return _Named(dict(self._port_tuples)).visit(copy.deepcopy(node))  # type: ignore[no-any-return]
+
+    def _tuples_of_ports(self) -> Iterator[tuple[str, ast.expr]]:
+        """Yield the variables that are set once, to members, and only iterated."""
+        for each in ast.walk(self._tree):
+            target = each.targets[0] if isinstance(each, ast.Assign) else None
+            if not isinstance(target, ast.Name) or not isinstance(each, ast.Assign):
+                continue
+            is_display = isinstance(each.value, ast.Tuple | ast.List)
+            if not is_display or not all(map(is_member, each.value.elts)):  # type: ignore[attr-defined]
+                continue
+            loops = [
+                of for of in ast.walk(self._tree) if isinstance(of, ast.For | ast.comprehension)
+            ]
+            uses = [name for of in loops for name in ast.walk(of.iter)]
+            count = sum(isinstance(of, ast.Name) and of.id == target.id for of in uses)
+            every = sum(
+                isinstance(of, ast.Name) and of.id == target.id for of in ast.walk(self._tree)
+            )
+            if len(each.targets) == 1 and count and every == 1 + count:
+                yield target.id, each.value
 
     def _written_out(self, node: _Comprehension) -> list[ast.expr] | None:
         """Return the elements of a comprehension over a few constants, names or ports, or None."""
@@ -734,6 +776,14 @@ def _nested(node: ast.AST) -> Iterator[tuple[str, ast.FunctionDef | ast.Lambda]]
         and isinstance(node.targets[0], ast.Name)
     ):
         yield node.targets[0].id, node.value
+
+
+def _set_before(nested: ast.FunctionDef | ast.Lambda, node: ast.stmt) -> set[str]:
+    """Return the arguments and variables that a function sets in other statements."""
+    inner = copy.copy(nested)
+    names = {each.id for each in ast.walk(inner) if isinstance(each, ast.Name)
+             and isinstance(each.ctx, ast.Store) and each is not node.target}  # type: ignore[attr-defined]  # fmt: skip
+    return names | {each.arg for each in ast.walk(inner.args) if isinstance(each, ast.arg)}
 
 
 def _sets(node: ast.AST, name: str) -> bool:

@@ -5,8 +5,9 @@ import hashlib
 import importlib.util
 import inspect
 import linecache
+import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import FunctionType, ModuleType
@@ -65,6 +66,8 @@ def load(file: Path) -> ModuleType:
         if isinstance(error, ModuleNotFoundError) and error.name == "rtcf.signal":
             remedy = "write from rtcf.linear import …"
             raise Mistake(str(file), line, "rtcf.signal is now rtcf.linear", remedy) from None
+        if isinstance(error, ImportError) and (found := _moved(error)):
+            raise Mistake(str(file), line, *found) from None
         what = f"{type(error).__name__}: {error}"
         if found := numpy_errors.explained(error, source_line(str(file), line)):
             what = found[0]
@@ -87,7 +90,20 @@ def components(module: ModuleType) -> list[type[Component]]:
     bases = {base for each in found for base in each.__mro__[1:]}
     # A base class without update is not a component.
     whole = [each for each in found if each not in bases or each.update is not Component.update]
+    _check_names(module, found)
     return sorted(dict.fromkeys(whole), key=lambda each: inspect.getsourcelines(each)[1])
+
+
+def _check_names(module: ModuleType, found: Sequence[type]) -> None:
+    """Reject two classes of one name: the second would hide the first."""
+    file = module.__file__ or "?"
+    tree = ast.parse("".join(linecache.getlines(file)))
+    seen: set[str] = set()
+    for each in tree.body:
+        if isinstance(each, ast.ClassDef) and each.name in {of.__name__ for of in found}:
+            if each.name in seen:
+                raise Mistake(file, each.lineno, f"{each.name} is defined twice", "rename one")
+            seen.add(each.name)
 
 
 def read(function: FunctionType, is_whole: bool = False) -> Source:
@@ -131,6 +147,18 @@ def is_of_user(value: Any) -> bool:
     file = getattr(module, "__file__", None) or ""
     packages = ("/dist-packages/", "/site-packages/", "/lib/python3")
     return bool(file) and not any(each in file for each in packages)
+
+
+def _moved(error: ImportError) -> tuple[str, str] | None:
+    """Return the error and the remedy for a name that is in a module of the imported package."""
+    name, package = getattr(error, "name_from", None), error.name or ""
+    if found := re.match(r"cannot import name '(\w+)' from '([\w.]+)'", str(error)):
+        name, package = found[1], found[2]
+    if package.endswith("_msgs"):
+        return f"{package} has no {name}", f"write from {package}.msg import {name}"
+    if package == "rtcf":
+        return f"rtcf has no {name}", f"write from rtcf.component import {name}"
+    return None
 
 
 def _parts(text: str) -> tuple[str, str]:

@@ -28,7 +28,7 @@ def by_port(
     ):
         return None
     columns = [each.elts for each in several]  # type: ignore[attr-defined]
-    are_ports = [all(map(_is_member, each)) for each in columns]
+    are_ports = [all(map(is_member, each)) for each in columns]
     rounds: list[tuple[dict[str, ast.expr], list[ast.stmt]]] = []
     for values in zip(*columns, strict=False):
         ports: dict[str, ast.expr] = {}
@@ -47,7 +47,8 @@ def by_port(
     return rounds if rounds and all(ports for ports, _ in rounds) else None
 
 
-def _is_member(node: ast.AST) -> bool:
+def is_member(node: ast.AST) -> bool:
+    """Tell whether a node is `self.name`."""
     return isinstance(node, ast.Attribute) and ast.unparse(node.value) == "self"
 
 
