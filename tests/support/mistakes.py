@@ -177,7 +177,6 @@ UPDATE: dict[str, tuple[str, str]] = {
         "a = np.linalg.matrix_power(self.m, 1)\na[0, 0] = 1.0  # here",
         "the same array",
     ),
-    "real part": ("self.z[:] = np.real(self.z)", "np.real"),
     "pair of one array": (
         "a, b = self.z, self.z\nself.z = 2.0 * self.z\na += 1.0  # here\nself.x.write(b)",
         "the same array",
@@ -414,7 +413,7 @@ UPDATE: dict[str, tuple[str, str]] = {
     "random vector": ("self.z[:] = np.random.randn(2)", "replay"),
     "random generator": ("rng = np.random.default_rng(1)", "replay"),
     "errstate": (
-        "with np.errstate(all='ignore'):  # here\n    self.f = 1.0 / self.f",
+        "with np.errstate(all='raise'):  # here\n    self.f = 1.0 / self.f",
         "open or lock",
     ),
     "printoptions": ("np.set_printoptions(precision=3)", "np.set_printoptions"),
@@ -425,8 +424,8 @@ UPDATE: dict[str, tuple[str, str]] = {
     "functools": ("a = functools.reduce(limited, (1.0, 2.0))", "functools"),
     # Statements.
     "list that grows": ("values = []\nvalues.append(1.0)  # here", "cannot grow"),
-    "list comprehension": ("a = [2.0 * each for each in self.z]", "list"),
-    "dict": ("a = {'kp': 1.0}", "dict"),
+    "list comprehension": ("a = [2.0 * each for each in self.z]  # here\nb = a", "list"),
+    "dict": ("a = {'kp': 1.0}  # here\na['ki'] = 2.0", "dict"),
     "key that a dict has not": ("self.f = GAINS['kd']", "'kd'"),
     "dict of the module": ("a = GAINS", "GAINS"),
     "dict call": ("a = dict(kp=1.0)", "dict"),
@@ -763,7 +762,6 @@ CLASS: dict[str, tuple[str, str]] = {
         "write `_v: State",
     ),
     "word of every component": ("time: State[float]", "time"),
-    "log's word": ("info: State[float]", "info"),
     "initial value that does not fit": ("v: State[np.uint8] = State(300)", "uint8"),
     "mode that is none": ("v: State[Mode] = State(5)", "Mode"),
     "element name taken": ("gains_0: Parameter[float] = Parameter(1.0)", "gains_0"),

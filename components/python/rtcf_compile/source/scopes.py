@@ -30,7 +30,8 @@ def everywhere(tree: ast.AST) -> frozenset[str]:
     for each in ast.walk(tree):
         if isinstance(each, _FUNCTIONS):
             found |= set(_arguments(each.args))
-        found |= set(_own(each))
+        if each is not tree:
+            found |= set(_own(each))
     return frozenset(found)
 
 
