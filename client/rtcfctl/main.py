@@ -144,7 +144,9 @@ def _run(args: argparse.Namespace, output: "Output") -> int:
     except rtcf.DaemonUnreachableError as error:
         return _fail(error, UNREACHABLE)
     except rtcf.RtcfError as error:
-        return _fail(error, REFUSED)
+        for line in error.lines:
+            _fail(line, REFUSED)
+        return REFUSED
     except ValueError as error:
         return _fail(error, USAGE)
     except BrokenPipeError:

@@ -453,6 +453,8 @@ class Program:
         ways = [
             f"np.concatenate(({parts[0]}, {parts[1]}))",
             f"np.sort({parts[2]})",
+            f"np.roll({parts[2]}, {self._draw.randint(-3, 9)})",
+            f"np.flip({parts[2]})",
             f"np.cumsum({parts[2]})",
             f"np.clip({parts[2]}, -2.0, {self._float(scope, 0)})",
             f"np.clip({parts[2]}, {self._vector(scope, size, 0)}, 3.0)",
@@ -468,6 +470,8 @@ class Program:
             ways += [f"np.{name}({matrix}, axis={axis})", f"{matrix}.{name}(axis={axis})"]
             ways += [f"np.diag({matrix})", f"np.linalg.norm({matrix}, axis={axis})"]
             ways += [f"np.cross({parts[2]}, {self._vector(scope, size, 0)})"]
+            ways += [f"np.einsum('ij,j->i', {matrix}, {parts[2]})"]
+            ways += [f"np.einsum('ii->i', {self._matrix(scope, 0)})"]
         return self._draw.choice(ways)
 
     def _matrix_of(self, scope: _Scope, depth: int) -> str:
@@ -486,6 +490,8 @@ class Program:
                 f"np.linalg.matrix_power({self._matrix(scope, 0)}, {self._draw.randint(0, 4)})",
                 f"{self._matrix(scope, depth - 1)}.reshape(9)[::-1].reshape(3, -1)",
                 f"np.sort({self._matrix(scope, 0)}, axis={self._draw.choice([0, 1])})",
+                f"np.einsum('ij->ji', {self._matrix(scope, depth - 1)})",
+                f"np.roll({self._matrix(scope, 0)}, 1, axis={self._draw.choice([0, 1])})",
             ]
         )
 

@@ -135,6 +135,7 @@ class Parameter(Declarable):
 class State(Declarable):
     """A value that the component keeps from one cycle to the next: `self.integral += …`.
 
+    `_integral` is a private name in the class; outside the component, the state is `integral`.
     With `live=True`, neither `rtcfctl reset` nor `rtcfctl restore` changes it while the loop runs
     in real time: for a latched stop, or the last command of a drive.
     """
@@ -239,9 +240,10 @@ def own_field(name: str) -> str:
 def describe(cls: type) -> Description:
     """Return the declarations of a class, those of its base classes first.
 
-    Raises DeclarationError, with file and line.
+    Raises DeclarationError: a line for each error, with file and line.
     """
     result = Description(cls.__name__, _first_line(cls.__doc__) or cls.__name__)
+    errors: list[DeclarationError] = []
     for base in reversed(cls.__mro__):
         if base in (object,) or base.__module__.startswith("rtcf.component"):
             continue
@@ -261,31 +263,28 @@ def describe(cls: type) -> Description:
                 if member.type.optional:
                     result.members[member.known] = _known(member)
             except DeclarationError as error:
-                raise _at(error, base, line, written) from None
+                errors.append(_at(error, base, line, written))
         for name, value in vars(base).items():
             if name.startswith("__") or name in annotations or callable(value):
                 continue
             if isinstance(value, MemberAttribute):
                 continue
             if isinstance(value, Declared):
-                kind = value.kind.__name__
-                raise _at(
-                    DeclarationError(f"is set to a type: write `{name}: {kind}[…]`"),
-                    base,
-                    lines.get(name, 0),
-                    name,
+                typed = DeclarationError(
+                    f"is set to a type: write `{name}: {value.kind.__name__}[…]`"
                 )
+                errors.append(_at(typed, base, lines.get(name, 0), name))
+                continue
             if isinstance(value, Declarable):
                 kind, written = type(value).__name__, written_name(base, name)
                 own = written if written == name else private_name(written)
-                raise _at(
-                    DeclarationError(f"has no annotation: write `{own}: {kind}[float] = …`"),
-                    base,
-                    lines.get(written, 0),
-                    written,
-                )
+                missing = DeclarationError(f"has no annotation: write `{own}: {kind}[float] = …`")
+                errors.append(_at(missing, base, lines.get(written, 0), written))
+                continue
             if not isinstance(value, staticmethod | classmethod | property | cached_property):
                 result.constants[name] = value
+    if errors:
+        raise DeclarationError("\n".join(" ".join(str(each).split()) for each in errors))
     states: dict[str, str] = {}
     for member in result.of(State):
         if (other := states.setdefault(member.outer_name, member.name)) != member.name:

@@ -3,6 +3,7 @@
 import argparse
 import sys
 from collections.abc import Iterable
+from contextlib import ExitStack
 from typing import Any
 
 import rtcf
@@ -10,6 +11,7 @@ from rtcf.v1 import control_pb2, graph_pb2
 from rtcf_shared.naming import listing, suggestion
 
 from rtcfctl.graph import python_source
+from rtcfctl.graph.compiler import Compiler
 from rtcfctl.terminal import words
 from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.plain import enumerator
@@ -87,14 +89,19 @@ def load(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Load a component."""
     if args.watch and not python_source.is_source(args.package):
         raise ValueError("--watch requires a Python source: rtcfctl load FILE.py COMPONENT --watch")
-    changes = python_source.changes(args.package) if args.watch else None
-    spec = _spec(args, output)
-    with python_source.found_by_rtcfd(args.package):
-        result = client.load(spec, args.runner, output.progress, wait=args.wait)
-    output.changed(f"loaded {result.component}", result)
-    if changes is not None:
-        sys.stdout.flush()
-        watch(client, args, output, result.component, changes)
+    with ExitStack() as ends:
+        if args.watch:
+            changes = python_source.changes(args.package)
+            compiler = ends.enter_context(python_source.warm_compiler(args.build_tree))
+            spec = _spec(args, output, compiler)
+        else:
+            spec = _spec(args, output)
+        with python_source.found_by_rtcfd(args.package):
+            result = client.load(spec, args.runner, output.progress, wait=args.wait)
+        output.changed(f"loaded {result.component}", result)
+        if args.watch:
+            sys.stdout.flush()
+            watch(client, args, output, result.component, changes, compiler)
 
 
 def watch(
@@ -103,6 +110,7 @@ def watch(
     output: Output,
     name: str,
     changes: Iterable[bool],
+    compiler: Compiler,
 ) -> None:
     """Replace a component whenever its Python source is saved."""
     for at, saved in enumerate(changes):
@@ -111,13 +119,13 @@ def watch(
         if not saved:
             continue
         try:
-            spec = _spec(args, output)
+            spec = _spec(args, output, compiler)
             # As the command line does not change, tuned parameters keep their values.
             with python_source.found_by_rtcfd(args.package):
                 result = client.replace(name, spec, args.runner, output.progress, given_before=spec)
         except (rtcf.RefusedError, python_source.NotCompiledError) as error:
             # The loop continues with the present component.
-            output.line(f"rtcfctl: {error}", to=sys.stderr)
+            output.error(error)
         else:
             output.changed(f"reloaded {name} from {args.package}{_kept(result)}", result)
             sys.stdout.flush()
@@ -372,11 +380,13 @@ def _component_options(to: argparse.ArgumentParser, needed: bool = True) -> None
     )
 
 
-def _spec(args: argparse.Namespace, output: Output) -> graph_pb2.ComponentSpec:
+def _spec(
+    args: argparse.Namespace, output: Output, compiler: Compiler | None = None
+) -> graph_pb2.ComponentSpec:
     package = args.package
     if python_source.is_source(package):
         package = python_source.compiled(
-            package, args.build_tree, output.progress, not args.no_verify
+            package, args.build_tree, output.begin, not args.no_verify, compiler
         )
     return rtcf.component(
         package,

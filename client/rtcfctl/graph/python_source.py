@@ -4,29 +4,36 @@ interpreter, and caches the library.
 
 import argparse
 import hashlib
-import importlib.util
+import json
 import os
-import platform
 import re
-import shutil
-import subprocess
-import sysconfig
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import rtcf
 from rtcf_shared.folders import compiled_folder
 
+from rtcfctl.graph.compiler import Compiler, SingleCompiler, WarmCompiler, program
+from rtcfctl.graph.source_files import Changes, compiler_version, dependencies, fingerprint
+
 _POLL_S = 0.2
 _VERIFY = "1s"  # processor time of the comparison
 _DIFFERENT = 3  # exit status of rtcf-compile if the comparison rejects the component
-_VERIFIED = " verified"
+_MOST_TIMES = 3  # compilations, if files change meanwhile
+_RESOLUTION_NS = 50_000_000  # of the times of files
 
 
 class NotCompiledError(rtcf.RtcfError):
-    """The source cannot be compiled; the message is one line."""
+    """The source cannot be compiled; the message has a line for each error."""
+
+    @property
+    def lines(self) -> list[str]:
+        """The errors."""
+        return str(self).splitlines()
 
 
 def is_source(package: str) -> bool:
@@ -43,44 +50,120 @@ def add_option(to: argparse.ArgumentParser) -> None:
     )
 
 
+def warm_compiler(build_tree: Path | None) -> WarmCompiler:
+    """Return a compiler for several compilations."""
+    return WarmCompiler(partial(_program, build_tree), compiler_version)
+
+
 def compiled(
-    source: str, build_tree: Path | None, progress: Callable[[str], None], verify: bool = True
+    source: str,
+    build_tree: Path | None,
+    progress: Callable[[str], None],
+    verify: bool = True,
+    compiler: Compiler | None = None,
 ) -> str:
     """Return the package of a source; compile it unless the cached library is up to date.
 
     Private daemons find the package.  With `verify`, the machine code of each version of the
-    source is compared with the interpreter once.  Raises NotCompiledError.
+    source is compared with the interpreter once.  `progress` receives a line before a compilation.
+    Raises NotCompiledError.
     """
     file = Path(source).resolve()
     if not file.is_file():
         raise NotCompiledError(f"{source}: no such file")
-    path_hash = hashlib.sha256(os.fsencode(file)).hexdigest()[:8]
-    package = f"{_ros_name(file.stem)}_{path_hash}"
-    library = compiled_folder() / package / f"{file.stem}.so"
-    # The file of the fingerprint is beside the package's folder, which has only libraries.
-    saved_file = compiled_folder() / f".{package}"
-    current = fingerprint(file)
-    saved = saved_file.read_text() if library.is_file() and saved_file.is_file() else ""
-    if saved == current + _VERIFIED or (saved == current and not verify):
-        return package
-    progress(f"compiling {source}")
-    options = ["--verify", _VERIFY] if verify else []
-    if saved != current:
-        options += ["-o", str(library)]
-    done = subprocess.run(
-        [_compiler(build_tree), source, *options], capture_output=True, text=True, check=False
-    )
-    if done.returncode != 0:
-        said = done.stderr.strip() or f"rtcf-compile ended with status {done.returncode}"
-        if done.returncode == _DIFFERENT:
-            said += f"; `rtcf-compile {source} --verify` shows details, --no-verify skips this"
-        raise NotCompiledError(said.removeprefix("rtcf-compile: "))
+    place = _Place(file)
+    saved = place.saved()
+    current = fingerprint(file, saved.dependencies)
+    if saved.fingerprint == current and (saved.is_verified or not verify):
+        return place.package
+    progress(f"compiling {source} …")
+    compiler = compiler or SingleCompiler(_program(build_tree))
+    is_compiled = saved.fingerprint == current
+    for _ in range(_MOST_TIMES):
+        options = [*(["--verify", _VERIFY] if verify else []), *place.depfile()]
+        if not is_compiled:
+            options += ["-o", str(place.library)]
+        begin_ns = time.time_ns()
+        status, errors = compiler.run([source, *options], progress)
+        others = place.dependencies()
+        if status != 0:
+            place.save(_Saved("", False, others))
+            said = "\n".join(errors) or f"rtcf-compile ended with status {status}"
+            if status == _DIFFERENT:
+                said += f"; `rtcf-compile {source} --verify` shows details, --no-verify skips this"
+            raise NotCompiledError(said)
+        # A file that was saved meanwhile may be compiled in part.
+        new = set(others) - set(saved.dependencies)
+        is_current = current == fingerprint(file, saved.dependencies)
+        saved = _Saved(fingerprint(file, others), verify, others)
+        if is_current and not any(map(partial(_is_newer, than_ns=begin_ns), new)):
+            break
+        current, is_compiled = saved.fingerprint, False
     # rtcfd loads libraries only from folders without write permission for others; the umask may
     # permit more.
-    for each in (library, library.parent, library.parents[1]):
+    for each in (place.library, place.library.parent, place.library.parents[1]):
         each.chmod(0o755)
-    saved_file.write_text(current + (_VERIFIED if verify else ""))
-    return package
+    place.save(saved)
+    return place.package
+
+
+@dataclass(frozen=True)
+class _Saved:
+    """What is known about a compiled library."""
+
+    fingerprint: str = ""
+    is_verified: bool = False
+    dependencies: list[Path] = field(default_factory=list)
+
+
+class _Place:
+    """The files of a source in the cache."""
+
+    def __init__(self, source: Path) -> None:
+        path_hash = hashlib.sha256(os.fsencode(source)).hexdigest()[:8]
+        self.package = f"{_ros_name(source.stem)}_{path_hash}"
+        self.library = compiled_folder() / self.package / f"{source.stem}.so"
+        # These files are beside the package's folder, which has only libraries.
+        self._saved = compiled_folder() / f".{self.package}"
+        self._rule = compiled_folder() / f".{self.package}.d"
+
+    def saved(self) -> _Saved:
+        """Return what is known about the library; nothing if there is none."""
+        try:
+            found = json.loads(self._saved.read_text())
+            others = [Path(each) for each in found["dependencies"]]
+            exists = self.library.is_file()
+            return _Saved(found["fingerprint"] if exists else "", found["is_verified"], others)
+        except (OSError, ValueError, LookupError, TypeError):
+            return _Saved()
+
+    def save(self, saved: _Saved) -> None:
+        """Save what is known about the library."""
+        content = {**vars(saved), "dependencies": list(map(str, saved.dependencies))}
+        self._saved.parent.mkdir(parents=True, exist_ok=True)
+        part = self._saved.with_name(f"{self._saved.name}.{os.getpid()}")
+        part.write_text(json.dumps(content))
+        part.replace(self._saved)
+
+    def depfile(self) -> list[str]:
+        """Return the option for the file of the dependencies."""
+        self._rule.parent.mkdir(parents=True, exist_ok=True)
+        self._rule.unlink(missing_ok=True)
+        return ["--depfile", str(self._rule)]
+
+    def dependencies(self) -> list[Path]:
+        """Return the dependencies of the last compilation."""
+        try:
+            return dependencies(self._rule.read_text())
+        except OSError:
+            return []
+
+
+def _is_newer(file: Path, than_ns: int) -> bool:
+    try:
+        return file.stat().st_mtime_ns >= than_ns - _RESOLUTION_NS
+    except OSError:
+        return True
 
 
 @contextmanager
@@ -108,64 +191,41 @@ def _ros_name(stem: str) -> str:
 
 
 def changes(source: str) -> Iterator[bool]:
-    """Yield, every 0.2 s, whether the content of a source or of a Python file beside it has changed
-    since the last time.  The first comparison is with the content at the time of this call, so
-    that a change during a compilation is not missed."""
+    """Yield, every 0.2 s, whether the content of a source, of a Python file beside it, or of a file
+    that it reads has changed since the last time.  The first comparison is with the content at the
+    time of this call, so that a change during a compilation is not missed."""
     file = Path(source).resolve()
-    return _changes(file, fingerprint(file))
+    return _changes(SourceChanges(file))
 
 
-def _changes(file: Path, last: str) -> Iterator[bool]:
+def _changes(watched: "SourceChanges") -> Iterator[bool]:
     while True:
         time.sleep(_POLL_S)
-        now = fingerprint(file)
-        yield now != last
-        last = now
+        yield watched.found()
 
 
-def fingerprint(source: Path) -> str:
-    """Return a hash of everything that the compiled library depends on: the Python files in the
-    source's folder, the compiler, and the runtime that is linked into each library.
-    """
-    # A compiled library links shared libraries whose names depend on the release of Debian.
-    digest = hashlib.sha256(f"{rtcf.__version__} {_release()}\n".encode())
-    compiler = importlib.util.find_spec("rtcf_compile")
-    files = sorted(source.parent.glob("*.py"))
-    if compiler is not None and compiler.origin is not None:
-        folder = Path(compiler.origin).parent
-        files += sorted(each for each in folder.rglob("*") if each.suffix in (".py", ".hpp"))
-        digest.update(f"{_runtime(folder)}\n".encode())
-    for file in files:
-        try:
-            content = file.read_bytes()
-        except OSError:
-            continue  # it is being saved
-        digest.update(f"{file.name} {len(content)}\n".encode() + content)
-    return digest.hexdigest()
+class SourceChanges:
+    """Watches a source and the files on which it depended when it was compiled last."""
+
+    def __init__(self, source: Path) -> None:
+        """Compare with the content at the time of this call."""
+        self._place = _Place(source)
+        self._changes = Changes(source, self._place.saved().dependencies)
+
+    def found(self) -> bool:
+        """Return whether the content has changed since the last call."""
+        saved = self._place.saved()
+        self._changes.watch(saved.dependencies, saved.fingerprint)
+        return self._changes.found()
+
+    @property
+    def fingerprint(self) -> str:
+        """A hash of the content at the last call of found()."""
+        return self._changes.fingerprint
 
 
-def _runtime(compiler: Path) -> str:
-    """Return the size and time of the runtime of a compiler, in a build tree or installed."""
-    triplet = sysconfig.get_config_var("MULTIARCH") or ""
-    for folder in (compiler.parents[1] / "lib", Path("/usr/lib") / triplet):
-        try:
-            found = (folder / "librtcf_python.a").stat()
-        except OSError:
-            continue
-        return f"{found.st_size} {found.st_mtime_ns}"
-    return ""
-
-
-def _compiler(build_tree: Path | None) -> str:
-    own = build_tree / "bin" / "rtcf-compile" if build_tree else Path("/usr/bin/rtcf-compile")
-    found = str(own) if own.is_file() else shutil.which("rtcf-compile")
-    if found is None:
-        raise NotCompiledError("rtcf-compile not found: sudo apt install rtcf-python")
-    return found
-
-
-def _release() -> str:
+def _program(build_tree: Path | None) -> str:
     try:
-        return platform.freedesktop_os_release().get("VERSION_ID", "")
-    except OSError:
-        return ""
+        return program(build_tree)
+    except rtcf.RtcfError as error:
+        raise NotCompiledError(str(error)) from None

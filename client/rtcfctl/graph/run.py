@@ -4,8 +4,8 @@ It reloads saved files and rebuilt libraries; the daemon logs to the standard er
 """
 
 import argparse
-import sys
 import time
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from rtcf.private_daemon import BUILT, PrivateDaemon, component_folders, program
 from rtcf.v1 import graph_pb2
 
 from rtcfctl.graph import files, python_source
+from rtcfctl.graph.compiler import Compiler
 from rtcfctl.terminal.interruption import interrupted_by_termination
 from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.words import counted
@@ -42,7 +43,14 @@ def show(_: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Run the loop until Ctrl-C.  Raises ValueError, and RtcfError if the daemon ends."""
     if python_source.is_source(args.file) != bool(args.type):
         raise ValueError("run: specify a graph file, or FILE.py and CLASS")
-    source = _Source(args, output)
+    with ExitStack() as ends:
+        compiler = None
+        if args.type:
+            compiler = ends.enter_context(python_source.warm_compiler(args.build_tree))
+        _run(args, _Source(args, output, compiler), output)
+
+
+def _run(args: argparse.Namespace, source: "_Source", output: Output) -> None:
     graphs = source.read()  # report errors in the file before the daemon starts
     try:
         folders = component_folders(args.path)
@@ -84,9 +92,12 @@ def _full_name(spec: graph_pb2.ComponentSpec) -> str:
 class _Source:
     """The graph file or Python source, its last applied version, and the last reported error."""
 
-    def __init__(self, args: argparse.Namespace, output: Output) -> None:
+    def __init__(self, args: argparse.Namespace, output: Output, compiler: Compiler | None) -> None:
         self._args = args
         self._output = output
+        self._compiler = compiler
+        source = Path(args.file).resolve()
+        self._changes = python_source.SourceChanges(source) if args.type else None
         self._last = self._content()
         self._refused = ""
         # The specs of the file when it was last applied, by runner and full name.
@@ -97,8 +108,9 @@ class _Source:
         file = self._args.file
         if self._args.type:
             package = python_source.compiled(
-                file, self._args.build_tree, self._output.progress, not self._args.no_verify
-            )
+                file, self._args.build_tree, self._output.begin, not self._args.no_verify,
+                self._compiler,
+            )  # fmt: skip
             spec = rtcf.component(package, self._args.type)
             return [rtcf.Graph(self._args.runner or DEFAULT_RUNNER, components=[spec])]
         graphs = rtcf.read_graphs(*files.read(file))
@@ -152,7 +164,7 @@ class _Source:
             said = f"{content!r} {error}"
             if said == self._refused or isinstance(error, python_source.NotCompiledError):
                 self._last = content
-                print(f"rtcfctl: {error}", file=sys.stderr)
+                self._output.error(error)
             self._refused = said
             return
         self._refused = ""
@@ -162,8 +174,9 @@ class _Source:
 
     def _content(self) -> object:
         """Return a value that changes with the file's content; None if there is no file."""
-        if self._args.type:
-            return python_source.fingerprint(Path(self._args.file).resolve())
+        if self._changes is not None:
+            self._changes.found()
+            return self._changes.fingerprint
         try:
             status = Path(self._args.file).stat()
         except OSError:

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any, TextIO
 
 from rtcf.v1 import control_pb2
+from rtcf_shared.errors import RtcfError
 
 from rtcfctl.terminal.plain import number, plain
 from rtcfctl.terminal.safe_streams import control
@@ -109,6 +110,15 @@ class Output:
         """Print the progress of a call, if verbose or after 10 s."""
         if self._verbose or time.monotonic() - self._since > _PATIENCE_S:
             print(line, file=sys.stderr)
+
+    def begin(self, line: str) -> None:
+        """Print at once what begins and takes seconds."""
+        print(line, file=sys.stderr, flush=True)
+
+    def error(self, error: RtcfError) -> None:
+        """Print an error after which the command goes on."""
+        for line in error.lines:
+            print(f"rtcfctl: {line}", file=sys.stderr, flush=True)
 
     def alarm(self, runner: str, reasons: Iterable[str], to: TextIO | None = None) -> None:
         """Print the reasons why a runner is not real time."""

@@ -7,7 +7,10 @@ import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rtcf_compile.source.report import Report
 
 DONE, REFUSED, USAGE, DIFFERENT = range(4)
 INTERRUPTED = 130
@@ -34,40 +37,77 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "processor time: 1s (default: 10000)",
     )
     parser.add_argument("--seed", metavar="N", type=int, default=1, help="seed of the inputs")
+    parser.add_argument(
+        "--depfile",
+        metavar="FILE",
+        type=Path,
+        help="write the files that the library depends on to this file, as a rule for make",
+    )
     args = parser.parse_args(arguments)
     if args.output is None and args.verify is None:
         parser.error("give -o LIB, --verify or both")
     if args.verify is not None and not _AMOUNT.fullmatch(args.verify):
         parser.error(f"--verify {args.verify}: give cycles (10000) or seconds (1s)")
-    from rtcf.component import DeclarationError
-
-    from rtcf_compile.source.mistake import Mistake
-
     try:
-        classes = _classes(args.sources)
-        if importlib.util.find_spec("numba") is None:
-            print("rtcf-compile: needs numba: sudo apt install python3-numba", file=sys.stderr)
-            return REFUSED
-        # Importing numba takes a second: import it only after the cheap checks.
-        from rtcf_compile.library import build, log_text
-        from rtcf_compile.machine_code import object_file
-
-        # Otherwise a tenth of the time goes into searches for garbage.
-        gc.freeze()
-        gc.set_threshold(100_000, 20, 20)
-        compiled = [object_file.compile_component(each) for each in classes]
-        for each in compiled:
-            log_text.check(each.logs)
-        if args.verify is not None and not _verified(classes, compiled, args):
-            return DIFFERENT
-        if args.output is not None:
-            build.library(compiled, args.output)
-    except (Mistake, DeclarationError) as error:
-        print(f"rtcf-compile: {' '.join(str(error).split())}", file=sys.stderr)
-        return REFUSED
+        return _run(args)
     except KeyboardInterrupt:
         return INTERRUPTED
-    return DONE
+
+
+def _run(args: argparse.Namespace) -> int:
+    from rtcf_compile.source.report import Report
+
+    report = Report()
+    classes = _classes(args.sources, report)
+    if args.depfile is not None:
+        from rtcf_compile.source import dependencies
+
+        args.depfile.write_text(dependencies.rule(args.output or args.sources[0]))
+    if classes and importlib.util.find_spec("numba") is None:
+        print("rtcf-compile: needs numba: sudo apt install python3-numba", file=sys.stderr)
+        return REFUSED
+    compiled = _compiled(classes, report) if classes else []
+    if not report and args.verify is not None:
+        with report.collected():
+            if not _verified(classes, compiled, args):
+                return DIFFERENT
+    if not report and args.output is not None:
+        from rtcf_compile.library import build
+
+        with report.collected():
+            build.library(compiled, args.output)
+    return _reported(report)
+
+
+def _reported(report: "Report") -> int:
+    for line in report.lines():
+        print(f"rtcf-compile: {line}", file=sys.stderr)
+    return REFUSED if report else DONE
+
+
+def _compiled(classes: list[type], report: "Report") -> list[Any]:
+    """Return the classes as machine code, as far as they have no errors."""
+    # Importing numba takes a second: import it only after the cheap checks.
+    from rtcf.component import DeclarationError
+
+    from rtcf_compile.library import log_text
+    from rtcf_compile.machine_code import object_file
+    from rtcf_compile.rewriting.functions import check_syntax
+
+    # Otherwise a tenth of the time goes into searches for garbage.
+    gc.freeze()
+    gc.set_threshold(100_000, 20, 20)
+    compiled = []
+    for each in classes:
+        with report.collected():
+            try:
+                compiled.append(object_file.compile_component(each))
+                log_text.check(compiled[-1].logs)
+            except DeclarationError:
+                with report.collected():
+                    check_syntax(each)
+                raise
+    return compiled
 
 
 def _verified(classes: list[type], compiled: list[Any], args: argparse.Namespace) -> bool:
@@ -83,22 +123,24 @@ def _verified(classes: list[type], compiled: list[Any], args: argparse.Namespace
     return not problem
 
 
-def _classes(files: list[Path]) -> list[type]:
+def _classes(files: list[Path], report: "Report") -> list[type]:
+    """Return the component classes of the files, as far as they run without errors."""
     from rtcf_compile.source import modules as source
     from rtcf_compile.source.mistake import Mistake
 
     found: dict[str, type] = {}
     for file in files:
-        here = source.components(source.load(file))
-        if not here:
-            raise Mistake(
-                str(file),
-                0,
-                "has no component",
-                "define class Name(Component): with `def update(self):`",
-            )
-        for each in here:
-            if each.__name__ in found:
-                raise Mistake(str(file), 0, f"{each.__name__} is defined twice", "rename one")
-            found[each.__name__] = each
+        with report.collected():
+            here = source.components(source.load(file))
+            if not here:
+                raise Mistake(
+                    str(file),
+                    0,
+                    "has no component",
+                    "define class Name(Component): with `def update(self):`",
+                )
+            for each in here:
+                if each.__name__ in found:
+                    raise Mistake(str(file), 0, f"{each.__name__} is defined twice", "rename one")
+                found[each.__name__] = each
     return list(found.values())

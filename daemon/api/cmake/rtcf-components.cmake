@@ -72,7 +72,8 @@ endfunction()
 # rtcf_add_python_components(<target> PACKAGE <package> SOURCES <file.py>... [DEPENDS <file>...])
 #
 # The same for components written in Python, which rtcf-compile (package rtcf-python) compiles to
-# machine code. DEPENDS: other files that the sources import or read.
+# machine code. DEPENDS: files of the build that the sources need before they are compiled. Files that
+# they import or read are dependencies without it.
 function(rtcf_add_python_components target)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "PACKAGE" "SOURCES;DEPENDS")
   if(NOT arg_PACKAGE OR NOT arg_SOURCES)
@@ -104,7 +105,9 @@ function(rtcf_add_python_components target)
     OUTPUT ${library}
     COMMAND ${CMAKE_COMMAND} -E env "CXX=${CMAKE_CXX_COMPILER}" "CXXFLAGS=${CMAKE_CXX_FLAGS}"
             "RTCF_CXXFLAGS=${flags}" ${RTCF_COMPILE} ${compiled} -o ${library}
+            --depfile ${CMAKE_CURRENT_BINARY_DIR}/${target}.d
     DEPENDS ${compiled} ${arg_DEPENDS} ${RTCF_COMPILE}
+    DEPFILE ${CMAKE_CURRENT_BINARY_DIR}/${target}.d
     COMMENT "Compiling Python components ${target}"
     VERBATIM)
   add_custom_target(${target} ALL DEPENDS ${library})

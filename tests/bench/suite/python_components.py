@@ -1,4 +1,6 @@
-"""Duration of update() of example controllers: compiled Python against C++ with Eigen."""
+"""Duration of update() of example controllers, and of banks of filters on rows and columns of
+matrices: compiled Python against C++ with Eigen.
+"""
 
 import json
 from pathlib import Path
@@ -7,7 +9,9 @@ from processes import output_of
 from result import Budget, Result
 from setting import Setting
 
-EXAMPLES = Path(__file__).parents[3] / "components" / "rtcf_examples" / "python"
+_TREE = Path(__file__).parents[3]
+_EXAMPLES = _TREE / "components" / "rtcf_examples" / "python"
+_BANKS = _TREE / "tests" / "bench" / "components" / "notch_bank.py"
 # By file name: type, and limit of the duration as a multiple of C++'s.
 CONTROLLERS = {
     "butterworth": ("Butterworth", 2.0),
@@ -23,24 +27,26 @@ CONTROLLERS = {
     "ring_buffer": ("RingBuffer", 2.0),
     "s_curve": ("SCurve", 2.0),
 }
+# Limits by type.
+BANKS = {"NotchRows": 2.0, "NotchColumns": 2.0, "NotchSections": 2.0, "NotchCascade": 2.0}
 
 
 def run(setting: Setting) -> Result:
-    """Compile the controllers in Python and measure both, alternating."""
+    """Compile the components in Python and measure both, alternating."""
     library = setting.output / "controllers.so"
-    sources = [str(EXAMPLES / f"{name}.py") for name in CONTROLLERS]
-    output_of([str(setting.build / "bin/rtcf-compile"), *sources, "-o", str(library)], 60.0)
+    sources = [str(_EXAMPLES / f"{name}.py") for name in CONTROLLERS]
+    sources.append(str(_BANKS))
+    output_of([str(setting.build / "bin/rtcf-compile"), *sources, "-o", str(library)], 120.0)
     reference = setting.build / "lib/rtcf/rtcf_bench/rtcf_bench_controllers.so"
-    types = [name for name, _ in CONTROLLERS.values()]
+    at_most = {**dict(CONTROLLERS.values()), **BANKS}
     found = json.loads(
-        output_of([setting.program("update_cost"), str(library), str(reference), *types])
+        output_of([setting.program("update_cost"), str(library), str(reference), *at_most])
     )
     result = Result(
         "python_components",
         "update() of controllers: compiled Python against C++ with Eigen, -O2",
         ["controller", "Python ns", "C++ ns", "ratio"],
     )
-    at_most = dict(CONTROLLERS.values())
     for each in found["types"]:
         name, ratio = each["type"], each["ns"] / each["reference_ns"]
         result.rows.append([name, each["ns"], each["reference_ns"], ratio])

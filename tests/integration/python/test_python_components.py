@@ -258,7 +258,8 @@ def test_a_state_has_three_dimensions(tmp_path: Path, daemon: Daemon, client: rt
     found = {each.name: each for each in client.get_component("window").states}
     types = {name: (each.type, each.unit) for name, each in found.items()}
     assert types == {"samples": ("double[3x2x2]", "m"), "counts": ("int16[3x2x2]", "")}
-    assert found["samples"].initial == "[[0.5, 0.5; 0.5, 0.5], " * 2 + "[0.5, 0.5; 0.5, 0.5]]"
+    half = "[0.5, 0.5; 0.5, 0.5]"
+    assert found["samples"].initial == f"[{half}, {half}, {half}]"
     assert daemon.ctl("write", "window.u", "[[1, 2], [3, 4]]").returncode == 0
     with client.watch_ports(["/window.*"]) as stream:
         client.step(2)

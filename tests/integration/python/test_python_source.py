@@ -2,8 +2,11 @@
 
 import importlib.machinery
 import importlib.util
+import json
+import os
 import platform
 import re
+import select
 import shutil
 import subprocess
 import threading
@@ -14,6 +17,7 @@ import pytest
 import rtcf
 import yaml
 from daemon_process import BUILD_TREE, DEADLINE_S, Daemon, wait_for
+from processor_time import descendants
 from rtcfctl.graph import python_source
 from values import parameter_values, port_value
 
@@ -107,6 +111,11 @@ def _history(client: rtcf.Client) -> list[tuple[str, str, object]]:
     ]
 
 
+def _errors(said: str) -> str:
+    """Return standard error without the line that announces a compilation."""
+    return re.sub(r"^compiling .* …\n", "", said)
+
+
 def _save(source: Path, text: str) -> None:
     """Replace the file at once: each partial write would be swapped in."""
     part = source.with_suffix(".part")
@@ -160,7 +169,7 @@ def test_code_that_differs_from_the_interpreter_is_rejected_by_default(
             rf"rtcfctl: {source}: Counts: update, cycle \d+: \w+ is -?\d+ compiled, -?\d+ in "
             rf"the interpreter; `rtcf-compile {source} --verify` shows details, --no-verify "
             rf"skips this\n",
-            done.stderr,
+            _errors(done.stderr),
         ), done.stderr
         # A library loaded with --no-verify is not trusted later.
         assert daemon.ctl("load", str(source), "Counts", "--no-verify").returncode == 0
@@ -182,7 +191,7 @@ def test_an_rtcfd_that_does_not_search_the_cache_names_the_remedy(
             rf"rtcfd with the same cache folder searches {tmp_path}/other/rtcf-components, as "
             r"that of `rtcfctl run`; for this rtcfd, compile into one of its folders: "
             rf"`rtcf-compile {source} -o FOLDER/PACKAGE/NAME\.so`\n",
-            done.stderr,
+            _errors(done.stderr),
         ), done.stderr
     assert client.get_order() == ["/I"]
 
@@ -263,7 +272,7 @@ def test_a_library_is_verified_once(tmp_path: Path, calls: Path) -> None:
         before = calls.read_text().splitlines() if calls.exists() else []
         python_source.compiled(str(source), tmp_path, lambda line: None, verify)
         lines = calls.read_text().splitlines()[len(before) :]
-        return [re.sub(r"\S+/", "", line) for line in lines]
+        return [re.sub(r"\S+/|--depfile \S+ ?", "", line).strip() for line in lines]
 
     assert called(verify=False) == ["counts.py -o counts.so"]
     assert called(verify=False) == []
@@ -310,6 +319,141 @@ def test_a_source_is_loaded_cached_and_swapped_in_when_saved(
     done = daemon.ctl("load", str(source), "Counts")
     assert done.returncode == 0, done.stderr
     assert library.stat().st_mtime_ns == second
+
+
+def test_a_compilation_is_announced_at_once(
+    tmp_path: Path, daemon: Daemon, client: rtcf.Client
+) -> None:
+    source, fifo = tmp_path / "counts.py", tmp_path / "fifo"
+    os.mkfifo(fifo)
+    # The compilation waits until the test has read the line.
+    source.write_text(f"open({str(fifo)!r}).read()\n{COUNTS.replace('STEP', '1')}")
+    loading = subprocess.Popen(
+        [str(BUILD_TREE / "bin" / "rtcfctl"), "-o", "json", "load", str(source), "Counts"],
+        env=daemon.environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    assert loading.stderr is not None
+    assert loading.stderr.readline() == f"compiling {source} …\n"
+    fifo.write_text("")
+    said, errors = loading.communicate(timeout=COMPILE_DEADLINE_S)
+    assert (loading.returncode, errors) == (0, "")
+    assert json.loads(said)["component"] == "/Counts"
+    client.unload(["Counts"])
+    done = daemon.ctl("load", str(source), "Counts")
+    assert (done.returncode, done.stderr) == (0, ""), "the library is in the cache"
+
+
+def test_all_errors_of_a_source_are_shown(
+    tmp_path: Path, daemon: Daemon, client: rtcf.Client
+) -> None:
+    source = tmp_path / "counts.py"
+    wrong = COUNTS.replace("STEP", "1 + absent") + "        print(self.count)\n"
+    source.write_text(wrong)
+    errors = [
+        rf"{source}:9: `absent`: absent is not defined: .*",
+        rf"{source}:11: `print\(self\.count\)`: printing calls the system: .*",
+    ]
+    expected = "".join(f"rtcfctl: {each}\n" for each in errors)
+    done = daemon.ctl("load", str(source), "Counts")
+    assert done.returncode == 1
+    assert re.fullmatch(f"compiling {source} …\n{expected}", done.stderr), done.stderr
+    source.write_text(COUNTS.replace("STEP", "1"))
+    with Watching(daemon, str(source), "Counts") as watching:
+        watching.wait_for("loaded /Counts")
+        source.write_text(wrong)
+        watching.wait_for("printing calls the system")
+        assert re.search(expected, watching.said), watching.said
+        client.step(10)
+        assert _states(client) == {"count": "10"}
+
+
+def _workers() -> list[int]:
+    found = descendants(os.getpid())
+    return [each for each in found if b"--worker" in Path(f"/proc/{each}/cmdline").read_bytes()]
+
+
+def test_a_watched_source_is_compiled_by_one_worker(
+    tmp_path: Path, daemon: Daemon, client: rtcf.Client
+) -> None:
+    source = tmp_path / "counts.py"
+    source.write_text(COUNTS.replace("STEP", "1"))
+    with Watching(daemon, str(source), "Counts") as watching:
+        watching.wait_for("loaded /Counts")
+        workers = _workers()
+        assert len(workers) == 1
+        for number in (1, 2):
+            _save(source, COUNTS.replace("STEP", f"{number}0"))
+            watching.wait_for("reloaded /Counts", number)
+        assert _workers() == workers
+        end = os.pidfd_open(workers[0])
+    assert select.select([end], [], [], DEADLINE_S)[0]
+
+
+def test_files_that_a_source_reads_are_watched(
+    tmp_path: Path, daemon: Daemon, client: rtcf.Client
+) -> None:
+    source, table, module = (
+        tmp_path / "own" / "counts.py", tmp_path / "table 1.txt", tmp_path / "shared" / "gains.py"
+    )  # fmt: skip
+    for each in (source, module):
+        each.parent.mkdir()
+    table.write_text("1 2\n")
+    module.write_text("GAIN = 100\n")
+    head = (
+        "import sys\n\nimport numpy as np\n\n"
+        f"sys.path.append({str(module.parent)!r})\nfrom gains import GAIN\n"
+        f"STEP = GAIN * int(np.loadtxt({str(table)!r})[1])\n"
+    )
+    source.write_text(head + COUNTS)
+    with Watching(daemon, str(source), "Counts") as watching:
+        watching.wait_for("loaded /Counts")
+        client.step(1)
+        assert _states(client) == {"count": "200"}
+        _save(table, "1 3\n")
+        watching.wait_for("reloaded /Counts", 1)
+        client.step(1)
+        assert _states(client) == {"count": "500"}
+        _save(module, "GAIN = 1000\n")
+        watching.wait_for("reloaded /Counts", 2)
+        client.step(1)
+        assert _states(client) == {"count": "3500"}
+    client.unload(["Counts"])
+    table.write_text("1 4\n")
+    assert daemon.ctl("load", str(source), "Counts").returncode == 0
+    client.step(1)
+    assert _states(client) == {"count": "4000"}
+
+
+def test_a_file_that_changes_while_it_is_compiled_is_compiled_again(
+    tmp_path: Path, own_cache: Path
+) -> None:
+    source, table = tmp_path / "counts.py", tmp_path / "table.txt"
+    table.write_text("1\n")
+    source.write_text(f"STEP = int(open({str(table)!r}).read())\n{COUNTS}")
+    calls = []
+
+    class Compiler:
+        def run(self, words: list[str], progress: object) -> tuple[int, list[str]]:
+            calls.append(words)
+            if len(calls) < 3:
+                table.write_text(f"{len(calls) + 1}\n")
+            library, rule = Path(words[-1]), Path(words[words.index("--depfile") + 1])
+            library.parent.mkdir(parents=True, exist_ok=True)
+            library.touch()
+            rule.write_text(f"{library}: {source} {table}\n")
+            return 0, []
+
+    def compiled() -> int:
+        before = len(calls)
+        python_source.compiled(str(source), BUILD_TREE, lambda line: None, False, Compiler())
+        return len(calls) - before
+
+    assert compiled() == 3
+    assert compiled() == 0
+    table.write_text("9\n")
+    assert compiled() == 1
+    table.write_text("3\n")
+    assert compiled() == 1
 
 
 def test_a_save_during_compilation_is_noticed(tmp_path: Path) -> None:
@@ -510,6 +654,6 @@ def test_a_wrong_source_is_rejected_in_one_line(own_cache: Path, daemon: Daemon)
     source.write_text(COUNTS.replace("STEP", "None"))
     done = daemon.ctl("load", str(source), "Counts")
     assert done.returncode == 1
-    assert re.fullmatch(r"rtcfctl: .*counts\.py:9: .*: .+\n", done.stderr), done.stderr
+    assert re.fullmatch(r"rtcfctl: .*counts\.py:9: .*: .+\n", _errors(done.stderr)), done.stderr
     done = daemon.ctl("load", "rtcf_examples", "Mimo", "--watch")
     assert done.returncode == 2 and "--watch requires a Python source" in done.stderr

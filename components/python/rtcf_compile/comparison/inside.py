@@ -11,7 +11,7 @@ from rtcf.component.declaration import REALTIME_HOOKS, Description, Member, own_
 
 from rtcf_compile.library.toolchain import compiler
 from rtcf_compile.machine_code import port_access
-from rtcf_compile.machine_code.object_file import Compiled
+from rtcf_compile.machine_code.compiled import Compiled
 from rtcf_compile.machine_code.raises import hash_of
 from rtcf_compile.source.mistake import Mistake
 

@@ -34,7 +34,7 @@ from rtcf.component.value_type import ValueType
 
 from rtcf_compile.comparison.inside import Inside
 from rtcf_compile.comparison.model import Branch, Model
-from rtcf_compile.machine_code.object_file import Compiled
+from rtcf_compile.machine_code.compiled import Compiled
 from rtcf_compile.source.mistake import display, source_line
 from rtcf_compile.source.processor_time import HOOK_S, TimeLimitError, loop_line
 

@@ -21,7 +21,7 @@ from rtcf.component import Component
 from rtcf.component.declaration import own_field
 
 from rtcf_compile.comparison.verify import Comparison, compare
-from rtcf_compile.machine_code.object_file import Compiled
+from rtcf_compile.machine_code.compiled import Compiled
 from rtcf_compile.source.mistake import Mistake
 from rtcf_compile.source.processor_time import HOOK_S, enclosing_loop, limited
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rtcf_compile.library import messages, tables, toolchain
-from rtcf_compile.machine_code.object_file import Compiled
+from rtcf_compile.machine_code.compiled import Compiled
 
 _FLAGS = (
     *("-shared", "-Wl,--no-undefined", "-Wl,-Bsymbolic-functions", "-Wl,--gc-sections"),

@@ -6,7 +6,7 @@ import re
 import string
 
 from rtcf_compile.rewriting.logs import LogCall, Logs
-from rtcf_compile.source.mistake import Mistake
+from rtcf_compile.source.mistake import Mistake, Mistakes
 
 # Fill and alignment, sign, alternate form, zeros, width, precision, type.
 _BOTH = re.compile(
@@ -16,9 +16,12 @@ _FLOAT, _WHOLE = "eEfFgG", "bcdoxX"
 
 
 def check(logs: Logs) -> None:
-    """Check all log calls of a component; raise Mistake on error."""
+    """Check all log calls of a component; raise Mistake with all errors."""
+    mistakes = Mistakes()
     for call in logs.calls:
-        checked(call)
+        with mistakes.collected():
+            checked(call)
+    mistakes.report()
 
 
 def checked(call: LogCall) -> tuple[str, list[str]]:

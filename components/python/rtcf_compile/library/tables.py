@@ -25,7 +25,7 @@ from rtcf.component.value_type import ValueType
 from rtcf_compile.library import log_text, messages
 from rtcf_compile.library.llvm_data import NULL, Data, Value, pointer_to
 from rtcf_compile.machine_code import backend
-from rtcf_compile.machine_code.object_file import Compiled
+from rtcf_compile.machine_code.compiled import Compiled
 from rtcf_compile.rewriting.logs import LogCall
 from rtcf_compile.source.mistake import display, source_line
 from rtcf_compile.source.prefix_map import mapped

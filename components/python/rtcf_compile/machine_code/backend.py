@@ -13,8 +13,9 @@ from unittest import mock
 import llvmlite.binding as llvm
 import numba
 from numba import types
-from numba.core import cgutils, codegen, cpu
+from numba.core import cgutils, codegen, config, cpu
 from numba.core.compiler_lock import global_compiler_lock
+from numba.core.registry import cpu_target
 from numba.core.typing import npydecl
 
 # Options for functions that need no wrappers for calls from Python or C.
@@ -28,12 +29,17 @@ _RECORD_AND_EXCEPTION = (
 
 # With this attribute, both versions of numba support arrays of bools in records.
 types.Boolean.bitwidth = 8
+# numba optimises each function on its own. Loops become vectors only in whole hooks, where sizes
+# are known: before that, vectors would multiply the code and hide the sizes.
+config.LOOP_VECTORIZE = config.SLP_VECTORIZE = 0
 if POINTERS_HAVE_TYPES:
     llvm.initialize()
 llvm.initialize_native_target()
 llvm.initialize_native_asmprinter()
 
 
+_OWN = "rtcf_own"
+_optimise = codegen.CPUCodeLibrary._optimize_final_module
 _types_in_place = npydecl.NumpyRulesInplaceArrayOperator.generic
 
 
@@ -46,6 +52,60 @@ def _in_place(template: Any, args: Any, kws: Any) -> Any:
         return _types_in_place(template, args, kws)
     except AttributeError:
         return None
+
+
+def initialise() -> None:
+    """Load what numba otherwise loads when it compiles the first function."""
+    cpu_target.typing_context.refresh()
+    cpu_target.target_context.refresh()
+
+
+def _moved(builder: Any, pointer: Any, offset: Any, return_type: Any = None) -> Any:
+    """Return a pointer moved by some bytes; replaces numba's cgutils.pointer_add.
+
+    numba adds to an int, which hides from LLVM what the pointer refers to: two columns of a matrix
+    might then share elements.
+    """
+    if isinstance(offset, int):
+        offset = cgutils.intp_t(offset)
+    moved = builder.gep(builder.bitcast(pointer, cgutils.voidptr_t), [offset])
+    return builder.bitcast(moved, return_type or pointer.type)
+
+
+def mark_own(library: Any, function: str) -> None:
+    """Mark the code of a function of the user, which is optimised as a part of its hooks."""
+    vars(library)[_OWN] = function
+
+
+def _optimise_library(library: Any) -> None:
+    """Optimise the functions of a library, as numba does, or simplify a function of the user."""
+    own = vars(library).get(_OWN)
+    if own is None:
+        _optimise(library)
+    else:
+        _simplify(library._final_module, own)
+
+
+def _simplify(module: Any, name: str) -> None:
+    """Simplify one function, so that its calls have constant arguments where possible."""
+    function = module.get_function(name)
+    if not POINTERS_HAVE_TYPES:
+        passes_builder = _builder(vectors=False)
+        passes_builder.getFunctionPassManager().run(function, passes_builder)
+        return
+    passes = llvm.FunctionPassManager(module)
+    target = machine()
+    target.add_analysis_passes(passes)
+    passes.add_sroa_pass()
+    passes.add_cfg_simplification_pass()
+    passes.add_instruction_combining_pass()
+    passes.add_gvn_pass()
+    passes.add_sccp_pass()
+    passes.add_cfg_simplification_pass()
+    passes.add_refprune_pass()
+    passes.initialize()
+    passes.run(function)
+    passes.finalize()
 
 
 @contextmanager
@@ -65,12 +125,25 @@ def not_to_run() -> Iterator[None]:
 
     with (
         mock.patch.object(cgutils, "do_boundscheck", check_bounds),
+        mock.patch.object(cgutils, "pointer_add", _moved),
         mock.patch.object(cpu.CPUContext, "get_executable", executable),
         mock.patch.object(codegen.JITCPUCodegen, "_add_module", lambda self, module: None),
         mock.patch.object(codegen.JITCodeLibrary, "_finalize_specific", lambda self: None),
+        mock.patch.object(codegen.CPUCodeLibrary, "_optimize_final_module", _optimise_library),
         mock.patch.object(npydecl.NumpyRulesInplaceArrayOperator, "generic", _in_place),
     ):
         yield
+
+
+def bitcode(library: Any) -> bytes:
+    """Return the code of a library.
+
+    From now on the library uses the code that another run reads: the order in which LLVM keeps uses
+    of a value differs, and so would the results of optimisation.
+    """
+    code: bytes = library.serialize_using_bitcode()[2]
+    library._final_module, library._shared_module = llvm.parse_bitcode(code), None
+    return code
 
 
 def assembly_of(library: Any) -> str:
@@ -114,20 +187,22 @@ def drop_unused(module: Any) -> None:
 
 def inline(module: Any) -> None:
     """Inline functions and simplify, without vectorising."""
-    _run(module, vectors=False)
+    # The first run inlines, the second one uses the sizes that are constant then.
+    _run(module, level=2)
+    _run(module, level=3)
 
 
 def optimise(module: Any) -> None:
     """Optimise a module as -O3 does, with more inlining."""
-    _run(module, vectors=True)
+    _run(module, level=3, vectors=True)
     drop_unused(module)
 
 
-def _run(module: Any, vectors: bool) -> None:
+def _run(module: Any, level: int, vectors: bool = False) -> None:
     if POINTERS_HAVE_TYPES:
         passes = llvm.ModulePassManager()
         builder = llvm.PassManagerBuilder()
-        builder.opt_level = 3
+        builder.opt_level = level
         builder.loop_vectorize = builder.slp_vectorize = vectors
         builder.inlining_threshold = _INLINED
         target = machine()  # the passes refer to it: keep it alive
@@ -135,7 +210,7 @@ def _run(module: Any, vectors: bool) -> None:
         builder.populate(passes)
         passes.run(module)
     else:
-        passes_builder = _builder(vectors)
+        passes_builder = _builder(vectors, level)
         passes_builder.getModulePassManager().run(module, passes_builder)
 
 
@@ -154,8 +229,8 @@ def machine() -> Any:
     return target.create_target_machine(cpu="generic", opt=3, reloc="pic", codemodel="default")
 
 
-def _builder(vectors: bool = True) -> Any:
-    tuning = llvm.create_pipeline_tuning_options(speed_level=3)
+def _builder(vectors: bool = True, level: int = 3) -> Any:
+    tuning = llvm.create_pipeline_tuning_options(speed_level=level)
     tuning.loop_vectorization = tuning.slp_vectorization = vectors
     tuning.inlining_threshold = _INLINED
     return llvm.create_pass_builder(machine(), tuning)

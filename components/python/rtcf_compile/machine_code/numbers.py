@@ -19,15 +19,17 @@ from typing import Any
 
 import numpy as np
 from numba.core import ir, types
-from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.compiler import DefaultPassBuilder
 from numba.core.compiler_machinery import AnalysisPass, register_pass
 from numba.core.errors import TypingError
 from numba.core.typed_passes import NopythonTypeInference
 
+from rtcf_compile.machine_code import backend, type_errors
+from rtcf_compile.machine_code.identity import OwnCompiler
 from rtcf_compile.machine_code.number_types import Operand, operand, plain_of, together
-from rtcf_compile.rewriting import helpers, numpy_functions, operators
+from rtcf_compile.rewriting import helpers, math_functions, numpy_functions, operators
 from rtcf_compile.rewriting.functions import INT_BOUNDS, WRITTEN_CODE
-from rtcf_compile.source.mistake import Mistake
+from rtcf_compile.source.mistake import Mistake, Mistakes, joined
 
 _LARGEST = 2**53  # floats represent all ints up to this
 _TURNS = 2**31  # assumed limit of iterations of a loop
@@ -58,14 +60,15 @@ _PYTHONS = (
     *(helpers.rtcf_round, helpers.rtcf_index, helpers.rtcf_front, helpers.rtcf_age),
     *(helpers.rtcf_math_fmod, helpers.rtcf_math_pow, helpers.rtcf_is, helpers.rtcf_is_known),
     *(helpers.rtcf_math_remainder, helpers.rtcf_round_to),
-    *(operators.rtcf_plain, numpy_functions.rtcf_math_hypot, numpy_functions.rtcf_math_isclose),
+    operators.rtcf_plain,
     *helpers.MATH.values(),
+    *(own for own in math_functions.BY_NAME.values() if own is not math_functions.rtcf_math_prod),
 )
 _AS_ARGUMENTS = (
     *(abs, max, min, numpy_functions.rtcf_abs, numpy_functions.rtcf_whole_pow, helpers.rtcf_pow),
     *(helpers.rtcf_negative_pow, helpers.rtcf_maybe, helpers.rtcf_or_old, helpers.rtcf_equal),
     *(helpers.rtcf_get, helpers.rtcf_items, operators.rtcf_negative, operators.rtcf_divmod),
-    helpers.rtcf_copied,
+    *(helpers.rtcf_copied, math_functions.rtcf_math_prod),
     *operators.OF.values(),
     *operators.OF_ELEMENTS.values(),
     *helpers.IN_PLACE.values(),
@@ -91,15 +94,30 @@ class _NarrowError(Exception):
     """A function computes with narrow numbers."""
 
 
-def compiler(narrow: set[CodeType]) -> Any:
+def compiler(narrow: set[CodeType], mistakes: Mistakes) -> Any:
     """Return numba's compiler with the pass, which adds the code of functions that compute with
     narrow numbers to `narrow`.
+
+    `mistakes`: receives the type errors of each function.
     """
-    return type("Compiler", (_Compiler,), {"narrow": narrow})
+    own = {"narrow": narrow, "known_narrow": len(narrow), "mistakes": mistakes}
+    return type("Compiler", (_Compiler,), own)
 
 
-class _Compiler(CompilerBase):  # type: ignore[misc]
+class _Compiler(OwnCompiler):
     narrow: set[CodeType]
+    known_narrow: int  # before this compilation
+    mistakes: Mistakes
+
+    def compile_extra(self, func: Any) -> Any:
+        """Compile a function; collect its errors."""
+        try:
+            result = super().compile_extra(func)
+        except Exception as error:
+            self.mistakes.add(*type_errors.mistakes(error, func))
+            raise
+        backend.mark_own(result.library, result.fndesc.llvm_func_name)
+        return result
 
     def define_pipelines(self) -> list[Any]:
         """Return the pipelines of passes."""
@@ -144,12 +162,22 @@ class Numbers:
                     self._assigned.setdefault(each.target.name, []).append(each.value)
 
     def check(self) -> None:
-        """Raise Stop for the first error, or _NarrowError for the first narrow number."""
+        """Raise Stop for the errors, or _NarrowError for the first narrow number."""
+        mistakes = Mistakes()
         for each in self._statements:
             self._line = each.loc.line
-            self._joined(each)
-            if isinstance(each.value, ir.Expr):
-                self._expression(each.value)
+            try:
+                self._joined(each)
+                if isinstance(each.value, ir.Expr):
+                    self._expression(each.value)
+            except Stop as stop:
+                mistakes.add(stop.mistake)
+            except _NarrowError:
+                if not mistakes.found:
+                    raise
+                break
+        if mistakes.found:
+            raise Stop(joined(mistakes.found))
         if any(map(self._becomes_float, self._statements)):
             Bounds(self).check()
 

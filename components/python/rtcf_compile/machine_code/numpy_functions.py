@@ -33,12 +33,12 @@ _ALL = (1, 2, 3)  # dimensions of arrays
 _LONG = 128  # up to this size, NumPy sums with eight accumulators; it halves longer arrays
 
 
-def _dtype(kind: Any) -> Any:
+def dtype_of(kind: Any) -> Any:
     """Return the NumPy type of a number, or of the elements of an array."""
     return as_dtype(types.unliteral(kind.dtype if isinstance(kind, types.Array) else kind))
 
 
-def _needs(kind: Any, what: str, dimensions: tuple[int, ...] = (1, 2)) -> None:
+def needs(kind: Any, what: str, dimensions: tuple[int, ...] = (1, 2)) -> None:
     """Reject values other than an array of these dimensions."""
     if isinstance(kind, types.Array) and kind.ndim in dimensions:
         return
@@ -90,10 +90,10 @@ def _store(typing: Any, array: Any, values: Any) -> Any:
 
 def _wanted(given: Any, dtype: Any) -> Any:
     """Return the element type: the given dtype, or the common type of the elements."""
-    follows = np.result_type(*(_dtype(each) for each in given))
+    follows = np.result_type(*(dtype_of(each) for each in given))
     if isinstance(dtype, types.NoneType):
         return follows
-    wanted = _dtype(dtype.dtype if isinstance(dtype, types.DTypeSpec) else dtype.instance_type)
+    wanted = dtype_of(dtype.dtype if isinstance(dtype, types.DTypeSpec) else dtype.instance_type)
     if follows.kind == "f" and wanted.kind != "f":
         raise TypingError(f"RTCF:elements are {follows}, not {wanted}:round them first")
     return wanted
@@ -156,15 +156,60 @@ def _array(object: Any, dtype: Any) -> Any:
 @compiled_as(own.rtcf_asarray)
 def _asarray(a: Any, dtype: Any) -> Any:
     if isinstance(a, types.Array) and (
-        isinstance(dtype, types.NoneType) or _wanted([a], dtype) == _dtype(a)
+        isinstance(dtype, types.NoneType) or _wanted([a], dtype) == dtype_of(a)
     ):
         return lambda a, dtype: a
     return lambda a, dtype: own.rtcf_array(a, dtype)
 
 
+@compiled_as(own.rtcf_atleast_1d, arrays=("ary",))
+def _atleast_1d(ary: Any) -> Any:
+    if isinstance(ary, _Numbers):
+        return lambda ary: own.rtcf_array((ary,), None)
+    needs(ary, "np.atleast_1d")
+    return lambda ary: ary
+
+
+@compiled_as(own.rtcf_atleast_2d, arrays=("ary",))
+def _atleast_2d(ary: Any) -> Any:
+    if isinstance(ary, _Numbers):
+        return lambda ary: own.rtcf_array(((ary,),), None)
+    needs(ary, "np.atleast_2d")
+    if ary.ndim == 1:
+        return lambda ary: own.rtcf_reshape(ary, (1, ary.shape[0]))
+    return lambda ary: ary
+
+
+@compiled_as(own.rtcf_meshgrid, arrays=("x1", "x2"))
+def _meshgrid(x1: Any, x2: Any, indexing: Any) -> Any:
+    needs(x1, "np.meshgrid", (1,))
+    needs(x2, "np.meshgrid", (1,))
+    if not isinstance(indexing, types.NoneType):
+
+        def by_rows(x1: Any, x2: Any, indexing: Any) -> Any:
+            shape = x1.shape[0], x2.shape[0]
+            one, two = np.empty(shape, x1.dtype), np.empty(shape, x2.dtype)
+            for i in range(shape[0]):
+                for j in range(shape[1]):
+                    one[i, j], two[i, j] = x1[i], x2[j]
+            return one, two
+
+        return by_rows
+
+    def by_columns(x1: Any, x2: Any, indexing: Any) -> Any:
+        shape = x2.shape[0], x1.shape[0]
+        one, two = np.empty(shape, x1.dtype), np.empty(shape, x2.dtype)
+        for i in range(shape[0]):
+            for j in range(shape[1]):
+                one[i, j], two[i, j] = x1[j], x2[i]
+        return one, two
+
+    return by_columns
+
+
 @compiled_as(own.rtcf_diag, arrays=("v",))
 def _diag(v: Any, k: Any) -> Any:
-    _needs(v, "np.diag")
+    needs(v, "np.diag")
     if v.ndim == 1:
 
         def matrix(v: Any, k: Any) -> Any:
@@ -186,9 +231,18 @@ def _diag(v: Any, k: Any) -> Any:
     return diagonal
 
 
+@plain
+def copied_vector(a: Any) -> Any:
+    """Return the elements of a vector as a new vector."""
+    result = np.empty(a.shape[0], a.dtype)
+    for i in range(a.shape[0]):
+        result[i] = a[i]
+    return result
+
+
 @compiled_as(own.rtcf_diagonal, arrays=("a",))
 def _diagonal(a: Any) -> Any:
-    _needs(a, "np.diagonal", (2,))
+    needs(a, "np.diagonal", (2,))
     return lambda a: own.rtcf_diag(a, 0)
 
 
@@ -219,7 +273,7 @@ def _linspace(start: Any, stop: Any, num: Any, endpoint: Any) -> Any:
 
 
 @intrinsic  # type: ignore[misc]
-def _viewed(typing: Any, array: Any, shape: Any, strides: Any) -> Any:
+def view_of(typing: Any, array: Any, shape: Any, strides: Any) -> Any:
     """Return a view of an array's memory with another shape and other strides."""
     layout = "C" if array.layout == "C" else "A"
     result = types.Array(array.dtype, shape.count, layout, not array.mutable, aligned=array.aligned)
@@ -260,7 +314,7 @@ def _sizes(wanted: Any, count: Any) -> Any:
 
 @compiled_as(own.rtcf_reshape, arrays=("a",))
 def _reshape(a: Any, newshape: Any) -> Any:
-    _needs(a, "np.reshape", _ALL)
+    needs(a, "np.reshape", _ALL)
     if isinstance(newshape, types.Integer):
         return lambda a, newshape: own.rtcf_reshape(a, (newshape,))
     if not isinstance(newshape, types.UniTuple) or newshape.count > 3:
@@ -269,7 +323,7 @@ def _reshape(a: Any, newshape: Any) -> Any:
 
         def view(a: Any, newshape: Any) -> Any:
             shape = _filled(newshape, _sizes(newshape, a.size))
-            return _viewed(a, shape, _strides(shape, a.itemsize))
+            return view_of(a, shape, _strides(shape, a.itemsize))
 
         return view
     if a.ndim == 3 or (a.ndim == 2 and newshape.count == 3):
@@ -280,18 +334,18 @@ def _reshape(a: Any, newshape: Any) -> Any:
         shape = _filled(newshape, _sizes(newshape, a.size))
         step = _only_step(a)
         if step != 0:
-            return _viewed(a, shape, _strides(shape, step))
+            return view_of(a, shape, _strides(shape, step))
         if _is_same(a, shape):
-            return _viewed(a, shape, _same_strides(a, shape))
+            return view_of(a, shape, _same_strides(a, shape))
         copy = own.rtcf_array(a, None)
-        return _viewed(_any_layout(copy), shape, _strides(shape, a.itemsize))
+        return view_of(any_layout(copy), shape, _strides(shape, a.itemsize))
 
     return reshape
 
 
 @compiled_as(own.rtcf_vector_as)
 def _vector_as(a: Any, shape: Any) -> Any:
-    _needs(a, "a new axis", (1,))
+    needs(a, "a new axis", (1,))
     return lambda a, shape: own.rtcf_reshape(a, shape)
 
 
@@ -373,7 +427,7 @@ def _strides_as_before(a: Any, shape: Any) -> Any:
 
 
 @intrinsic  # type: ignore[misc]
-def _any_layout(typing: Any, array: Any) -> Any:
+def any_layout(typing: Any, array: Any) -> Any:
     """Return an array with the type for any layout."""
     result = types.Array(array.dtype, array.ndim, "A", not array.mutable, aligned=array.aligned)
 
@@ -385,11 +439,11 @@ def _any_layout(typing: Any, array: Any) -> Any:
 
 @compiled_as(own.rtcf_ravel, arrays=("a",))
 def _ravel(a: Any) -> Any:
-    _needs(a, "np.ravel", _ALL)
+    needs(a, "np.ravel", _ALL)
     if a.ndim == 1:
         return lambda a: own.rtcf_contiguous(a)
     if a.ndim == 3:
-        return lambda a: _viewed(own.rtcf_contiguous(a), (a.size,), (a.itemsize,))
+        return lambda a: view_of(own.rtcf_contiguous(a), (a.size,), (a.itemsize,))
     return lambda a: own.rtcf_reshape(own.rtcf_contiguous(a), (a.size,))
 
 
@@ -406,15 +460,15 @@ def _is_contiguous(a: Any) -> Any:
 
 @compiled_as(own.rtcf_contiguous, arrays=("a",))
 def _contiguous(a: Any) -> Any:
-    _needs(a, "np.ascontiguousarray", _ALL)
+    needs(a, "np.ascontiguousarray", _ALL)
     if a.layout == "C":
         return lambda a: a
-    return lambda a: _any_layout(a) if _is_contiguous(a) else _any_layout(a.copy())
+    return lambda a: any_layout(a) if _is_contiguous(a) else any_layout(a.copy())
 
 
 @compiled_as(own.rtcf_flatten, arrays=("a",))
 def _flatten(a: Any) -> Any:
-    _needs(a, "flatten", _ALL)
+    needs(a, "flatten", _ALL)
     if a.ndim == 1:
         return lambda a: own.rtcf_array(a, None)
     if a.ndim == 3:
@@ -436,7 +490,7 @@ def _joined(name: str, parts: Any, along: Any) -> Any:
     `along`: None joins vectors; 0 joins matrices below each other, 1 side by side, with vectors as
     rows or columns.
     """
-    result = np.result_type(*(_dtype(each) for each in parts))
+    result = np.result_type(*(dtype_of(each) for each in parts))
     count = len(parts)
     # numba indexes a tuple of several types only by constants.
     lines = [f"def joined({name}):"]
@@ -591,7 +645,7 @@ def _stack(arrays: Any, axis: Any) -> Any:
 
 def _stacked_matrices(parts: Any) -> Any:
     """Return the function that makes an array of three dimensions from matrices."""
-    result = np.result_type(*(_dtype(each) for each in parts))
+    result = np.result_type(*(dtype_of(each) for each in parts))
     count = len(parts)
     places = {0: "{k}", 1: ":, {k}", 2: ":, :, {k}"}
     shapes = {0: f"({count}, n, m)", 1: f"(n, {count}, m)", 2: f"(n, m, {count})"}
@@ -615,33 +669,85 @@ def _stacked_matrices(parts: Any) -> Any:
 
 
 @compiled_as(own.rtcf_roll, arrays=("a",))
-def _roll(a: Any, shift: Any) -> Any:
-    _needs(a, "np.roll", (1,))
+def _roll(a: Any, shift: Any, axis: Any) -> Any:
+    needs(a, "np.roll")
+    if not isinstance(shift, types.Integer | types.Boolean):
+        raise TypingError(f"RTCF:np.roll by {words(shift)}:give it an int")
+    if a.ndim == 1 and not isinstance(axis, types.NoneType):
 
-    def roll(a: Any, shift: Any) -> Any:
-        n = a.shape[0]
-        result = np.empty(n, a.dtype)
+        def one_axis(a: Any, shift: Any, axis: Any) -> Any:
+            if axis != 0 and axis != -1:
+                raise ValueError("axis is out of bounds")
+            return own.rtcf_roll(a, shift, None)
+
+        return one_axis
+    if a.ndim == 1:
+
+        def roll(a: Any, shift: Any, axis: Any) -> Any:
+            n = a.shape[0]
+            result = np.empty(n, a.dtype)
+            for i in range(n):
+                result[(i + shift) % n] = a[i]
+            return result
+
+        return roll
+    if isinstance(axis, types.NoneType):
+        return lambda a, shift, axis: own.rtcf_reshape(
+            own.rtcf_roll(own.rtcf_ravel(a), shift, None), a.shape
+        )
+
+    def along(a: Any, shift: Any, axis: Any) -> Any:
+        if not -2 <= axis <= 1:
+            raise ValueError("axis is out of bounds")
+        by_rows = axis == 0 or axis == -2
+        n, m = a.shape
+        result = np.empty(a.shape, a.dtype)
         for i in range(n):
-            result[(i + shift) % n] = a[i]
+            for j in range(m):
+                if by_rows:
+                    result[(i + shift) % n, j] = a[i, j]
+                else:
+                    result[i, (j + shift) % m] = a[i, j]
         return result
 
-    return roll
+    return along
 
 
 @compiled_as(own.rtcf_flip, arrays=("m",))
-def _flip(m: Any) -> Any:
-    _needs(m, "np.flip", _ALL)
+def _flip(m: Any, axis: Any) -> Any:
+    needs(m, "np.flip", _ALL)
+    is_all = isinstance(axis, types.NoneType)
     if m.ndim == 1:
-        return lambda m: m[::-1]
+        if is_all:
+            return lambda m, axis: m[::-1]
+
+        def one_axis(m: Any, axis: Any) -> Any:
+            if axis != 0 and axis != -1:
+                raise ValueError("axis is out of bounds")
+            return m[::-1]
+
+        return one_axis
+    if is_all:
+        if m.ndim == 3:
+            return lambda m, axis: m[::-1, ::-1, ::-1]
+        return lambda m, axis: m[::-1, ::-1]
     if m.ndim == 3:
-        return lambda m: m[::-1, ::-1, ::-1]
-    return lambda m: m[::-1, ::-1]
+        raise TypingError("RTCF:np.flip of three dimensions along an axis:write x[:, ::-1]")
+
+    def flip(m: Any, axis: Any) -> Any:
+        if axis == 0 or axis == -2:
+            return m[::-1, :]
+        if axis != 1 and axis != -1:
+            raise ValueError("axis is out of bounds")
+        return m[:, ::-1]
+
+    return flip
 
 
 @compiled_as(own.rtcf_append, arrays=("arr", "values"))
 def _append(arr: Any, values: Any) -> Any:
-    _needs(arr, "np.append", (1,))
-    dtype = np.result_type(_dtype(arr), _dtype(values))
+    needs(arr, "np.append", (1,))
+    dtype = np.result_type(dtype_of(arr), dtype_of(values))
     if not isinstance(values, types.Array):
 
         def appended(arr: Any, values: Any) -> Any:
@@ -653,13 +759,13 @@ def _append(arr: Any, values: Any) -> Any:
             return result
 
         return appended
-    _needs(values, "np.append", (1,))
+    needs(values, "np.append", (1,))
     return lambda arr, values: own.rtcf_concatenate((arr, values), 0)
 
 
 @compiled_as(own.rtcf_tile, arrays=("A",))
 def _tile(A: Any, reps: Any) -> Any:
-    _needs(A, "np.tile", (1,))
+    needs(A, "np.tile", (1,))
     if not isinstance(reps, types.Integer):
         raise TypingError(f"RTCF:np.tile by {words(reps)}:give it an int")
 
@@ -675,7 +781,7 @@ def _tile(A: Any, reps: Any) -> Any:
 
 @compiled_as(own.rtcf_repeat, arrays=("a",))
 def _repeat(a: Any, repeats: Any) -> Any:
-    _needs(a, "np.repeat", (1,))
+    needs(a, "np.repeat", (1,))
     if not isinstance(repeats, types.Integer):
         raise TypingError(f"RTCF:np.repeat by {words(repeats)}:give it an int")
 
@@ -692,9 +798,9 @@ def _repeat(a: Any, repeats: Any) -> Any:
 
 @compiled_as(own.rtcf_kron, arrays=("a", "b"))
 def _kron(a: Any, b: Any) -> Any:
-    _needs(a, "np.kron", (2,))
-    _needs(b, "np.kron", (2,))
-    dtype = np.result_type(_dtype(a), _dtype(b))
+    needs(a, "np.kron", (2,))
+    needs(b, "np.kron", (2,))
+    dtype = np.result_type(dtype_of(a), dtype_of(b))
 
     def kron(a: Any, b: Any) -> Any:
         rows, columns = b.shape
@@ -707,14 +813,67 @@ def _kron(a: Any, b: Any) -> Any:
     return kron
 
 
-@compiled_as(own.rtcf_diff, arrays=("a",))
-def _diff(a: Any) -> Any:
-    _needs(a, "np.diff", _ALL)
+@compiled_as(own.rtcf_diff, arrays=("a", "prepend", "append"), refused="b")
+def _diff(a: Any, n: Any, axis: Any, prepend: Any, append: Any) -> Any:
+    needs(a, "np.diff", _ALL)
+    ends = [each for each in (prepend, append) if not isinstance(each, types.NoneType)]
+    if ends and a.ndim > 1:
+        raise TypingError("RTCF:np.diff of a matrix with prepend or append:use np.hstack before")
+    if ends:
+        given = (("prepend", prepend), ("a", a), ("append", append))
+        parts = [
+            f"array(({name},), None)" if isinstance(each, _Numbers) else name
+            for name, each in given
+            if not isinstance(each, types.NoneType)
+        ]
+        text = f"diff(joined(({', '.join(parts)}), 0), n, axis, None, None)"
+        scope = {"array": own.rtcf_array, "joined": own.rtcf_concatenate, "diff": own.rtcf_diff}
+        return _function(
+            f"def again(a, n, axis, prepend, append):\n    return {text}\n", "again", scope
+        )
     if a.ndim == 1:
-        return lambda a: a[1:] - a[:-1]
+
+        def vector(a: Any, n: Any, axis: Any, prepend: Any, append: Any) -> Any:
+            _require_order(n)
+            if axis != 0 and axis != -1:
+                raise ValueError("axis is out of bounds")
+            result = a[1:] - a[:-1]
+            for _ in range(n - 1):
+                result = result[1:] - result[:-1]
+            return result
+
+        return vector
+
     if a.ndim == 3:
-        return lambda a: a[:, :, 1:] - a[:, :, :-1]
-    return lambda a: a[:, 1:] - a[:, :-1]
+
+        def block(a: Any, n: Any, axis: Any, prepend: Any, append: Any) -> Any:
+            if n != 1 or (axis != 2 and axis != -1):
+                raise ValueError("np.diff of three dimensions: once, along the last axis")
+            return a[:, :, 1:] - a[:, :, :-1]
+
+        return block
+
+    def matrix(a: Any, n: Any, axis: Any, prepend: Any, append: Any) -> Any:
+        _require_order(n)
+        if axis == 0 or axis == -2:
+            result = a[1:] - a[:-1]
+            for _ in range(n - 1):
+                result = result[1:] - result[:-1]
+            return result
+        if axis != 1 and axis != -1:
+            raise ValueError("axis is out of bounds")
+        result = a[:, 1:] - a[:, :-1]
+        for _ in range(n - 1):
+            result = result[:, 1:] - result[:, :-1]
+        return result
+
+    return matrix
+
+
+@plain
+def _require_order(n: Any) -> None:
+    if n < 1:
+        raise ValueError("np.diff: the order is 1 or more")
 
 
 @compiled_as(own.rtcf_real)
@@ -820,7 +979,7 @@ def _sum_of(a: Any) -> Any:
     if isinstance(a.dtype, types.Complex):
         return lambda a: _complex_sum(a)
     if isinstance(a.dtype, types.Float):
-        zero = _dtype(a).type(0)
+        zero = dtype_of(a).type(0)
         return lambda a: zero + _halves(a, 0, a.shape[0], zero)
 
     def unsigned(a: Any) -> Any:
@@ -835,7 +994,7 @@ def _sum_of(a: Any) -> Any:
             result += np.int64(a[i])
         return result
 
-    return unsigned if _dtype(a).kind == "u" else wide
+    return unsigned if dtype_of(a).kind == "u" else wide
 
 
 @plain
@@ -909,7 +1068,7 @@ def _multiplied(a: Any) -> Any:
 
 @compiled_as(_multiplied)
 def _product_of(a: Any) -> Any:
-    kind = _dtype(a)
+    kind = dtype_of(a)
     wide = kind if kind.kind == "f" else np.dtype(np.uint64 if kind.kind == "u" else np.int64)
     one = wide.type(1)
     convert = wide.type
@@ -940,10 +1099,10 @@ def _reduction(
             raise TypingError(f"RTCF:{name} with {words(axis)} as its axis:{remedy}")
         if isinstance(a, _Numbers):
             return lambda a, axis, keepdims: whole(own.rtcf_array((a,), None))
-        _needs(a, name, _ALL)
+        needs(a, name, _ALL)
         if isinstance(axis, types.BaseTuple):
             raise TypingError(f"RTCF:{name} along several axes:leave axis out")
-        dtype = _dtype(a) if result is None else result(_dtype(a))
+        dtype = dtype_of(a) if result is None else result(dtype_of(a))
         stays = not isinstance(keepdims, types.NoneType)
         if a.ndim == 1:
             if stays:
@@ -1078,17 +1237,18 @@ _reduction(own.rtcf_all, "np.all", _is_all, result=lambda _: np.dtype(np.bool_))
 
 @compiled_as(own.rtcf_ptp, arrays=("a",))
 def _ptp(a: Any, axis: Any) -> Any:
-    _needs(a, "np.ptp", _ALL)
-    if _dtype(a).kind == "b":
+    needs(a, "np.ptp", _ALL)
+    if dtype_of(a).kind == "b":
         raise TypingError("RTCF:np.ptp of bools:convert them: x.astype(int)")
     return lambda a, axis: _minus(own.rtcf_max(a, axis, None), own.rtcf_min(a, axis, None))
 
 
-def _as_floats(a: Any) -> Any:
+def as_floats(a: Any) -> Any:
+    """Return an array as floats, as it is if possible."""
     raise NotImplementedError
 
 
-@compiled_as(_as_floats)
+@compiled_as(as_floats)
 def _floats_of(a: Any) -> Any:
     if isinstance(a.dtype, types.Float | types.Complex):
         return lambda a: a
@@ -1111,9 +1271,9 @@ def _elements_along(a: Any, axis: Any) -> Any:
 def _mean(a: Any, axis: Any, keepdims: Any) -> Any:
     if isinstance(a, _Numbers):
         return lambda a, axis, keepdims: helpers.rtcf_to_float(a)
-    _needs(a, "np.mean", _ALL)
+    needs(a, "np.mean", _ALL)
     return lambda a, axis, keepdims: _divided(
-        own.rtcf_sum(_as_floats(a), axis, keepdims), _elements(a, axis)
+        own.rtcf_sum(as_floats(a), axis, keepdims), _elements(a, axis)
     )
 
 
@@ -1124,7 +1284,7 @@ def _divided(total: Any, count: Any) -> Any:
 @compiled_as(_divided)
 def _divided_by(total: Any, count: Any) -> Any:
     """Divide a sum, or sums, by a number of elements; floats keep their size."""
-    if _dtype(total) != np.float32:
+    if dtype_of(total) != np.float32:
         return lambda total, count: total / count
     # Rounding the quotient of 64 bits gives the correct quotient of 32 bits.
     if isinstance(total, types.Array):
@@ -1134,10 +1294,10 @@ def _divided_by(total: Any, count: Any) -> Any:
 
 @compiled_as(own.rtcf_var, arrays=("a",))
 def _var(a: Any, axis: Any, ddof: Any) -> Any:
-    _needs(a, "np.var", _ALL)
+    needs(a, "np.var", _ALL)
 
     def var(a: Any, axis: Any, ddof: Any) -> Any:
-        values = _as_floats(a)
+        values = as_floats(a)
         mean = _kept_mean(values, axis)
         far = values - mean
         return _divided(own.rtcf_sum(far * far, axis, None), max(_elements(a, axis) - ddof, 0))
@@ -1162,10 +1322,12 @@ def _std(a: Any, axis: Any, ddof: Any) -> Any:
 
 
 @compiled_as(own.rtcf_count_nonzero, arrays=("a",))
-def _count_nonzero(a: Any) -> Any:
-    _needs(a, "np.count_nonzero", _ALL)
+def _count_nonzero(a: Any, axis: Any) -> Any:
+    needs(a, "np.count_nonzero", _ALL)
+    if not isinstance(axis, types.NoneType):
+        return lambda a, axis: own.rtcf_sum(a != 0, axis, None)
 
-    def count(a: Any) -> Any:
+    def count(a: Any, axis: Any) -> Any:
         found = 0
         row = own.rtcf_ravel(a)
         for i in range(row.shape[0]):
@@ -1177,12 +1339,13 @@ def _count_nonzero(a: Any) -> Any:
 
 
 @compiled_as(own.rtcf_median, arrays=("a",))
-def _median(a: Any) -> Any:
-    _needs(a, "np.median", _ALL)
-    to = np.float32 if _dtype(a) == np.float32 else np.float64
+def _median(a: Any, axis: Any) -> Any:
+    needs(a, "np.median", _ALL if isinstance(axis, types.NoneType) else (1, 2))
+    to = np.float32 if dtype_of(a) == np.float32 else np.float64
 
-    def median(a: Any) -> Any:
-        ordered = own.rtcf_sort(_as_floats(own.rtcf_ravel(a)), -1)
+    @plain
+    def of_vector(a: Any) -> Any:
+        ordered = own.rtcf_sort(as_floats(a), -1)
         n = ordered.shape[0]
         if n == 0 or ordered[n - 1] != ordered[n - 1]:
             return to(np.nan)
@@ -1190,13 +1353,37 @@ def _median(a: Any) -> Any:
             return to(ordered[n // 2] + 0.0)
         return to((ordered[n // 2 - 1] + ordered[n // 2]) / 2.0)
 
-    return median
+    if isinstance(axis, types.NoneType):
+        return lambda a, axis: of_vector(own.rtcf_ravel(a))
+    if a.ndim == 1:
+
+        def one_axis(a: Any, axis: Any) -> Any:
+            if axis != 0 and axis != -1:
+                raise ValueError("axis is out of bounds")
+            return of_vector(a)
+
+        return one_axis
+
+    def along(a: Any, axis: Any) -> Any:
+        if axis == 1 or axis == -1:
+            found = np.empty(a.shape[0], to)
+            for i in range(a.shape[0]):
+                found[i] = of_vector(a[i])
+        elif axis == 0 or axis == -2:
+            found = np.empty(a.shape[1], to)
+            for j in range(a.shape[1]):
+                found[j] = of_vector(a[:, j])
+        else:
+            raise ValueError("axis is out of bounds")
+        return found
+
+    return along
 
 
 @compiled_as(own.rtcf_trace, arrays=("a",))
-def _trace(a: Any) -> Any:
-    _needs(a, "np.trace", (2,))
-    return lambda a: own.rtcf_sum(own.rtcf_diag(a, 0), None, None)
+def _trace(a: Any, offset: Any) -> Any:
+    needs(a, "np.trace", (2,))
+    return lambda a, offset: own.rtcf_sum(own.rtcf_diag(a, offset), None, None)
 
 
 def _running(helper: Any, name: str, step: Any) -> None:
@@ -1204,8 +1391,8 @@ def _running(helper: Any, name: str, step: Any) -> None:
 
     @compiled_as(helper, arrays=("a",))
     def _run(a: Any, axis: Any) -> Any:
-        _needs(a, name, _ALL if isinstance(axis, types.NoneType) else (1, 2))
-        dtype = _wide(_dtype(a))
+        needs(a, name, _ALL if isinstance(axis, types.NoneType) else (1, 2))
+        dtype = _wide(dtype_of(a))
 
         def vector(a: Any) -> Any:
             result = np.empty(a.shape[0], dtype)
@@ -1293,7 +1480,7 @@ def _sort_vector(values: Any) -> None:
 
 @compiled_as(own.rtcf_sort_in_place)
 def _sort_in_place(a: Any, axis: Any) -> Any:
-    _needs(a, "sort")
+    needs(a, "sort")
     if not a.mutable:
         raise TypingError("RTCF:a constant of the module is sorted:copy it first")
     if a.ndim == 1:
@@ -1312,7 +1499,7 @@ def _sort_in_place(a: Any, axis: Any) -> Any:
 
 @compiled_as(own.rtcf_sort, arrays=("a",))
 def _sort(a: Any, axis: Any) -> Any:
-    _needs(a, "np.sort", _ALL if isinstance(axis, types.NoneType) else (1, 2))
+    needs(a, "np.sort", _ALL if isinstance(axis, types.NoneType) else (1, 2))
     if isinstance(axis, types.NoneType):
         return lambda a, axis: own.rtcf_sort(own.rtcf_flatten(a), -1)
 
@@ -1331,7 +1518,7 @@ def _fill(a: Any, value: Any) -> Any:
 
 @compiled_as(own.rtcf_argsort, arrays=("a",))
 def _argsort(a: Any, kind: Any) -> Any:
-    _needs(a, "np.argsort", (1,))
+    needs(a, "np.argsort", (1,))
 
     def argsort(a: Any, kind: Any) -> Any:
         n = a.shape[0]
@@ -1384,11 +1571,11 @@ def _first_above(a: Any, v: Any) -> Any:
 
 @compiled_as(own.rtcf_searchsorted, arrays=("a", "v"))
 def _searchsorted(a: Any, v: Any, side: Any) -> Any:
-    _needs(a, "np.searchsorted", (1,))
+    needs(a, "np.searchsorted", (1,))
     search = _first_not_below if isinstance(side, types.NoneType) else _first_above
     if isinstance(v, _Numbers):
         return lambda a, v, side: search(a, v)
-    _needs(v, "np.searchsorted", (1,))
+    needs(v, "np.searchsorted", (1,))
 
     def each(a: Any, v: Any, side: Any) -> Any:
         result = np.empty(v.shape[0], np.int64)
@@ -1421,7 +1608,7 @@ def _clip(a: Any, a_min: Any, a_max: Any) -> Any:
         return _clip_narrow(a, a_min, a_max)
     if all(isinstance(each, types.Float) for each in (a, a_min, a_max)):
         return _clip_number
-    if low and high and all(_dtype(each) == np.float64 for each in (a, a_min, a_max)):
+    if low and high and all(dtype_of(each) == np.float64 for each in (a, a_min, a_max)):
         return lambda a, a_min, a_max: _clip_elements(a, a_min, a_max)
     if low and high:
         return lambda a, a_min, a_max: np.minimum(np.maximum(a, a_min), a_max)
@@ -1446,23 +1633,23 @@ def _clip_narrow(a: Any, a_min: Any, a_max: Any) -> Any:
 
 @compiled_as(own.rtcf_is_any, arrays=("values",))
 def _any_of_values(values: Any) -> Any:
-    _needs(values, "any", (1,))
+    needs(values, "any", (1,))
     return lambda values: own.rtcf_any(values, None)
 
 
 @compiled_as(own.rtcf_is_all, arrays=("values",))
 def _all_of_values(values: Any) -> Any:
-    _needs(values, "all", (1,))
+    needs(values, "all", (1,))
     return lambda values: own.rtcf_all(values, None)
 
 
 @compiled_as(own.rtcf_astype)
 def _astype(a: Any, dtype: Any) -> Any:
-    _needs(a, "astype", _ALL)
-    wanted = _dtype(dtype.dtype if isinstance(dtype, types.DTypeSpec) else dtype.instance_type)
+    needs(a, "astype", _ALL)
+    wanted = dtype_of(dtype.dtype if isinstance(dtype, types.DTypeSpec) else dtype.instance_type)
     if wanted.kind == "b":
         return lambda a, dtype: a != 0
-    if not (_dtype(a).kind == "f" and wanted.kind in "iu"):
+    if not (dtype_of(a).kind == "f" and wanted.kind in "iu"):
         return lambda a, dtype: own.rtcf_array(a, dtype)
     if wanted != np.dtype(np.int64):
         raise TypingError(f"RTCF:floats cannot become {wanted}:convert them to int64 first")
@@ -1492,7 +1679,7 @@ def _abs(x: Any) -> Any:
     return lambda x: abs(x)
 
 
-def _elementwise(function: Callable[..., Any]) -> Any:
+def elementwise(function: Callable[..., Any]) -> Any:
     """Return a function of numbers that also takes arrays."""
     function.__annotations__ = {}
     return numba.vectorize(function)
@@ -1504,7 +1691,7 @@ def _about(a: Any, b: Any, rtol: Any, atol: Any, equal_nan: Any) -> Any:
     return a == b or (equal_nan and a != a and b != b)
 
 
-_isclose_each = _elementwise(_about)
+_isclose_each = elementwise(_about)
 
 
 @compiled_as(own.rtcf_isclose, arrays=("a", "b"), refused="fiu")
@@ -1522,13 +1709,23 @@ def _allclose(a: Any, b: Any, rtol: Any, atol: Any, equal_nan: Any) -> Any:
 
 
 @compiled_as(own.rtcf_array_equal, arrays=("a1", "a2"))
-def _array_equal(a1: Any, a2: Any) -> Any:
-    _needs(a1, "np.array_equal", _ALL)
-    _needs(a2, "np.array_equal", _ALL)
+def _array_equal(a1: Any, a2: Any, equal_nan: Any) -> Any:
+    needs(a1, "np.array_equal", _ALL)
+    needs(a2, "np.array_equal", _ALL)
     if a1.ndim != a2.ndim:
-        return lambda a1, a2: False
+        return lambda a1, a2, equal_nan: False
+    has_nan = all(dtype_of(each).kind == "f" for each in (a1, a2))
+    if has_nan and not isinstance(equal_nan, types.NoneType):
 
-    def equal(a1: Any, a2: Any) -> Any:
+        def equal_or_nan(a1: Any, a2: Any, equal_nan: Any) -> Any:
+            if a1.shape != a2.shape:
+                return False
+            both = (a1 != a1) & (a2 != a2)
+            return own.rtcf_all((a1 == a2) | both, None)
+
+        return equal_or_nan
+
+    def equal(a1: Any, a2: Any, equal_nan: Any) -> Any:
         if a1.shape != a2.shape:
             return False
         return own.rtcf_all(a1 == a2, None)
@@ -1536,27 +1733,11 @@ def _array_equal(a1: Any, a2: Any) -> Any:
     return equal
 
 
-@compiled_as(own.rtcf_math_isclose)
-def _math_isclose(a: Any, b: Any, rel_tol: Any, abs_tol: Any) -> Any:
-    def isclose(a: Any, b: Any, rel_tol: Any, abs_tol: Any) -> Any:
-        x, y = np.float64(a), np.float64(b)
-        if rel_tol < 0.0 or abs_tol < 0.0:
-            raise ValueError("tolerances must be non-negative")
-        if x == y:
-            return True
-        if math.isinf(x) or math.isinf(y):
-            return False
-        far = abs(y - x)
-        return far <= abs(rel_tol * y) or far <= abs(rel_tol * x) or far <= abs_tol
-
-    return isclose
-
-
 @compiled_as(own.rtcf_np_round, arrays=("a",))
 def _np_round(a: Any, decimals: Any) -> Any:
     if not isinstance(a.dtype if isinstance(a, types.Array) else a, types.Float):
         raise TypingError(f"RTCF:np.round of {words(a)}:give it floats")
-    to = _dtype(a).type
+    to = dtype_of(a).type
 
     def rounded(a: Any, decimals: Any) -> Any:
         if decimals == 0:
@@ -1577,20 +1758,20 @@ def _replaced(x: Any, nan: Any, posinf: Any, neginf: Any) -> Any:
     return x
 
 
-_nan_to_num_each = _elementwise(_replaced)
+_nan_to_num_each = elementwise(_replaced)
 
 
 @compiled_as(own.rtcf_nan_to_num, arrays=("x",), refused="fiu")
-def _nan_to_num(x: Any, nan: Any, posinf: Any, neginf: Any) -> Any:
+def _nan_to_num(x: Any, copy: Any, nan: Any, posinf: Any, neginf: Any) -> Any:
     top = np.finfo(np.float64).max
     up, down = (isinstance(each, types.NoneType) for each in (posinf, neginf))
     if up and down:
-        return lambda x, nan, posinf, neginf: _nan_to_num_each(x, nan, top, -top)
+        return lambda x, copy, nan, posinf, neginf: _nan_to_num_each(x, nan, top, -top)
     if up:
-        return lambda x, nan, posinf, neginf: _nan_to_num_each(x, nan, top, neginf)
+        return lambda x, copy, nan, posinf, neginf: _nan_to_num_each(x, nan, top, neginf)
     if down:
-        return lambda x, nan, posinf, neginf: _nan_to_num_each(x, nan, posinf, -top)
-    return lambda x, nan, posinf, neginf: _nan_to_num_each(x, nan, posinf, neginf)
+        return lambda x, copy, nan, posinf, neginf: _nan_to_num_each(x, nan, posinf, -top)
+    return lambda x, copy, nan, posinf, neginf: _nan_to_num_each(x, nan, posinf, neginf)
 
 
 @plain
@@ -1679,9 +1860,9 @@ def _value_or_end(value: Any, fp: Any, place: Any) -> Any:
 
 @compiled_as(own.rtcf_interp, arrays=("x", "xp", "fp"))
 def _interp(x: Any, xp: Any, fp: Any, left: Any, right: Any) -> Any:
-    _needs(xp, "np.interp", (1,))
-    _needs(fp, "np.interp", (1,))
-    if any(is_narrow(_dtype(each)) for each in (xp, fp)):
+    needs(xp, "np.interp", (1,))
+    needs(fp, "np.interp", (1,))
+    if any(is_narrow(dtype_of(each)) for each in (xp, fp)):
         return lambda x, xp, fp, left, right: own.rtcf_interp(
             x, own.rtcf_asarray(xp, np.float64), own.rtcf_asarray(fp, np.float64), left, right
         )
@@ -1689,7 +1870,7 @@ def _interp(x: Any, xp: Any, fp: Any, left: Any, right: Any) -> Any:
         return lambda x, xp, fp, left, right: _interpolated(
             x, xp, fp, _or_end(left, fp, 0), _or_end(right, fp, -1)
         )
-    _needs(x, "np.interp", (1,))
+    needs(x, "np.interp", (1,))
 
     def each(x: Any, xp: Any, fp: Any, left: Any, right: Any) -> Any:
         if xp.shape[0] == 0 or xp.shape[0] != fp.shape[0]:
@@ -1709,7 +1890,7 @@ def _interp(x: Any, xp: Any, fp: Any, left: Any, right: Any) -> Any:
 
 @compiled_as(own.rtcf_polyval, arrays=("p", "x"), refused="fiu")
 def _polyval(p: Any, x: Any) -> Any:
-    _needs(p, "np.polyval", (1,))
+    needs(p, "np.polyval", (1,))
 
     def number(p: Any, x: Any) -> Any:
         result = 0.0
@@ -1719,7 +1900,7 @@ def _polyval(p: Any, x: Any) -> Any:
 
     if isinstance(x, _Numbers):
         return number
-    _needs(x, "np.polyval", (1,))
+    needs(x, "np.polyval", (1,))
     of_one = plain(number)
 
     def each(p: Any, x: Any) -> Any:
@@ -1733,10 +1914,10 @@ def _polyval(p: Any, x: Any) -> Any:
 
 @compiled_as(own.rtcf_trapz, arrays=("y", "x"), refused="fiu")
 def _trapz(y: Any, x: Any, dx: Any) -> Any:
-    _needs(y, "np.trapz", (1,))
+    needs(y, "np.trapz", (1,))
     if isinstance(x, types.NoneType):
         return lambda y, x, dx: own.rtcf_sum(dx * (y[1:] + y[:-1]) / 2.0, None, None)
-    _needs(x, "np.trapz", (1,))
+    needs(x, "np.trapz", (1,))
     return lambda y, x, dx: own.rtcf_sum((x[1:] - x[:-1]) * (y[1:] + y[:-1]) / 2.0, None, None)
 
 
@@ -1745,11 +1926,11 @@ def _trapz(y: Any, x: Any, dx: Any) -> Any:
 
 @compiled_as(own.rtcf_outer, arrays=("a", "b"))
 def _outer(a: Any, b: Any) -> Any:
-    _needs(a, "np.outer")
-    _needs(b, "np.outer")
+    needs(a, "np.outer")
+    needs(b, "np.outer")
     if a.ndim == 2 or b.ndim == 2:
         return lambda a, b: own.rtcf_outer(own.rtcf_ravel(a), own.rtcf_ravel(b))
-    dtype = np.result_type(_dtype(a), _dtype(b))
+    dtype = np.result_type(dtype_of(a), dtype_of(b))
 
     def outer(a: Any, b: Any) -> Any:
         result = np.empty((a.shape[0], b.shape[0]), dtype)
@@ -1761,71 +1942,138 @@ def _outer(a: Any, b: Any) -> Any:
     return outer
 
 
-@compiled_as(own.rtcf_cross, arrays=("a", "b"), refused="iu")
+@plain
+def _cross_of(a: Any, b: Any, result: Any) -> None:
+    result[0] = a[1] * b[2] - a[2] * b[1]
+    result[1] = a[2] * b[0] - a[0] * b[2]
+    result[2] = a[0] * b[1] - a[1] * b[0]
+
+
+@compiled_as(own.rtcf_cross, arrays=("a", "b"), refused="biu")
 def _cross(a: Any, b: Any) -> Any:
-    _needs(a, "np.cross", (1,))
-    _needs(b, "np.cross", (1,))
+    needs(a, "np.cross")
+    needs(b, "np.cross")
+    dtype = np.promote_types(dtype_of(a), dtype_of(b))
+    if a.ndim == b.ndim == 1:
 
-    def cross(a: Any, b: Any) -> Any:
-        if a.shape[0] != 3 or b.shape[0] != 3:
-            raise ValueError("np.cross takes vectors of three elements")
-        return own.rtcf_array(
-            (
-                a[1] * b[2] - a[2] * b[1],
-                a[2] * b[0] - a[0] * b[2],
-                a[0] * b[1] - a[1] * b[0],
-            ),
-            None,
-        )
+        def cross(a: Any, b: Any) -> Any:
+            if a.shape[0] != 3 or b.shape[0] != 3:
+                raise ValueError("np.cross takes vectors of three elements")
+            result = np.empty(3, dtype)
+            _cross_of(a, b, result)
+            return result
 
-    return cross
+        return cross
+    if a.ndim == 1:
+        return lambda a, b: own.rtcf_cross(own.rtcf_reshape(a, (1, a.shape[0])), b)
+    if b.ndim == 1:
+        return lambda a, b: own.rtcf_cross(a, own.rtcf_reshape(b, (1, b.shape[0])))
+
+    def rows(a: Any, b: Any) -> Any:
+        if a.shape[1] != 3 or b.shape[1] != 3:
+            raise ValueError("np.cross takes rows of three elements")
+        down, along = 0 if a.shape[0] == 1 else 1, 0 if b.shape[0] == 1 else 1
+        if down and along and a.shape[0] != b.shape[0]:
+            raise ValueError("np.cross of different numbers of rows")
+        result = np.empty((a.shape[0] if down else b.shape[0], 3), dtype)
+        for i in range(result.shape[0]):
+            _cross_of(a[i * down], b[i * along], result[i])
+        return result
+
+    return rows
 
 
 @compiled_as(own.rtcf_inner, arrays=("a", "b"))
 def _inner(a: Any, b: Any) -> Any:
-    _needs(a, "np.inner", (1,))
-    _needs(b, "np.inner", (1,))
+    needs(a, "np.inner", (1,))
+    needs(b, "np.inner", (1,))
     return lambda a, b: helpers.rtcf_matmul(a, b)
 
 
 @compiled_as(own.rtcf_norm, arrays=("x",), refused="f")
-def _norm(x: Any, ord: Any, axis: Any) -> Any:
-    _needs(x, "np.linalg.norm", _ALL)
-    default = isinstance(ord, types.NoneType)
-    if isinstance(axis, types.NoneType):
-        if default:
+def _norm(x: Any, ord: Any, axis: Any, keepdims: Any) -> Any:
+    needs(x, "np.linalg.norm", _ALL)
+    default, is_all = (isinstance(each, types.NoneType) for each in (ord, axis))
+    if is_all and (default or x.ndim == 1) and not isinstance(keepdims, types.NoneType):
+        ones = (1,) * x.ndim
+        return lambda x, ord, axis, keepdims: own.rtcf_reshape(
+            own.rtcf_array((own.rtcf_norm(x, ord, None, None),), None), ones
+        )
+    if is_all and default:
 
-            def of_all(x: Any, ord: Any, axis: Any) -> Any:
-                total = 0.0
-                row = own.rtcf_ravel(x)
-                for i in range(row.shape[0]):
-                    total += float(row[i]) * float(row[i])
-                return np.sqrt(total)
+        def of_all(x: Any, ord: Any, axis: Any, keepdims: Any) -> Any:
+            total = 0.0
+            row = own.rtcf_ravel(x)
+            for i in range(row.shape[0]):
+                total += float(row[i]) * float(row[i])
+            return np.sqrt(total)
 
-            return of_all
-        if x.ndim > 1:
-            raise TypingError("RTCF:this norm of a matrix is not compiled:leave ord out")
+        return of_all
+    if is_all and x.ndim == 1:
+        along = plain(_norm_along())
 
-        def of_vector(x: Any, ord: Any, axis: Any) -> Any:
+        def of_vector(x: Any, ord: Any, axis: Any, keepdims: Any) -> Any:
             if ord == 2:
                 return np.sqrt(helpers.rtcf_matmul(x * 1.0, x * 1.0))
-            if ord == 1:
-                return own.rtcf_sum(np.abs(x * 1.0), None, None)
-            if ord == np.inf:
-                return own.rtcf_max(np.abs(x * 1.0), None, None)
-            if ord == -np.inf:
-                return own.rtcf_min(np.abs(x * 1.0), None, None)
-            raise ValueError("np.linalg.norm: ord is 1, 2 or np.inf")
+            return along(x, ord, None, None)
 
         return of_vector
-    if not default:
-        raise TypingError("RTCF:np.linalg.norm with ord and axis:leave ord out")
-    return lambda x, ord, axis: np.sqrt(own.rtcf_sum(x * 1.0 * x, axis, None))
+    if is_all:
+        return _norm_of_matrix(ord, keepdims)
+    if default:
+        return lambda x, ord, axis, keepdims: np.sqrt(own.rtcf_sum(x * 1.0 * x, axis, keepdims))
+    return _norm_along()
+
+
+def _norm_along() -> Any:
+    """Return the function for the norm of a vector, or of each row or column of a matrix."""
+
+    def along(x: Any, ord: Any, axis: Any, keepdims: Any) -> Any:
+        x = x * 1.0
+        if ord == 2:
+            return np.sqrt(own.rtcf_sum(x * x, axis, keepdims))
+        if ord == 1:
+            return own.rtcf_sum(np.abs(x), axis, keepdims)
+        if ord == np.inf:
+            return own.rtcf_max(np.abs(x), axis, keepdims)
+        if ord == -np.inf:
+            return own.rtcf_min(np.abs(x), axis, keepdims)
+        if ord == 0:
+            return own.rtcf_sum(own.rtcf_array(x != 0.0, np.float64), axis, keepdims)
+        return own.rtcf_sum(helpers.rtcf_pow(np.abs(x), ord * 1.0), axis, keepdims) ** (1.0 / ord)
+
+    return along
+
+
+def _norm_of_matrix(ord: Any, keepdims: Any) -> Any:
+    """Return the function for a norm of a matrix; None for an int whose value is not known."""
+    if isinstance(ord, types.Integer):
+        if not isinstance(ord, types.IntegerLiteral):
+            return None  # numba asks again with the value of a constant
+        if ord.literal_value not in (1, -1):
+            what = f"np.linalg.norm of a matrix with ord={ord.literal_value} needs singular values"
+            raise TypingError(f"RTCF:{what}, which LAPACK computes:use the Frobenius norm")
+    if not isinstance(keepdims, types.NoneType):
+        raise TypingError("RTCF:np.linalg.norm of a matrix with ord and keepdims:remove keepdims")
+
+    def norm(x: Any, ord: Any, axis: Any, keepdims: Any) -> Any:
+        far = np.abs(x * 1.0)
+        if ord == 1:
+            return own.rtcf_max(own.rtcf_sum(far, 0, None), None, None)
+        if ord == -1:
+            return own.rtcf_min(own.rtcf_sum(far, 0, None), None, None)
+        if ord == np.inf:
+            return own.rtcf_max(own.rtcf_sum(far, 1, None), None, None)
+        if ord == -np.inf:
+            return own.rtcf_min(own.rtcf_sum(far, 1, None), None, None)
+        raise ValueError("np.linalg.norm of a matrix: ord is 1, -1, np.inf or -np.inf")
+
+    return norm
 
 
 @compiled_as(own.rtcf_det, arrays=("a",), refused="f")
 def _det(a: Any) -> Any:
-    _needs(a, "np.linalg.det", (2,))
+    needs(a, "np.linalg.det", (2,))
 
     def det(a: Any) -> Any:
         n = a.shape[0]
@@ -1856,7 +2104,7 @@ def _det(a: Any) -> Any:
 
 @compiled_as(own.rtcf_matrix_power, arrays=("a",), refused="fiu")
 def _matrix_power(a: Any, n: Any) -> Any:
-    _needs(a, "np.linalg.matrix_power", (2,))
+    needs(a, "np.linalg.matrix_power", (2,))
 
     def power(a: Any, n: Any) -> Any:
         size = a.shape[0]
@@ -1928,8 +2176,3 @@ def _by_libm(helper: Any, name: str) -> None:
 
 for _helper, _name in own.BY_LIBM.items():
     _by_libm(_helper, _name)
-
-
-@compiled_as(own.rtcf_math_hypot)
-def _math_hypot(x: Any, y: Any) -> Any:
-    return lambda x, y: math.hypot(np.float64(x), np.float64(y))

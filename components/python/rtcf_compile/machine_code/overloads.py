@@ -18,7 +18,7 @@ from rtcf_compile.machine_code import backend
 from rtcf_compile.machine_code.explain import NAMES, kind_of
 from rtcf_compile.machine_code.number_types import Operand, operand, plain_of, together
 from rtcf_compile.machine_code.raised_values import note
-from rtcf_compile.machine_code.sharing import overlaps, shares
+from rtcf_compile.machine_code.sharing import in_one_block, overlaps, shares
 from rtcf_compile.machine_code.tile import ROWS
 from rtcf_compile.rewriting import helpers, numpy_functions, operators
 
@@ -60,7 +60,7 @@ def compiled_as(
                 elif name in arrays and isinstance(kind, types.BaseTuple):
                     changed[name] = f"array({name}, None)"
                 elif refused:
-                    _refuse_narrow(helper, kind, refused)
+                    refuse_narrow(helper, kind, refused)
             if changed:
                 return _again(helper, names, changed)
             implementation = choose(*types_of, **named)
@@ -74,7 +74,8 @@ def compiled_as(
     return register
 
 
-def _refuse_narrow(helper: Callable[..., Any], kind: Any, refused: str) -> None:
+def refuse_narrow(helper: Callable[..., Any], kind: Any, refused: str) -> None:
+    """Reject narrow numbers of these kinds, and bools for b."""
     number = operand(kind)
     other = number is not None and (number.is_narrow or number.is_bool)
     if number is not None and other and number.dtype.kind in refused:
@@ -646,7 +647,7 @@ def _is_from_the_end(target: Any, value: Any) -> Any:
     addresses only, not by strides.
     """
     n = target.shape[0]
-    if n == 0 or value.shape[0] != n:
+    if n == 0 or value.shape[0] != n or not in_one_block(target, value):
         return False
     # The difference of two addresses in one record is a compile-time constant.
     ahead = np.int64(target.ctypes.data) - np.int64(value.ctypes.data)
@@ -1309,16 +1310,16 @@ def _checking(helper: Any, function: Any) -> None:
     A NaN from a number is a domain error. So is infinity from a finite number, unless the function
     grows that large (OverflowError).
     """
-    name, grows = function.__name__, function in (math.exp, math.expm1, math.sinh, math.cosh)
-    if function is math.log2:  # not supported by numba
-        function = types.ExternalFunction("log2", types.float64(types.float64))
+    name = function.__name__
+    grows = function in (math.exp, math.exp2, math.expm1, math.sinh, math.cosh)
+    arrays = f"; np.{name} takes arrays" if hasattr(np, name) else ""
+    if function in (math.log2, math.cbrt, math.exp2):  # not supported by numba
+        function = types.ExternalFunction(name, types.float64(types.float64))
 
     @compiled_as(helper)
     def _check(value: Any) -> Any:
         if not isinstance(value, types.Number | types.Boolean):
-            raise TypingError(
-                f"RTCF:math.{name} of {words(value)}:give it a number; np.{name} takes arrays"
-            )
+            raise TypingError(f"RTCF:math.{name} of {words(value)}:give it a number{arrays}")
 
         def checked(value: Any) -> Any:
             result = function(np.float64(value))
@@ -1420,7 +1421,7 @@ def _pow(base: Any, exponent: Any) -> Any:
     if isinstance(base, types.Complex) or isinstance(exponent, types.Complex):
         return lambda base, exponent: helpers.rtcf_complex_pow(base, exponent)
     for each in (base, exponent):
-        _refuse_narrow(helpers.rtcf_pow, each, "f")
+        refuse_narrow(helpers.rtcf_pow, each, "f")
     if not isinstance(base, types.Float) and not isinstance(exponent, types.Float):
 
         def whole(base: Any, exponent: Any) -> Any:

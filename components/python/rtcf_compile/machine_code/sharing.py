@@ -19,6 +19,18 @@ def _overlaps(typing: Any, target: Any, value: Any) -> Any:
     return _compared(target, value, False)
 
 
+def _in_one_block(typing: Any, target: Any, value: Any) -> Any:
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        arrays = (
+            context.make_array(kind)(context, builder, array)
+            for kind, array in zip(signature.args, arguments, strict=True)
+        )
+        owners = (builder.bitcast(each.meminfo, cgutils.voidptr_t) for each in arrays)
+        return builder.icmp_unsigned("==", *owners)
+
+    return types.boolean(target, value), generate
+
+
 def _compared(target: Any, value: Any, but_same: bool) -> Any:
     """Return the signature and the code generator of the test.
 
@@ -72,8 +84,11 @@ def _numbers(builder: Any, array: Any, name: str) -> Any:
     return cgutils.unpack_tuple(builder, getattr(array, name))
 
 
-_shares.__annotations__ = _overlaps.__annotations__ = {}
+for _each in (_shares, _overlaps, _in_one_block):
+    _each.__annotations__ = {}
 # Tells whether a value may overlap the target other than element by element.
 shares: Any = intrinsic(_shares)
 # Tells whether a value may overlap the target.
 overlaps: Any = intrinsic(_overlaps)
+# Tells whether two arrays may lie in one block: a record, or a block of the arena.
+in_one_block: Any = intrinsic(_in_one_block)

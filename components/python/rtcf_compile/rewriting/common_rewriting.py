@@ -15,11 +15,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from rtcf_compile.rewriting import numpy_functions, operators
+from rtcf_compile.rewriting import math_functions, numpy_functions, operators
 from rtcf_compile.rewriting.helpers import IN_PLACE, INSTEAD, OF_LISTS, rtcf_round, rtcf_round_to
 from rtcf_compile.rewriting.references import is_copied, is_ellipsis, is_new_axis
+from rtcf_compile.rewriting.subscripts import Subscripts
 from rtcf_compile.source.checks import resolve
-from rtcf_compile.source.mistake import at
+from rtcf_compile.source.mistake import Mistake, Mistakes, at
 from rtcf_compile.source.modules import Source, is_of_user, is_own
 
 _Node = TypeVar("_Node", bound=ast.AST)
@@ -27,13 +28,18 @@ _BY_NODE: tuple[Any, ...] = (operators.BINARY, operators.SHIFTS, operators.COMPA
 _OPERATORS: dict[type[ast.AST], operators.Function] = {
     node: operators.OF[operation] for by_node in _BY_NODE for node, operation in by_node.items()
 }
-_STANDS_FOR = [*INSTEAD.items(), *numpy_functions.STANDS_FOR]
+_STANDS_FOR = [*INSTEAD.items(), *numpy_functions.STANDS_FOR, *math_functions.STANDS_FOR]
 # Size of the arena for temporary arrays of a hook in the real-time thread, bytes.
 ARENA = 64 * 1024
 _NEW = (np.zeros, np.ones, np.empty, np.full, np.eye, np.identity)
 _PLAIN = (*_NEW, np.zeros_like, np.ones_like, np.empty_like, np.full_like, np.arange)
 _PLAIN_METHODS = ("copy", "fill", "flatten", "item", "view")
 _DTYPES = {float: np.float64, int: np.int64, bool: np.bool_, complex: np.complex128}
+# Arguments that have two names in NumPy.
+_OTHER_NAMES = {
+    (numpy_functions.rtcf_clip, "min"): "a_min",
+    (numpy_functions.rtcf_clip, "max"): "a_max",
+}
 # NumPy functions with the position of their element type argument.
 _TYPED = {np.zeros: 1, np.ones: 1, np.empty: 1, np.full: 2, np.zeros_like: 1, np.ones_like: 1}
 
@@ -46,6 +52,7 @@ class CommonRewriting(ast.NodeTransformer):
     ) -> None:
         """Rewrite a function; `functions`: the operators that become calls of functions."""
         self.source = source
+        self.mistakes = Mistakes()
         self._functions = functions
         self.constants: dict[str, Any] = {}
         self._named_values: dict[str, Any] = {}  # what the names of constants stand for
@@ -107,6 +114,21 @@ class CommonRewriting(ast.NodeTransformer):
         return False
 
     def visit(self, node: ast.AST) -> Any:
+        """Rewrite a node; collect the errors of each statement."""
+        if not isinstance(node, ast.stmt):
+            return self._visit(node)
+        try:
+            return self._visit(node)
+        except Mistake as mistake:
+            self.mistakes.add(mistake)
+        # Find the errors of the statements inside, too.
+        cases = node.cases if isinstance(node, ast.Match) else []
+        for each in (node, *cases):
+            for inner in (*getattr(each, "body", ()), *getattr(each, "orelse", ())):
+                self.visit(inner)
+        return like(node, ast.Pass())
+
+    def _visit(self, node: ast.AST) -> Any:
         """Move `y := x` before the statement that contains it; copy where references.py says so."""
         if isinstance(node, ast.stmt) and (before := self._before(node)):
             return self.statements(before)
@@ -440,6 +462,16 @@ class CommonRewriting(ast.NodeTransformer):
         if target is float and (number := _number_in(node)) is not None:
             return like(node, ast.Constant(number))
         instead = next((own for each, own in _STANDS_FOR if each is target), None)
+        if instead is not None and instead in math_functions.OF_ALL_ARGUMENTS.values():
+            return self._instead(node, instead, [like(node, ast.Tuple(node.args, ast.Load()))])
+        if target is np.einsum:
+            return self._einsum(node)
+        if target is np.meshgrid and len(node.args) != 2:
+            what = f"np.meshgrid of {len(node.args)} vectors"
+            raise self.mistake(node, what, "give it two: arrays have one or two dimensions")
+        if target is np.gradient and node.args:
+            spacing = like(node, ast.Tuple(node.args[1:], ast.Load()))
+            return self._instead(node, numpy_functions.rtcf_gradient, [node.args[0], spacing])
         if instead is not None:
             return self._instead(node, instead, node.args)
         if target is round and len(node.args) == 1 and not node.keywords:
@@ -543,7 +575,28 @@ class CommonRewriting(ast.NodeTransformer):
             bounds = [ast.BinOp(each, ast.Sub(), ast.Constant(1)) for each in (of.args[-1], low)]
             step = ast.UnaryOp(ast.USub(), ast.Constant(1))
             return self.visit(like(node, ast.Call(of.func, [*bounds, step], [])))  # type: ignore[no-any-return]
-        return like(node, call_of("rtcf_flip", self.visit(of)))
+        return like(node, call_of("rtcf_flip", self.visit(of), ast.Constant(None)))
+
+    def _einsum(self, node: ast.Call) -> ast.AST:
+        """Rewrite `np.einsum("ij,j->i", a, b)`."""
+        if node.keywords:
+            what = f"np.einsum takes no {node.keywords[0].arg}"
+            raise self.mistake(node, what, f"remove {node.keywords[0].arg}")
+        given = node.args[0] if node.args else None
+        text = given.value if isinstance(given, ast.Constant) else None
+        if not isinstance(text, str):
+            what = "np.einsum takes constant subscripts"
+            raise self.mistake(node, what, 'write np.einsum("ij,j->i", a, b)')
+        try:
+            subscripts = Subscripts(text)
+        except ValueError as error:
+            raise self.mistake(node, *error.args) from None
+        count = len(node.args) - 1
+        if count != len(subscripts.operands):
+            what = f"{text!r} has subscripts of {len(subscripts.operands)} operands, not {count}"
+            raise self.mistake(node, what, "write one part per operand, with commas between")
+        operands = ast.Tuple([self.visit(each) for each in node.args[1:]], ast.Load())
+        return like(node, call_of("rtcf_einsum", ast.Constant(text), operands))
 
     def _method(self, node: ast.Call, called: ast.Attribute) -> ast.AST:
         """Rewrite a method call such as `a.sum(axis=0)`."""
@@ -558,7 +611,11 @@ class CommonRewriting(ast.NodeTransformer):
         """Return the call of the helper that replaces a function."""
         signature = inspect.signature(helper)
         try:
-            named = {each.arg: each.value for each in node.keywords if each.arg}
+            named = {
+                _OTHER_NAMES.get((helper, each.arg), each.arg): each.value
+                for each in node.keywords
+                if each.arg
+            }
             bound = signature.bind(*arguments, **named).arguments
         except TypeError:
             name, takes = ast.unparse(node.func), ", ".join(signature.parameters)
@@ -579,14 +636,17 @@ class CommonRewriting(ast.NodeTransformer):
 
     def _argument(self, name: str, value: ast.expr, default: Any) -> ast.expr:
         if isinstance(value, ast.Constant) and isinstance(value.value, str):
-            if value.value not in numpy_functions.WORDS:
+            known = numpy_functions.WORDS.get(name, {})
+            if value.value not in known:
                 what, remedy = "a text has no meaning here", "give it a number"
-                if name in ("kind", "side", "ord"):
+                if known:
                     what, remedy = f"{name}={value.value!r} is not compiled", f"remove {name}"
                 if name == "kind":
                     remedy = 'write kind="stable"'
                 raise self.mistake(value, what, remedy)
-            return like(value, ast.Constant(numpy_functions.WORDS[value.value]))
+            return like(value, ast.Constant(known[value.value]))
+        if name == "copy" and not (isinstance(value, ast.Constant) and value.value is True):
+            raise self.mistake(value, "the result is always a new array", "remove copy")
         if default is None and isinstance(value, ast.Constant) and value.value is False:
             return like(value, ast.Constant(None))
         return self.visit(value)  # type: ignore[no-any-return]

@@ -4,7 +4,8 @@ import ast
 import dataclasses
 import enum
 import inspect
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
@@ -12,20 +13,21 @@ import numpy as np
 from rtcf.component import Component, Fault
 from rtcf.component.declaration import HOOKS, REALTIME_HOOKS, Description
 
-from rtcf_compile.rewriting import helpers, numpy_functions, operators
+from rtcf_compile.rewriting import helpers, math_functions, numpy_functions, operators
 from rtcf_compile.rewriting.common_rewriting import ARENA, CommonRewriting, is_number
 from rtcf_compile.rewriting.logs import Logs
 from rtcf_compile.rewriting.methods import Method, Methods
+from rtcf_compile.rewriting.reached import ReachedFunctions
 from rtcf_compile.rewriting.references import References
 from rtcf_compile.rewriting.rewrite import Hook
 from rtcf_compile.source import progress
 from rtcf_compile.source.checks import check, resolve
-from rtcf_compile.source.mistake import Mistake, at, written
+from rtcf_compile.source.mistake import Mistake, Mistakes, at, written
 from rtcf_compile.source.modules import Source, is_own, read
 from rtcf_compile.source.spelling import defaults_of
 
 # The helpers that rewritten functions call, by name.
-HELPERS = {**helpers.BY_NAME, **numpy_functions.BY_NAME}
+HELPERS = {**helpers.BY_NAME, **numpy_functions.BY_NAME, **math_functions.BY_NAME}
 # Compiles a Python function.
 Compiler = Callable[[FunctionType], Any]
 # Attributes of rewritten functions: the name of the original function, such as `Observer.update`,
@@ -45,7 +47,7 @@ class Functions:
         compiler: Compiler,
         narrow: Collection[CodeType] = (),
     ) -> None:
-        """Prepare the functions of a class.
+        """Prepare the functions of a class; `mistakes` collects their errors.
 
         `narrow`: the code of functions that compute with narrow numbers, see operators.py.
         """
@@ -59,6 +61,10 @@ class Functions:
         self._made: dict[FunctionType, Any] = {}
         self._hooks: dict[FunctionType, Hook] = {}
         self._making: list[FunctionType] = []
+        self.mistakes = Mistakes()
+        # Functions with errors in their syntax trees.
+        self._rejected: set[FunctionType] = set()
+        self._references: References | None = None
         # The functions that each function calls, and the arrays that are too large for the arena.
         self._calls: dict[FunctionType, set[FunctionType]] = {}
         self._large: dict[FunctionType, Mistake] = {}
@@ -66,47 +72,93 @@ class Functions:
         self.other_calls: list[tuple[str, int, str, str]] = []
 
     def hooks(self) -> dict[str, FunctionType]:
-        """Return the hooks of the class, rewritten but not compiled."""
-        if self._methods.find("update") is None:
-            file = inspect.getsourcefile(self._cls) or "?"
-            line = inspect.getsourcelines(self._cls)[1]
-            raise Mistake(file, line, "has no update", "write `def update(self):`")
-        if dataclasses.is_dataclass(self._cls):
-            file = inspect.getsourcefile(self._cls) or "?"
-            line = inspect.getsourcelines(self._cls)[1]
-            raise Mistake(file, line, "a component is no dataclass", "remove the decorator")
-        if (own := self._methods.find("__init__")) is not None and own.function is not None:
-            raise Mistake(
-                read(own.function).file,
-                read(own.function).tree.lineno,
-                "__init__ is not compiled",
-                "give members initial values, or set them in start",
-            )
+        """Return the hooks of the class, rewritten but not compiled.
+
+        Raise Mistake with all errors in the hooks and in the functions that they call.
+        """
+        reached = ReachedFunctions.of(self._methods)
+        self._check_class()
+        self.mistakes.add(*reached.mistakes.found)
+        self._check(reached)
         found = {}
-        self._references = References(self.description, self._methods)
+        if not self.mistakes.found:
+            with self.mistakes.collected():
+                self._references = References(self.description, self._methods)
         for hook in HOOKS:
             method = self._methods.find(hook)
-            if method is not None:
+            if method is None or method.function in self._rejected:
+                continue
+            with self.mistakes.collected():
                 source = read(self._plain(method))
-                check(source)
-                self._hook_form(source)
-                found[hook] = self._method(source, method, is_hook=True)
+                rewritten = self._method(source, method, is_hook=True)
+                if rewritten is not None:
+                    found[hook] = rewritten
                 if hook == "prepare":
                     self._check_prepare(source.function, set())
                 elif hook in REALTIME_HOOKS:
                     self._check_large(source.function, set())
+        if self.mistakes.found:
+            self._look_further(reached)
+        if not self._rejected:
+            self.mistakes.one_per_line()
+        self.mistakes.report()
         return found
+
+    def _check_class(self) -> None:
+        file, line = self.file(), inspect.getsourcelines(self._cls)[1]
+        if dataclasses.is_dataclass(self._cls):
+            remedy = "remove the decorator"
+            self.mistakes.add(Mistake(file, line, "a component is no dataclass", remedy))
+        if self._methods.find("update") is None:
+            self.mistakes.add(Mistake(file, line, "has no update", "write `def update(self):`"))
+        elif (own := self._methods.find("__init__")) is not None and own.function is not None:
+            with self.mistakes.collected():
+                source = read(own.function)
+                raise Mistake(
+                    source.file,
+                    source.tree.lineno,
+                    "__init__ is not compiled",
+                    "give members initial values, or set them in start",
+                )
+
+    def _check(self, reached: ReachedFunctions) -> None:
+        """Check the syntax trees of all functions."""
+        names = {*self.description.members, *self.description.constants, *self._methods.names()}
+        hooks = [self._methods.find(hook) for hook in HOOKS]
+        for each in reached.functions:
+            before = len(self.mistakes.found)
+            with self.mistakes.collected():
+                check(each.source, names)
+            if each.method is not None and each.method in hooks:
+                self._hook_form(each.source)
+            if len(self.mistakes.found) > before:
+                self._rejected.add(each.source.function)
+
+    def _look_further(self, reached: ReachedFunctions) -> None:
+        """Rewrite the functions that only functions with errors call, to find their errors."""
+        for each in reached.functions:
+            function = each.source.function
+            if function in self._rejected or function in self._made or function in self._hooks:
+                continue
+            if each.method is not None and each.method.kind == "nested function":
+                continue  # its arguments may be messages, which only its calls tell
+            if each.method is None or each.method.kind == "static method":
+                self._own_function(function)
+            else:
+                self._compiled_method(each.method)
 
     def _check_prepare(self, function: FunctionType, seen: set[FunctionType]) -> None:
         """Reject members that prepare, and the methods that it calls, cannot read."""
         seen.add(function)
         hook = self._hooks[function]
         for node in hook.touched.values():
-            raise at(
-                hook.source.file,
-                node,
-                "prepare runs beside the loop and reads only parameters",
-                "compute it in update, or declare a Parameter",
+            self.mistakes.add(
+                at(
+                    hook.source.file,
+                    node,
+                    "prepare runs beside the loop and reads only parameters",
+                    "compute it in update, or declare a Parameter",
+                )
             )
         for called in self._calls.get(function, set()) & set(self._hooks) - seen:
             self._check_prepare(called, seen)
@@ -115,7 +167,7 @@ class Functions:
         """Reject arrays that are larger than the arena."""
         seen.add(function)
         if function in self._large:
-            raise self._large[function]
+            self.mistakes.add(self._large[function])
         for called in self._calls.get(function, set()) - seen:
             self._check_large(called, seen)
 
@@ -131,16 +183,20 @@ class Functions:
 
     def _hook_form(self, source: Source) -> None:
         if len(source.tree.args.args) != 1:
-            raise Mistake(
-                source.file,
-                source.tree.lineno,
-                "a hook takes only self",
-                f"write def {source.tree.name}(self):",
+            self.mistakes.add(
+                Mistake(
+                    source.file,
+                    source.tree.lineno,
+                    "a hook takes only self",
+                    f"write def {source.tree.name}(self):",
+                )
             )
-        for node in ast.walk(source.tree):
+        for node in _own_nodes(source.tree):
             value = node.value if isinstance(node, ast.Return) else None
             if value is not None and getattr(value, "value", value) is not None:
-                raise at(source.file, node, "a hook returns nothing", "write an Output")
+                self.mistakes.add(
+                    at(source.file, node, "a hook returns nothing", "write an Output")
+                )
 
     def _plain(self, method: Method) -> FunctionType:
         if method.function is not None:
@@ -149,50 +205,60 @@ class Functions:
         what = f"{method.name} is a {method.kind}"
         raise Mistake(file, method.line, what, method.remedy)
 
-    def _method(self, source: Source, method: Method, is_hook: bool = False) -> FunctionType:
+    def _method(self, source: Source, method: Method, is_hook: bool = False) -> FunctionType | None:
+        """Return a rewritten method; None if it has errors, which are collected."""
         function = source.function
         progress.note(source.file, source.tree.lineno)
         check(source)
-        self._begin(function, source)
         # Noted lines refer to one file: for a base's hook in another file, note the class's line.
         is_here = source.file == self.file()
         line = 0 if is_here or not is_hook else inspect.getsourcelines(self._cls)[1]
-        self._references.mark(source)
-        hook = Hook(
-            source, self.description, self._methods, method.owner, self.logs,
-            operator_functions(function, self._narrow), is_here, line,
-        )  # fmt: skip
-        tree = hook.function()
-        self._hooks[function] = hook
-        self.used |= hook.used
-        self.lines |= hook.lines
-        self._note_calls(hook)
-        scope = self._scope(source, tree, hook.constants)
-        for called in hook.called.values():
-            if called.kind == "static method":
-                scope[called.symbol] = self._own_function(self._plain(called))
-            else:
-                scope[called.symbol] = self._compiled_method(called)
-        for number, call in enumerate(self.logs.calls):
-            scope[f"rtcf_log_{number}"] = _log(number, call.count)
-        self._making.pop()
+        with self._rewriting(function, source):
+            hook = Hook(
+                source, self.description, self._methods, method.owner, self.logs,
+                operator_functions(function, self._narrow), is_here, line,
+            )  # fmt: skip
+            tree = hook.function()
+            self.mistakes.add(*hook.mistakes.found)
+            self._hooks[function] = hook
+            self.used |= hook.used
+            self.lines |= hook.lines
+            self._note_calls(hook)
+            scope = self._scope(source, tree, hook.constants)
+            for called in hook.called.values():
+                if called.kind == "static method":
+                    scope[called.symbol] = self._own_function(self._plain(called))
+                else:
+                    scope[called.symbol] = self._compiled_method(called)
+            for number, call in enumerate(self.logs.calls):
+                scope[f"rtcf_log_{number}"] = _log(number, call.count)
+        if self.mistakes.found:
+            return None
         return self._with_bounds(made(tree, scope, source), source)
 
     def _with_bounds(self, function: FunctionType, source: Source) -> FunctionType:
         """Attach the largest absolute ints of the arguments that are constants in all calls."""
-        bounds = self._references.constants.items()
+        bounds = self._references.constants.items() if self._references else ()
         code = source.function.__code__
         vars(function)[INT_BOUNDS] = {
             name: bound for (of, name), bound in bounds if of is code and bound is not None
         }
         return function
 
-    def _begin(self, function: FunctionType, source: Source) -> None:
+    @contextmanager
+    def _rewriting(self, function: FunctionType, source: Source) -> Iterator[None]:
+        """Rewrite a function in the context, with its copies marked."""
         if function in self._making:
             raise Mistake(
                 source.file, source.tree.lineno, f"{function.__name__} calls itself", "use a loop"
             )
         self._making.append(function)
+        try:
+            if self._references is not None:
+                self._references.mark(source)
+            yield
+        finally:
+            self._making.pop()
 
     def _note(self, function: FunctionType) -> None:
         """Record that the current function calls another."""
@@ -217,34 +283,38 @@ class Functions:
             )
 
     def _compiled_method(self, method: Method) -> Any:
-        function = self._plain(method)
-        self._note(function)
-        if function not in self._made:
-            source = read(function)
-            _find_messages(source.tree, method)
-            if function in self._making:
-                self._begin(function, source)
-            self._made[function] = self._compiler(self._method(source, method))
-        return self._made[function]
+        """Return the compiler of a method; None if the method has errors, which are collected."""
+        with self.mistakes.collected():
+            function = self._plain(method)
+            self._note(function)
+            if function not in self._made and function not in self._rejected:
+                source = read(function)
+                _find_messages(source.tree, method)
+                rewritten = self._method(source, method)
+                self._made[function] = rewritten and self._compiler(rewritten)
+            return self._made.get(function)
+        return None
 
     def _own_function(self, function: FunctionType) -> Any:
+        """Return the compiler of a function; None if it has errors, which are collected."""
         self._note(function)
-        if function in self._made:
-            return self._made[function]
-        source = read(function)
-        progress.note(source.file, source.tree.lineno)
-        self._begin(function, source)
-        check(source)
-        self._references.mark(source)
-        rewriting = CommonRewriting(source, operator_functions(function, self._narrow))
-        source.tree.body = rewriting.statements(source.tree.body)
-        drop_types(source.tree)
-        self._note_calls(rewriting)
-        plain = made(source.tree, self._scope(source, source.tree, rewriting.constants), source)
-        own = self._compiler(self._with_bounds(plain, source))
-        self._making.pop()
-        self._made[function] = own
-        return own
+        if function in self._made or function in self._rejected:
+            return self._made.get(function)
+        with self.mistakes.collected():
+            source = read(function)
+            progress.note(source.file, source.tree.lineno)
+            check(source)
+            with self._rewriting(function, source):
+                rewriting = CommonRewriting(source, operator_functions(function, self._narrow))
+                source.tree.body = rewriting.statements(source.tree.body)
+                drop_types(source.tree)
+                self.mistakes.add(*rewriting.mistakes.found)
+                self._note_calls(rewriting)
+                scope = self._scope(source, source.tree, rewriting.constants)
+                if not self.mistakes.found:
+                    plain = made(source.tree, scope, source)
+                    self._made[function] = self._compiler(self._with_bounds(plain, source))
+        return self._made.setdefault(function, None)
 
     def _scope(
         self, source: Source, tree: ast.FunctionDef, constants: dict[str, Any]
@@ -263,10 +333,11 @@ class Functions:
                 if is_own(value) and node.id not in HELPERS:
                     scope[node.id] = self._own_function(value)
                 else:
-                    _constant(node, value, source)
+                    with self.mistakes.collected():
+                        _constant(node, value, source)
             elif isinstance(node, ast.Attribute) and is_own(resolve(node, source)):
                 what = "a function of another module"
-                raise at(source.file, node, what, "import the function by name")
+                self.mistakes.add(at(source.file, node, what, "import the function by name"))
         return scope
 
 
@@ -279,6 +350,26 @@ def _find_messages(tree: ast.FunctionDef, method: Method) -> None:
         for each in ast.walk(found):
             ast.copy_location(each, tree)
         tree.body.insert(0, found)
+
+
+def _own_nodes(tree: ast.AST) -> Iterator[ast.AST]:
+    """Yield the nodes of a function without those of functions in it."""
+    for node in ast.iter_child_nodes(tree):
+        if not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+            yield node
+            yield from _own_nodes(node)
+
+
+def check_syntax(cls: type[Component]) -> None:
+    """Raise Mistake for the errors in syntax trees of a class, whose declarations are wrong."""
+    methods, mistakes = Methods(cls), Mistakes()
+    declared = {name for each in cls.__mro__ for name in inspect.get_annotations(each)}
+    reached = ReachedFunctions.of(methods)
+    mistakes.add(*reached.mistakes.found)
+    for each in reached.functions:
+        with mistakes.collected():
+            check(each.source, declared | methods.names())
+    mistakes.report()
 
 
 def operator_functions(

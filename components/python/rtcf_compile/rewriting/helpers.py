@@ -156,6 +156,7 @@ _MATH: list[Callable[[float], float]] = [
     *(math.sqrt, math.exp, math.expm1, math.log, math.log1p, math.log2, math.log10),
     *(math.sin, math.cos, math.tan, math.asin, math.acos, math.atan),
     *(math.sinh, math.cosh, math.tanh, math.asinh, math.acosh, math.atanh),
+    *(math.cbrt, math.exp2, math.erf, math.erfc),
 ]
 MATH: dict[Callable[..., Any], Callable[[Any], float]] = {each: _checked(each) for each in _MATH}
 

@@ -1,5 +1,5 @@
-"""Helpers for functions of NumPy and math with our own overloads: for numbers, vectors and
-matrices, without BLAS, LAPACK and lists.
+"""Helpers for functions of NumPy with our own overloads: for numbers, vectors and matrices, without
+BLAS, LAPACK and lists.
 
 Each helper is registered with the functions that it replaces. In the interpreter it calls NumPy's
 function, except where the order of sums or the C library determines the last place: there it
@@ -8,13 +8,13 @@ computes as the overload does.
 
 import ctypes
 import ctypes.util
-import math
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from rtcf_compile.rewriting import helpers, operators
+from rtcf_compile.rewriting.subscripts import Subscripts
 
 Function = Callable[..., Any]
 
@@ -24,8 +24,16 @@ STANDS_FOR: list[tuple[Function, Function]] = []
 METHODS: dict[str, Function] = {}
 
 
-# Text arguments and the values that stand for them in the helpers.
-WORDS = {"left": None, "right": True, "stable": None, "fro": None}
+# Texts, by arguments, and the values that stand for them in the helpers.
+_MODES = ("valid", "same", "full")
+WORDS: dict[str, dict[str, Any]] = {
+    "side": {"left": None, "right": True},
+    "kind": {"stable": None},
+    "ord": {"fro": None, "f": None},
+    "mode": {mode: number for number, mode in enumerate(_MODES)},
+    "indexing": {"xy": None, "ij": True},
+    "method": {"linear": None},
+}
 
 
 def _stands_for(*functions: Function, method: str = "") -> Callable[[Function], Function]:
@@ -55,6 +63,18 @@ def rtcf_contiguous(a: Any) -> Any:
     return np.ascontiguousarray(a)
 
 
+@_stands_for(np.atleast_1d)
+def rtcf_atleast_1d(ary: Any) -> Any:
+    """Return an array as it is, or a number as a vector."""
+    return np.atleast_1d(ary)
+
+
+@_stands_for(np.atleast_2d)
+def rtcf_atleast_2d(ary: Any) -> Any:
+    """Return a matrix as it is, or a vector or a number as a row."""
+    return np.atleast_2d(ary)
+
+
 @_stands_for(np.asarray)
 def rtcf_asarray(a: Any, dtype: Any = None) -> Any:
     """Return an array as it is, or a list as a new array."""
@@ -71,6 +91,12 @@ def rtcf_diag(v: Any, k: Any = 0) -> Any:
 def rtcf_diagonal(a: Any) -> Any:
     """Return the diagonal of a matrix."""
     return np.array(np.diagonal(a))
+
+
+@_stands_for(np.meshgrid)
+def rtcf_meshgrid(x1: Any, x2: Any, indexing: Any = None) -> Any:
+    """Return matrices of the coordinates of a grid."""
+    return tuple(np.meshgrid(x1, x2, indexing="ij" if indexing else "xy"))
 
 
 @_stands_for(np.linspace)
@@ -150,15 +176,15 @@ def rtcf_column_stack(tup: Any) -> Any:
 
 
 @_stands_for(np.roll)
-def rtcf_roll(a: Any, shift: Any) -> Any:
-    """Return a vector with its elements shifted cyclically."""
-    return np.roll(a, shift)
+def rtcf_roll(a: Any, shift: Any, axis: Any = None) -> Any:
+    """Return an array with its elements, or its rows or columns, shifted cyclically."""
+    return np.roll(a, shift, axis)
 
 
 @_stands_for(np.flip)
-def rtcf_flip(m: Any) -> Any:
+def rtcf_flip(m: Any, axis: Any = None) -> Any:
     """Return a view of an array in reverse order."""
-    return np.flip(m)
+    return np.flip(m, axis)
 
 
 @_stands_for(np.append)
@@ -192,9 +218,11 @@ def rtcf_kron(a: Any, b: Any) -> Any:
 
 
 @_stands_for(np.diff)
-def rtcf_diff(a: Any) -> Any:
-    """Return the differences of consecutive elements."""
-    return np.diff(a)
+def rtcf_diff(a: Any, n: Any = 1, axis: Any = -1, prepend: Any = None, append: Any = None) -> Any:
+    """Return the differences of consecutive elements, of order 1 or 2."""
+    ends = {"prepend": prepend, "append": append}
+    given = {name: value for name, value in ends.items() if value is not None}
+    return np.diff(a, n, axis, **given)
 
 
 # Reductions, along all axes or one.
@@ -278,21 +306,33 @@ def rtcf_all(a: Any, axis: Any = None) -> Any:
 
 
 @_stands_for(np.count_nonzero)
-def rtcf_count_nonzero(a: Any) -> Any:
+def rtcf_count_nonzero(a: Any, axis: Any = None) -> Any:
     """Return the number of elements that are not 0."""
-    return np.count_nonzero(a)
+    return np.count_nonzero(a, axis)
 
 
 @_stands_for(np.median)
-def rtcf_median(a: Any) -> Any:
-    """Return the median of all elements; NaN if one is NaN."""
-    return np.median(a)
+def rtcf_median(a: Any, axis: Any = None) -> Any:
+    """Return the median; NaN if an element is NaN."""
+    return np.median(a, axis)
+
+
+@_stands_for(np.percentile)
+def rtcf_percentile(a: Any, q: Any, axis: Any = None, method: Any = None) -> Any:
+    """Return percentiles, interpolated linearly; NaN if an element is NaN."""
+    return np.percentile(a, q, axis)
+
+
+@_stands_for(np.quantile)
+def rtcf_quantile(a: Any, q: Any, axis: Any = None, method: Any = None) -> Any:
+    """Return quantiles, interpolated linearly; NaN if an element is NaN."""
+    return np.quantile(a, q, axis)
 
 
 @_stands_for(np.trace, method="trace")
-def rtcf_trace(a: Any) -> Any:
-    """Return the sum of the diagonal of a matrix, by NumPy's pairwise summation."""
-    return np.trace(a)
+def rtcf_trace(a: Any, offset: Any = 0) -> Any:
+    """Return the sum of a diagonal of a matrix, by NumPy's pairwise summation."""
+    return np.trace(a, offset)
 
 
 @_stands_for(np.cumsum, method="cumsum")
@@ -344,7 +384,7 @@ def rtcf_searchsorted(a: Any, v: Any, side: Any = None) -> Any:
 
 
 @_stands_for(np.clip, method="clip")
-def rtcf_clip(a: Any, a_min: Any, a_max: Any) -> Any:
+def rtcf_clip(a: Any, a_min: Any = None, a_max: Any = None) -> Any:
     """Return numbers clipped to bounds; None: no bound. A NaN bound gives NaN, as in NumPy 2;
     NumPy 1 ignores a single NaN bound.
     """
@@ -352,6 +392,12 @@ def rtcf_clip(a: Any, a_min: Any, a_max: Any) -> Any:
         return np.clip(a, a_min, a_max)
     raised = a if a_min is None else operators.OF[np.maximum](a, a_min)
     return raised if a_max is None else operators.OF[np.minimum](raised, a_max)
+
+
+@_stands_for(np.select)
+def rtcf_select(condlist: Any, choicelist: Any, default: Any = 0) -> Any:
+    """Return, by elements, the choice of the first condition that is true."""
+    return np.select(list(condlist), list(choicelist), default)
 
 
 @_stands_for(any)
@@ -395,15 +441,9 @@ def rtcf_allclose(
 
 
 @_stands_for(np.array_equal)
-def rtcf_array_equal(a1: Any, a2: Any) -> Any:
+def rtcf_array_equal(a1: Any, a2: Any, equal_nan: Any = None) -> Any:
     """Tell whether two arrays have the same shape and elements."""
-    return np.array_equal(a1, a2)
-
-
-@_stands_for(math.isclose)
-def rtcf_math_isclose(a: Any, b: Any, rel_tol: Any = 1e-09, abs_tol: Any = 0.0) -> Any:
-    """Tell whether two numbers are equal within tolerances."""
-    return math.isclose(a, b, rel_tol=rel_tol, abs_tol=abs_tol)
+    return np.array_equal(a1, a2, bool(equal_nan))
 
 
 @_stands_for(np.round, np.around, method="round")
@@ -413,7 +453,9 @@ def rtcf_np_round(a: Any, decimals: Any = 0) -> Any:
 
 
 @_stands_for(np.nan_to_num)
-def rtcf_nan_to_num(x: Any, nan: Any = 0.0, posinf: Any = None, neginf: Any = None) -> Any:
+def rtcf_nan_to_num(
+    x: Any, copy: Any = True, nan: Any = 0.0, posinf: Any = None, neginf: Any = None
+) -> Any:
     """Return numbers with NaN and infinity replaced."""
     return np.nan_to_num(x, nan=nan, posinf=posinf, neginf=neginf)
 
@@ -422,6 +464,66 @@ def rtcf_nan_to_num(x: Any, nan: Any = 0.0, posinf: Any = None, neginf: Any = No
 def rtcf_interp(x: Any, xp: Any, fp: Any, left: Any = None, right: Any = None) -> Any:
     """Return linearly interpolated values of a function given by points."""
     return np.interp(x, xp, fp, left, right)
+
+
+@_stands_for(np.heaviside)
+def rtcf_heaviside(x1: Any, x2: Any) -> Any:
+    """Return 0 for numbers below 0, 1 for those above 0, and x2 for 0."""
+    return np.heaviside(*operators.alike(x1, x2))
+
+
+@_stands_for(np.sinc)
+def rtcf_sinc(x: Any) -> Any:
+    """Return sin(pi x) / (pi x)."""
+    return np.sinc(x)
+
+
+@_stands_for(np.unwrap)
+def rtcf_unwrap(
+    p: Any, discont: Any = None, axis: Any = -1, period: Any = 6.283185307179586
+) -> Any:
+    """Return phases without jumps of a period."""
+    return np.unwrap(p, discont, axis, period=period)
+
+
+@_stands_for(np.gradient)
+def rtcf_gradient(f: Any, spacing: Any, axis: Any = None, edge_order: Any = 1) -> Any:
+    """Return the derivative by central differences; `spacing`: a tuple of steps or coordinates, one
+    per axis, or empty.
+    """
+    return np.gradient(f, *spacing, axis=axis, edge_order=edge_order)
+
+
+@_stands_for(np.convolve)
+def rtcf_convolve(a: Any, v: Any, mode: Any = 2) -> Any:
+    """Return the convolution of two vectors; each sum runs from its first product to the last."""
+    a, v = np.asarray(a), np.asarray(v)
+    if len(v) > len(a):
+        a, v = v, a
+    return _correlated(a, v[::-1], mode)
+
+
+@_stands_for(np.correlate)
+def rtcf_correlate(a: Any, v: Any, mode: Any = 0) -> Any:
+    """Return the cross-correlation of two vectors; each sum runs from its first product to the
+    last.
+    """
+    a, v = np.asarray(a), np.asarray(v)
+    return _correlated(a, v, mode) if len(a) >= len(v) else _correlated(v, a, mode)[::-1]
+
+
+def _correlated(a: Any, v: Any, mode: int) -> Any:
+    """Return the sums of products of a vector and another that is not longer."""
+    n, m = len(a), len(v)
+    if not m:
+        raise ValueError("an empty vector")
+    ahead, count = ((0, n - m + 1), (m // 2, n), (m - 1, n + m - 1))[mode]
+    result = np.zeros(count, np.promote_types(a.dtype, v.dtype))
+    for j in range(count):
+        for k in range(m):
+            if 0 <= j - ahead + k < n:
+                result[j] += a[j - ahead + k] * v[k]
+    return result
 
 
 @_stands_for(np.polyval)
@@ -450,10 +552,38 @@ def rtcf_outer(a: Any, b: Any) -> Any:
 
 @_stands_for(np.cross)
 def rtcf_cross(a: Any, b: Any) -> Any:
-    """Return the cross product of two vectors of three elements."""
-    if np.shape(a) != (3,) or np.shape(b) != (3,):
+    """Return the cross product of two vectors of three elements, or of the rows of matrices."""
+    if {np.shape(a)[-1:], np.shape(b)[-1:]} != {(3,)}:
         raise ValueError(f"cross of shapes {np.shape(a)} and {np.shape(b)}")
     return np.cross(a, b)
+
+
+@_stands_for(np.einsum)
+def rtcf_einsum(text: Any, operands: Any) -> Any:
+    """Return a sum of products; each sum runs from its first product to the last."""
+    subscripts = Subscripts(text)
+    if subscripts.is_view:
+        return np.einsum(text, *operands)
+    operands = [np.asarray(each) for each in operands]
+    sizes: dict[str, int] = {}
+    for names, operand in zip(subscripts.operands, operands, strict=True):
+        if operand.ndim != len(names):
+            raise ValueError(f"einsum {text}: an operand of shape {operand.shape}")
+        for name, size in zip(names, operand.shape, strict=True):
+            if sizes.setdefault(name, size) != size:
+                raise ValueError(f"einsum {text}: sizes {sizes[name]} and {size} of {name}")
+    result: Any = np.zeros([sizes[name] for name in subscripts.result], np.result_type(*operands))
+    for place in np.ndindex(*(sizes[name] for name in subscripts.summed)):
+        at = dict(zip(subscripts.summed, place, strict=True))
+        parts = [
+            operand[tuple(at.get(name, slice(None)) for name in names)]
+            for names, operand in zip(subscripts.operands, operands, strict=True)
+        ]
+        left = ",".join(
+            "".join(name for name in names if name not in at) for names in subscripts.operands
+        )
+        result = result + np.einsum(f"{left}->{subscripts.result}", *parts)
+    return result[()]
 
 
 @_stands_for(np.inner, np.vdot)
@@ -465,15 +595,16 @@ def rtcf_inner(a: Any, b: Any) -> Any:
 
 
 @_stands_for(np.linalg.norm)
-def rtcf_norm(x: Any, ord: Any = None, axis: Any = None) -> Any:
+def rtcf_norm(x: Any, ord: Any = None, axis: Any = None, keepdims: Any = None) -> Any:
     """Return a norm; squares are summed from the first element to the last."""
     x = np.asarray(x)
     if axis is None and (ord is None or (x.ndim == 1 and ord == 2)):
         row = np.ravel(x).astype(np.float64)
-        return np.sqrt(helpers.rtcf_matmul(row, row))
-    if axis is None and x.ndim != 1:
-        raise ValueError("norm of a matrix: only the Frobenius norm")
-    return np.linalg.norm(_sequential(x), ord, axis)
+        norm = np.sqrt(helpers.rtcf_matmul(row, row))
+        return np.full((1,) * x.ndim, norm) if keepdims else norm
+    if axis is None and x.ndim == 2 and ord in (2, -2):
+        raise ValueError("this norm of a matrix needs a singular value decomposition")
+    return np.linalg.norm(_sequential(x), ord, axis, bool(keepdims))
 
 
 @_stands_for(np.linalg.det)
@@ -582,14 +713,6 @@ for _name, _c_name in LIBM.items():
     _own.__name__ = f"rtcf_np_{_name}"
     BY_LIBM[_own] = _name
     STANDS_FOR.append((getattr(np, _name), _own))
-
-
-def rtcf_math_hypot(x: Any, y: Any) -> float:
-    """Return math.hypot(x, y)."""
-    return float(BY_NAME["rtcf_np_hypot"](x, y))
-
-
-STANDS_FOR.append((math.hypot, rtcf_math_hypot))
 
 _ALL: list[Function] = [own for _, own in STANDS_FOR]
 _ALL += [*METHODS.values(), rtcf_whole_pow, rtcf_vector_as]

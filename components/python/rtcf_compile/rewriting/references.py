@@ -34,6 +34,7 @@ from rtcf.component.declaration import (
 
 from rtcf_compile.rewriting.live_names import LiveNames
 from rtcf_compile.rewriting.methods import Method, Methods, nested
+from rtcf_compile.rewriting.subscripts import Subscripts
 from rtcf_compile.source.assigned import matches_all
 from rtcf_compile.source.checks import check, resolve
 from rtcf_compile.source.mistake import at, written
@@ -1107,6 +1108,9 @@ class _Followed:
         is_array = not isinstance(first, tuple)
         if is_array and any(target is each for each in (*_SAME, *_VIEWS, *_DIAGONALS)):
             return self._viewed(target, _flat(first), node)
+        if target is np.einsum:
+            of = NOTHING if _sums(node) else _flat(values[1])
+            return frozenset(map(_view, of)) or self._lazy(everything)
         if target is np.linalg.matrix_power and not _is_other_power(node):
             # The first power is the matrix itself, compiled a copy.
             place = ("copy of power", self._site(node))
@@ -1330,6 +1334,15 @@ def _keeps(index: ast.expr) -> bool:
 def _is_other_power(node: ast.Call) -> bool:
     exponent = node.args[1] if len(node.args) > 1 else None
     return isinstance(exponent, ast.Constant) and exponent.value != 1
+
+
+def _sums(node: ast.Call) -> bool:
+    """Tell whether np.einsum returns a new array, not a view of its operand."""
+    text = node.args[0].value if node.args and isinstance(node.args[0], ast.Constant) else ""
+    try:
+        return len(node.args) != 2 or not Subscripts(str(text)).is_view
+    except ValueError:
+        return True  # rejected
 
 
 def _copy_of(text: str) -> str:

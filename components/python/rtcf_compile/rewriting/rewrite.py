@@ -39,6 +39,7 @@ from rtcf_compile.rewriting.methods import Method, Methods, nested
 from rtcf_compile.rewriting.ports import Ports, a_kind
 from rtcf_compile.rewriting.references import is_super
 from rtcf_compile.source.checks import METHODS, check_arguments, resolve
+from rtcf_compile.source.mistake import at, once
 from rtcf_compile.source.modules import Source
 
 
@@ -452,7 +453,7 @@ class Hook(Ports):
             or difflib.get_close_matches(node.attr, words, 1, 0.75)
         ):
             remedy = f"correct its name (self.{near[0]}), or {remedy}"
-        return self.mistake(node, "is not declared", remedy)
+        return once(at(self.source.file, node, "is not declared", remedy))
 
     def _no_function(self, node: ast.Call, called: ast.Attribute) -> None:
         """Reject the call of a member, a time or a property of `self`."""

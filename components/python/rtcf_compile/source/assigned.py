@@ -4,18 +4,23 @@ compiled code would read undefined memory.
 
 import ast
 import builtins
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
-from rtcf_compile.source.mistake import at
+from rtcf_compile.source.mistake import Mistakes, at
 from rtcf_compile.source.modules import Source
 
 # The variables that have a value at a place; None: the place is unreachable.
 _Known = frozenset[str] | None
 
 
-def check_assigned(source: Source) -> None:
-    """Raise Mistake at the first use of a variable that has no value on some path."""
-    _Flow(source).function()
+def check_assigned(source: Source, rejected: Collection[ast.AST] = ()) -> None:
+    """Raise Mistake at the first use of each variable that has no value on some path.
+
+    `rejected`: expressions with another error, which are skipped.
+    """
+    flow = _Flow(source, rejected)
+    flow.function()
+    flow.mistakes.report()
 
 
 def _both(one: _Known, other: _Known) -> _Known:
@@ -28,9 +33,10 @@ def _both(one: _Known, other: _Known) -> _Known:
 class _Flow:
     """Follows the statements of a function in execution order."""
 
-    def __init__(self, source: Source) -> None:
-        self._source = source
-        self._variables = source.variables
+    def __init__(self, source: Source, rejected: Collection[ast.AST]) -> None:
+        self._source, self._rejected = source, rejected
+        self.mistakes = Mistakes()
+        self._variables = set(source.variables)
         # Per enclosing loop: the variables assigned at break and at continue.
         self._breaks: list[_Known] = []
         self._continues: list[_Known] = []
@@ -38,7 +44,8 @@ class _Flow:
     def function(self) -> None:
         """Check the whole function."""
         tree = self._source.tree
-        arguments = (*tree.args.posonlyargs, *tree.args.args, *tree.args.kwonlyargs)
+        rest = [each for each in (tree.args.vararg, tree.args.kwarg) if each is not None]
+        arguments = (*tree.args.posonlyargs, *tree.args.args, *tree.args.kwonlyargs, *rest)
         self._block(tree.body, frozenset(each.arg for each in arguments))
 
     def _block(self, body: Sequence[ast.stmt], known: _Known) -> _Known:
@@ -167,13 +174,14 @@ class _Flow:
 
     def _used(self, node: ast.expr, known: frozenset[str]) -> frozenset[str]:
         """Check an expression; return the assigned variables after it."""
+        if node in self._rejected:
+            set_there = (each for each in ast.walk(node) if isinstance(each, ast.NamedExpr))
+            return known | {each.target.id for each in set_there}
         if isinstance(node, ast.Name):
-            if (
-                isinstance(node.ctx, ast.Load)
-                and node.id in self._variables - known
-                and not node.id.startswith("rtcf_")
-            ):
-                raise at(self._source.file, node, *self._without_value(node.id))
+            is_read = isinstance(node.ctx, ast.Load) and not node.id.startswith("rtcf_")
+            if is_read and node.id in self._variables - known:
+                self.mistakes.add(at(self._source.file, node, *self._without_value(node.id)))
+                self._variables.discard(node.id)  # report it once
             return known
         if isinstance(node, ast.NamedExpr):
             return self._used(node.value, known) | {node.target.id}

@@ -9,7 +9,7 @@ import enum
 import inspect
 import math
 import operator
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Sequence
 from contextlib import suppress
 from types import BuiltinFunctionType, FunctionType, ModuleType
 from typing import Any
@@ -18,7 +18,7 @@ import numpy as np
 from rtcf.component.declaration import Declarable
 
 from rtcf_compile.source.assigned import check_assigned
-from rtcf_compile.source.mistake import Mistake, at
+from rtcf_compile.source.mistake import Mistake, Mistakes, at, once
 from rtcf_compile.source.modules import Source, is_own
 
 _REFUSED: dict[type[ast.AST], tuple[str, str]] = {
@@ -143,59 +143,102 @@ _COMPILED = ("builtins", "cmath", "math", "numpy", "operator", "rtcf", "_operato
 _LARGEST, _SMALLEST = 2**63 - 1, -(2**63)
 
 
+# Statements that are rejected, but not what they contain.
+_BLOCKS = (ast.Try, ast.With, ast.While)
+
+
 def check(source: Source, members: Collection[str] = ()) -> None:
-    """Raise Mistake for the first error in a function; `members`: the names in self."""
-    tree, file = source.tree, source.file
-    for each in tree.decorator_list:
+    """Raise Mistake for the errors in a function; `members`: the names in self."""
+    mistakes = Mistakes()
+    for part in (_decorators, _arguments, _defaults):
+        with mistakes.collected():
+            part(source)
+    known = _names(source)
+    rejected: list[ast.AST] = []
+    undefined: set[str] = set()
+    waiting: list[ast.AST] = list(reversed(_body(source.tree)))
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, ast.Name) and node.id in undefined:
+            continue
+        try:
+            _check(node, source, members, known)
+        except Mistake as mistake:
+            mistakes.add(mistake)
+            rejected.append(node)
+            if isinstance(node, ast.Name):
+                undefined.add(node.id)
+            inner = _children(node) if isinstance(node, _BLOCKS) else []
+            waiting.extend(each for each in reversed(inner) if not isinstance(each, ast.withitem))
+        else:
+            waiting.extend(reversed(_children(node)))
+    # Variables that a rejected statement sets would be reported, too.
+    if not any(isinstance(each, ast.stmt) and not isinstance(each, ast.Raise) for each in rejected):
+        with mistakes.collected():
+            check_assigned(source, rejected)
+    mistakes.report()
+
+
+def _decorators(source: Source) -> None:
+    for each in source.tree.decorator_list:
         if ast.unparse(each).rpartition(".")[2] not in _DECORATORS:
-            raise at(file, each, "a decorator is not compiled", "remove the decorator")
+            raise at(source.file, each, "a decorator is not compiled", "remove the decorator")
+
+
+def _arguments(source: Source) -> None:
+    file, tree = source.file, source.tree
     arguments = tree.args
     if arguments.vararg or arguments.kwarg:
         raise Mistake(file, tree.lineno, f"{tree.name} takes any number of arguments", "name each")
     if arguments.kwonlyargs:
         what = f"{tree.name} takes {arguments.kwonlyargs[0].arg} only as a keyword"
         raise Mistake(file, tree.lineno, what, "give it a default, or remove the *")
-    for default in (*arguments.defaults, *arguments.kw_defaults):
+
+
+def _defaults(source: Source) -> None:
+    for default in (*source.tree.args.defaults, *source.tree.args.kw_defaults):
         if isinstance(default, ast.List | ast.Dict | ast.Set):
             raise at(
-                file,
+                source.file,
                 default,
                 "a mutable default is shared by all calls",
                 "write a number or a tuple",
             )
-    known = _names(source)
-    for node in _walk(tree):
-        if type(node) in _REFUSED:
-            raise at(file, node, *_REFUSED[type(node)])
-        if isinstance(node, ast.Constant):
-            _constant(node, file)
-        if isinstance(node, ast.BinOp | ast.UnaryOp):
-            _folded(node, file)
-        if isinstance(node, ast.Call):
-            _call(node, source)
-        if isinstance(node, ast.Attribute):
-            _module(node, source)
-        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load) and not (
-            node.id in known or node.id.startswith("rtcf_")
-        ):  # fmt: skip
-            raise _undefined(node, source, members, known)
-        if isinstance(node, ast.Expr) and isinstance(node.value, ast.ListComp):
-            raise at(file, node, "a list that is not used", "write a loop: for … in …:")
-        if isinstance(node, ast.Compare):
-            _compared(node, file)
-        if isinstance(node, ast.Raise):
-            _raised(node, file)
-        if isinstance(node, ast.Slice):
-            _slice(node, file)
-        if isinstance(node, ast.Subscript):
-            _indexed(node, source)
-        if isinstance(node, ast.Attribute) and getattr(node.value, "id", "") == "super":
-            raise at(file, node.value, "super must be called", f"write super().{node.attr}")
-        if isinstance(node, ast.While) and _endless(node):
-            raise Mistake(file, node.lineno, "an endless loop", "bound it: for _ in range(…)")
-        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod) and _is_text(node.left):
-            raise at(file, node, *_REFUSED[ast.JoinedStr])
-    check_assigned(source)
+
+
+def _check(node: ast.AST, source: Source, members: Collection[str], known: Collection[str]) -> None:
+    """Raise Mistake for the error of a node, without its parts."""
+    file = source.file
+    if type(node) in _REFUSED:
+        raise at(file, node, *_REFUSED[type(node)])
+    if isinstance(node, ast.Constant):
+        _constant(node, file)
+    if isinstance(node, ast.BinOp | ast.UnaryOp):
+        _folded(node, file)
+    if isinstance(node, ast.Call):
+        _call(node, source)
+    if isinstance(node, ast.Attribute):
+        _module(node, source)
+    if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load) and not (
+        node.id in known or node.id.startswith("rtcf_")
+    ):  # fmt: skip
+        raise once(_undefined(node, source, members, known))
+    if isinstance(node, ast.Expr) and isinstance(node.value, ast.ListComp):
+        raise at(file, node, "a list that is not used", "write a loop: for … in …:")
+    if isinstance(node, ast.Compare):
+        _compared(node, file)
+    if isinstance(node, ast.Raise):
+        _raised(node, file)
+    if isinstance(node, ast.Slice):
+        _slice(node, file)
+    if isinstance(node, ast.Subscript):
+        _indexed(node, source)
+    if isinstance(node, ast.Attribute) and getattr(node.value, "id", "") == "super":
+        raise at(file, node.value, "super must be called", f"write super().{node.attr}")
+    if isinstance(node, ast.While) and _endless(node):
+        raise Mistake(file, node.lineno, "an endless loop", "bound it: for _ in range(…)")
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod) and _is_text(node.left):
+        raise at(file, node, *_REFUSED[ast.JoinedStr])
 
 
 def _undefined(
@@ -242,19 +285,17 @@ def resolve(node: ast.AST, source: Source) -> Any:
     return None
 
 
-def _walk(tree: ast.FunctionDef) -> Iterator[ast.AST]:
-    """Yield the nodes of a body in source order, without annotations and docstrings."""
+def _body(tree: ast.FunctionDef) -> list[ast.stmt]:
+    """Return the statements of a function without its docstring."""
     body = tree.body
-    if isinstance(body[0], ast.Expr) and _is_text(body[0].value):
-        body = body[1:]
-    waiting: list[ast.AST] = list(reversed(body))
-    while waiting:
-        node = waiting.pop()
-        yield node
-        children = list(ast.iter_child_nodes(node))
-        if isinstance(node, ast.AnnAssign):
-            children = [each for each in (node.target, node.value) if each is not None]
-        waiting.extend(reversed(children))
+    return body[1:] if isinstance(body[0], ast.Expr) and _is_text(body[0].value) else body
+
+
+def _children(node: ast.AST) -> list[ast.AST]:
+    """Return the parts of a node in source order, without annotations."""
+    if isinstance(node, ast.AnnAssign):
+        return [each for each in (node.target, node.value) if each is not None]
+    return list(ast.iter_child_nodes(node))
 
 
 def _names(source: Source) -> set[str]:

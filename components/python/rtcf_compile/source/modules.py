@@ -15,7 +15,7 @@ from typing import Any
 
 from rtcf.component import Component, DeclarationError
 
-from rtcf_compile.source import lifting, numpy_errors, progress, spelling
+from rtcf_compile.source import dependencies, lifting, numpy_errors, progress, spelling
 from rtcf_compile.source.mistake import Mistake, source_line
 from rtcf_compile.source.prefix_map import mapped
 from rtcf_compile.source.scopes import everywhere
@@ -54,7 +54,8 @@ def load(file: Path) -> ModuleType:
     sys.modules[name] = module
     sys.path.insert(0, str(file.parent))
     try:
-        spec.loader.exec_module(module)
+        with dependencies.recorded():
+            spec.loader.exec_module(module)
     except SyntaxError as error:
         raise Mistake(
             str(error.filename or file), error.lineno or 0, str(error.msg), "correct the syntax"

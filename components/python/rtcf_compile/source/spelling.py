@@ -41,9 +41,9 @@ class _Spelling(ast.NodeTransformer):
         self._prefix = f"_{owner.lstrip('_')}" if owner.strip("_") else ""
 
     def visit(self, node: ast.AST) -> Any:
-        field = _NAMES.get(type(node))
-        name = getattr(node, field, None) if field else None
-        if field and self._prefix and name and name.startswith("__") and not name.endswith("__"):
+        field = _NAMES.get(type(node), "")
+        name = getattr(node, field, None) or ""
+        if self._prefix and name.startswith("__") and not name.endswith("__"):
             setattr(node, field, self._prefix + name)
         return super().visit(node)
 

@@ -11,6 +11,7 @@ from rtcf_compile.main import main
 from rtcf_compile.rewriting import numpy_functions
 
 EXAMPLES = sorted((TREE / "components").glob("*/python/*.py"))
+EXAMPLES.append(TREE / "tests" / "bench" / "components" / "notch_bank.py")
 NAMES = [each.stem for each in EXAMPLES]
 
 

@@ -77,7 +77,7 @@ def test_a_failure_of_the_compiler_is_one_line(tmp_path: Path) -> None:
     )  # fmt: skip
     assert done.returncode == 1
     assert re.fullmatch(
-        r"rtcf-compile: failing\.py:.*: the compiler failed at \w+\.py:\d+: "
+        r"rtcf-compile: failing\.py: the compiler failed at \w+\.py:\d+: "
         r"TypeError: 'NoneType' object is not callable: write this function in another way\n",
         done.stderr,
     ), done.stderr
@@ -86,7 +86,8 @@ def test_a_failure_of_the_compiler_is_one_line(tmp_path: Path) -> None:
 def test_numba_is_needed_only_to_compile(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setitem(sys.modules, "numba", None)
+    absent: Any = None
+    monkeypatch.setitem(sys.modules, "numba", absent)
     file, library = tmp_path / "relay.py", tmp_path / "relay.so"
     file.write_text(RELAY.format(name="Relay"))
     assert main.main([str(file), "-o", str(library)]) == main.REFUSED
@@ -249,6 +250,29 @@ def test_code_runs_on_any_processor_with_any_import_order() -> None:
         capture_output=True, text=True, check=True,
     )  # fmt: skip
     assert done.stdout == "generic ''\n"
+
+
+def test_the_files_that_the_sources_read_are_listed(tmp_path: Path) -> None:
+    source, table, module = (
+        tmp_path / "source.py", tmp_path / "a table.txt", tmp_path / "more" / "gains.py"
+    )  # fmt: skip
+    module.parent.mkdir()
+    (module.parent / "__init__.py").touch()
+    module.write_text("GAIN = 2.0\n")
+    table.write_text("1 2\n")
+    text = (
+        "import json\n\nimport numpy as np\nfrom more.gains import GAIN\n"
+        f"TABLE = np.loadtxt({str(table)!r})\nopen({str(tmp_path / 'written')!r}, 'w').close()\n"
+    )
+    rule = tmp_path / "source.d"
+    for each in ("x = GAIN\n", "x = absent\n"):  # also if the module fails
+        rule.unlink(missing_ok=True)
+        source.write_text(text + each)
+        words = [COMMAND, source, "-o", tmp_path / "source.so", "--depfile", rule]
+        subprocess.run(words, stderr=subprocess.PIPE, timeout=DEADLINE_S)
+        listed = rule.read_text().replace(" \\\n", "").split("  ")
+        files = [str(table).replace(" ", "\\ "), str(module.parent / "__init__.py"), module, source]
+        assert listed == [f"{tmp_path}/source.so:", *map(str, files[:-1]), f"{source}\n"]
 
 
 def test_a_messages_name_becomes_a_symbol() -> None:

@@ -37,6 +37,10 @@ def twice(x):
     return 2 * twice(x - 1) if x > 0 else 0
 
 
+def same(x):
+    return x
+
+
 class Faulty(Component):
     u: Input[float]
     x: Output[np.float64, 2]
@@ -182,7 +186,7 @@ IN_UPDATE = {
     "endless loop": ("while True:\n            self.n += 1", "an endless loop"),
     "returning a value": ("return self.n", "a hook returns nothing"),
     "write as value": ("a = self.y.write(1.0)", "write returns no value"),
-    "self passed on": ("twice(self)", "self cannot be used as a value"),
+    "self passed on": ("same(self)", "self cannot be used as a value"),
     "several targets": ("self.n, self.kp = 1, 2.0", "a parameter is set from outside"),
     "two types of a variable": (
         "a = 1.0\n        if self.on:\n            a = self.z\n        self.y.write(a)",

@@ -9,6 +9,7 @@ from daemon_process import BUILD_TREE
 from rtcf.component import DeclarationError, Parameter
 from rtcf_compile.comparison import verify
 from rtcf_compile.machine_code import object_file
+from rtcf_compile.machine_code.compiled import Compiled
 from rtcf_compile.source import modules
 from rtcf_compile.source.mistake import Mistake
 
@@ -114,7 +115,7 @@ class {name}(Component):
 """
 
 
-def compiled(file: Path) -> list[object_file.Compiled]:
+def compiled(file: Path) -> list[Compiled]:
     return [object_file.compile_component(each) for each in modules.components(modules.load(file))]
 
 

@@ -116,7 +116,7 @@ def test_a_redeclared_private_state_has_one_place(tmp_path: Path) -> None:
     # 5 + 2 * 1 of the base, and 3 of the derived class; 1 of the base's own __more().
     assert (redeclared._sum, redeclared.y.value, redeclared._peak) == (10.0, 11.0, 10.0)
     states = {each.outer_name: each.initial for each in describe(module.Redeclared).of(State)}
-    assert (states["sum"], len(states)) == (5.0, 4)
+    assert states["sum"].item() == 5.0 and len(states) == 4
 
 
 def test_two_states_of_one_outer_name_are_rejected(tmp_path: Path) -> None:

@@ -53,6 +53,23 @@ BODIES = {
         self.x.write(x)
         self.y.write(y)
 """,
+    "columns in a loop": """
+        x = a
+        for k in range(3):
+            y = 0.5 * x + self.m[:, k]
+            self.m[:, k] = x - 0.25 * y
+            x = y
+        self.x.write(x)
+        self.y.write(self.m[:, 0] + self.m[1] + b)
+""",
+    "in a loop of many turns": """
+        x = a
+        for k in range(5000):
+            y = 0.5 * x + self.m[k % 3]
+            x = y
+        self.x.write(x)
+        self.y.write(x + b)
+""",
     "parts of others": """
         wide = np.zeros(8)
         wide[:3] = a + b
@@ -104,10 +121,14 @@ def test_temporaries_match_the_interpreter(body: str, tmp_path: Path) -> None:
     assert found.differences == []
 
 
-def test_arrays_of_constant_size_do_not_use_the_arena(tmp_path: Path) -> None:
-    cls = component(tmp_path, BODIES["parts of others"])
+@pytest.mark.parametrize(
+    "body", ["parts of others", "kept over a turn of a loop", "columns in a loop"]
+)
+def test_arrays_of_constant_size_do_not_use_the_arena(body: str, tmp_path: Path) -> None:
+    cls = component(tmp_path, BODIES[body])
     inside = Inside(object_file.compile_component(cls, arena_bytes=128))
     record = cls()._record
     record["a"], record["b"] = (1.0, 2.0, 3.0), (4.0, 5.0, 6.0)
     assert inside.call("update", record) is None
-    np.testing.assert_array_equal(record["x"], (7.0 + 1.0, 9.0 + 2.0, 0.0 + 3.0))
+    if body == "parts of others":
+        np.testing.assert_array_equal(record["x"], (7.0 + 1.0, 9.0 + 2.0, 0.0 + 3.0))

@@ -15,6 +15,7 @@ from pages import TREE
 from rtcf_compile import main
 from rtcf_compile.comparison import inside, model, verify, watched
 from rtcf_compile.machine_code import object_file
+from rtcf_compile.machine_code.compiled import Compiled
 from rtcf_compile.rewriting.functions import HELPERS
 from rtcf_compile.source import modules as source
 
@@ -31,23 +32,19 @@ CLASSES = {
 
 
 @pytest.fixture(scope="module")
-def compiled() -> dict[str, object_file.Compiled]:
+def compiled() -> dict[str, Compiled]:
     """Cache compiled components."""
     return {}
 
 
-def compared(
-    name: str, compiled: dict[str, object_file.Compiled], cycles: int
-) -> verify.Comparison:
+def compared(name: str, compiled: dict[str, Compiled], cycles: int) -> verify.Comparison:
     if name not in compiled:
         compiled[name] = object_file.compile_component(CLASSES[name])
     return verify.compare(CLASSES[name], compiled[name], cycles)
 
 
 @pytest.mark.parametrize("name", CLASSES)
-def test_machine_code_and_interpreter_agree(
-    name: str, compiled: dict[str, object_file.Compiled]
-) -> None:
+def test_machine_code_and_interpreter_agree(name: str, compiled: dict[str, Compiled]) -> None:
     found = compared(name, compiled, 3_000)
     assert found.differences == [] and found.problem == ""
     assert found.cycles == 3_000
@@ -56,9 +53,7 @@ def test_machine_code_and_interpreter_agree(
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", CLASSES)
-def test_they_agree_over_a_million_cycles(
-    name: str, compiled: dict[str, object_file.Compiled]
-) -> None:
+def test_they_agree_over_a_million_cycles(name: str, compiled: dict[str, Compiled]) -> None:
     assert compared(name, compiled, 1_000_000).differences == []
 
 
