@@ -99,12 +99,13 @@ def _check_names(module: ModuleType, found: Sequence[type]) -> None:
     """Reject two classes of one name: the second would hide the first."""
     file = module.__file__ or "?"
     tree = ast.parse("".join(linecache.getlines(file)))
-    seen: set[str] = set()
-    for each in tree.body:
-        if isinstance(each, ast.ClassDef) and each.name in {of.__name__ for of in found}:
-            if each.name in seen:
-                raise Mistake(file, each.lineno, f"{each.name} is defined twice", "rename one")
-            seen.add(each.name)
+    for name in {each.__name__ for each in found}:
+        defined = [
+            each for each in tree.body if isinstance(each, ast.ClassDef) and each.name == name
+        ]
+        # The first may have another name by now: Other = Base.
+        if len(defined) > len({each for each in found if each.__name__ == name}):
+            raise Mistake(file, defined[-1].lineno, f"{name} is defined twice", "rename one")
 
 
 def read(function: FunctionType, is_whole: bool = False) -> Source:
