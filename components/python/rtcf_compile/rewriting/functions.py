@@ -389,8 +389,8 @@ def drop_types(tree: ast.FunctionDef) -> None:
 
 
 def frozen(value: Any) -> Any:
-    """Return a constant with lists converted to tuples whose numbers have one type, and arrays whose
-    elements lie in order: numba would refer to others by their address.
+    """Return a constant with lists converted to tuples whose numbers have one type, and arrays
+    whose elements lie in order: numba would refer to others by their address.
     """
     if isinstance(value, np.ndarray) and not (value.flags.c_contiguous or value.flags.f_contiguous):
         return np.ascontiguousarray(value)
