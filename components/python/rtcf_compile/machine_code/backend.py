@@ -125,6 +125,8 @@ def not_to_run() -> Iterator[None]:
 
     with (
         mock.patch.object(cgutils, "do_boundscheck", check_bounds),
+        # Otherwise code would contain the address of a large array in this process.
+        mock.patch.object(cpu.CPUContext, "allow_dynamic_globals", False),
         mock.patch.object(cgutils, "pointer_add", _moved),
         mock.patch.object(cpu.CPUContext, "get_executable", executable),
         mock.patch.object(codegen.JITCPUCodegen, "_add_module", lambda self, module: None),

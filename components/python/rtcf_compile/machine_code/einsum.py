@@ -12,6 +12,8 @@ from rtcf_compile.rewriting import helpers
 from rtcf_compile.rewriting import numpy_functions as own
 from rtcf_compile.rewriting.subscripts import Subscripts
 
+_DIFFER = "np.einsum: the sizes of the operands do not fit"
+
 
 @compiled_as(own.rtcf_einsum)
 def _einsum(text: Any, operands: Any) -> Any:
@@ -84,8 +86,10 @@ def _product(subscripts: Subscripts, operands: Any) -> Any:
         text = f"product({other}.T, {one}.T)"
     else:
         return None
-    scope: dict[str, Any] = {"product": helpers.rtcf_matmul}
-    exec(f"def multiplied(text, operands):\n    return {text}\n", scope)
+    sizes = f"operands[0].shape[{left.index(over)}] != operands[1].shape[{right.index(over)}]"
+    check = f"    if {sizes}:\n        raise ValueError(differ)\n"
+    scope: dict[str, Any] = {"product": helpers.rtcf_matmul, "differ": _DIFFER}
+    exec(f"def multiplied(text, operands):\n{check}    return {text}\n", scope)
     return scope["multiplied"]
 
 
@@ -125,7 +129,7 @@ def _loops(subscripts: Subscripts, operands: Any, dtype: Any) -> Any:
     lines.append(f"    return {'result' if subscripts.result else 'total'}")
     scope: dict[str, Any] = {
         **{"np": np, "dtype": dtype, "to": dtype.type},
-        "differ": "np.einsum: the sizes of the operands do not fit",
+        "differ": _DIFFER,
     }
     exec("\n".join(lines), scope)
     return scope["sums"]

@@ -35,7 +35,6 @@ Compiler = Callable[[FunctionType], Any]
 WRITTEN_NAME, WRITTEN_CODE = "rtcf_written_name", "rtcf_written_code"
 # Attribute: the largest absolute ints of arguments, by their names.
 INT_BOUNDS = "rtcf_int_bounds"
-_LARGEST_CONSTANT = 10**6  # bytes; numba refers to larger arrays by their address
 
 
 class Functions:
@@ -389,11 +388,16 @@ def drop_types(tree: ast.FunctionDef) -> None:
 
 
 def frozen(value: Any) -> Any:
-    """Return a constant with lists converted to tuples whose numbers have one type, and arrays
-    whose elements lie in order: numba would refer to others by their address.
+    """Return a constant with lists converted to tuples whose numbers have one type.
+
+    numba refers to an array by its address in this process, unless its elements are adjacent.
     """
-    if isinstance(value, np.ndarray) and not (value.flags.c_contiguous or value.flags.f_contiguous):
-        return np.ascontiguousarray(value)
+    if isinstance(value, np.ndarray) and not value.flags.forc:
+        return value.copy(order="C")
+    if type(value) is tuple:
+        return tuple(
+            frozen(each) if isinstance(each, tuple | np.ndarray) else each for each in value
+        )
     if not isinstance(value, list):
         return value
     elements = tuple(frozen(each) for each in value)
@@ -412,9 +416,6 @@ def _constant(node: ast.Name, value: Any, source: Source) -> None:
     what = kinds.get(type(value))
     if what:
         raise at(source.file, node, f"is {what} of the module", "use a tuple or np.array(…)")
-    if isinstance(value, np.ndarray) and value.nbytes >= _LARGEST_CONSTANT:
-        what = f"is an array of {value.nbytes} bytes, too large for a constant"
-        raise at(source.file, node, what, f"keep it below {_LARGEST_CONSTANT} bytes")
     if isinstance(value, np.ndarray) and not is_number(value.dtype):
         raise at(source.file, node, f"is an array of {value.dtype}", "use an array of numbers")
     known = (

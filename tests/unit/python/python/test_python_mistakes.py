@@ -18,7 +18,6 @@ from rtcf.component import Component, Derived, Input, Output, Parameter, Queue, 
 from std_msgs.msg import Float64MultiArray
 
 A = np.eye(2)
-LARGE = np.zeros(200_000)
 GAINS = {"kp": 1.0}
 SIZE = 100
 TABLE = [1.0, 2.0]
@@ -219,7 +218,6 @@ IN_UPDATE = {
     "fault with a variable": ("self.fault(self.n)", "a fault takes one constant text"),
     "isinstance": ("a = isinstance(self.n, int)", "types are fixed at compile time"),
     "time set": ("self.dt = 1.0", "belongs to the loop"),
-    "large constant": ("self.z[0] = LARGE[self.n]", "too large for a constant"),
     "complex number": ("self.n = 1j", "a whole number is set to a complex number"),
 }
 IN_PREPARE = {

@@ -232,7 +232,7 @@ class Views(Component):
         diagonal[:] = self.u.value
         turned = np.einsum("ji", self.q)
         self.q = 0.5 * self.q
-        self.r = turned + np.einsum("ij,j->i", self.q, diagonal)
+        self.r = turned + np.einsum("ij,j->i", self.q, self.u.value)
         np.atleast_1d(self.v)[0] = self.u.value[1]
         np.atleast_2d(self.v)[0, 1] += self.u.value[2]
         np.flip(self.r, axis=0)[0] -= self.v

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pages import TREE
 from rtcf_compile.comparison import verify
 from rtcf_compile.comparison.inside import Inside
 from rtcf_compile.machine_code import object_file
@@ -121,14 +122,24 @@ def test_temporaries_match_the_interpreter(body: str, tmp_path: Path) -> None:
     assert found.differences == []
 
 
-@pytest.mark.parametrize(
-    "body", ["parts of others", "kept over a turn of a loop", "columns in a loop"]
-)
-def test_arrays_of_constant_size_do_not_use_the_arena(body: str, tmp_path: Path) -> None:
-    cls = component(tmp_path, BODIES[body])
+def test_arrays_of_constant_size_do_not_use_the_arena(tmp_path: Path) -> None:
+    cls = component(tmp_path, BODIES["parts of others"])
     inside = Inside(object_file.compile_component(cls, arena_bytes=128))
     record = cls()._record
     record["a"], record["b"] = (1.0, 2.0, 3.0), (4.0, 5.0, 6.0)
     assert inside.call("update", record) is None
-    if body == "parts of others":
-        np.testing.assert_array_equal(record["x"], (7.0 + 1.0, 9.0 + 2.0, 0.0 + 3.0))
+    np.testing.assert_array_equal(record["x"], (7.0 + 1.0, 9.0 + 2.0, 0.0 + 3.0))
+
+
+@pytest.mark.parametrize(
+    ("file", "name"),
+    [
+        ("tests/bench/components/notch_bank.py", "NotchSections"),
+        ("components/rtcf_examples/python/gravity_pd.py", "GravityPd"),
+    ],
+    ids=["carried to the next turn", "of a size that depends on the turn"],
+)
+def test_arrays_of_a_loop_of_few_turns_do_not_use_the_arena(file: str, name: str) -> None:
+    classes = {each.__name__: each for each in modules.components(modules.load(TREE / file))}
+    inside = Inside(object_file.compile_component(classes[name], arena_bytes=64))
+    assert inside.call("update", classes[name]()._record) is None
