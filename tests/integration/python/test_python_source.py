@@ -10,7 +10,7 @@ import select
 import shutil
 import subprocess
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import pytest
@@ -18,7 +18,7 @@ import rtcf
 import yaml
 from daemon_process import BUILD_TREE, DEADLINE_S, Daemon, wait_for
 from processor_time import descendants
-from rtcfctl.graph import python_source
+from rtcfctl.graph import python_source, source_files
 from values import parameter_values, port_value
 
 COMPILE_DEADLINE_S = 900.0
@@ -433,7 +433,10 @@ def test_a_file_that_changes_while_it_is_compiled_is_compiled_again(
     calls = []
 
     class Compiler:
-        def run(self, words: list[str], progress: object) -> tuple[int, list[str]]:
+        def run(
+            self, arguments: Sequence[str], progress: Callable[[str], None]
+        ) -> tuple[int, list[str]]:
+            words = list(arguments)
             calls.append(words)
             if len(calls) < 3:
                 table.write_text(f"{len(calls) + 1}\n")
@@ -472,10 +475,10 @@ def test_a_library_of_another_debian_is_recompiled(
 ) -> None:
     source = tmp_path / "counts.py"
     source.write_text(COUNTS)
-    ours = python_source.fingerprint(source)
-    assert python_source.fingerprint(source) == ours
+    ours = source_files.fingerprint(source)
+    assert source_files.fingerprint(source) == ours
     monkeypatch.setattr(platform, "freedesktop_os_release", lambda: {"VERSION_ID": "14"})
-    assert python_source.fingerprint(source) != ours
+    assert source_files.fingerprint(source) != ours
 
 
 @pytest.mark.parametrize(
@@ -498,11 +501,11 @@ def test_a_library_of_another_compiler_is_recompiled(
     )
     source = tmp_path / "counts.py"
     source.write_text(COUNTS)
-    before = python_source.fingerprint(source)
+    before = source_files.fingerprint(source)
     (compiler / changed).parent.mkdir(exist_ok=True)
     with (compiler / changed).open("a") as file:
         file.write("\n")
-    assert python_source.fingerprint(source) != before
+    assert source_files.fingerprint(source) != before
 
 
 FREELY = """\

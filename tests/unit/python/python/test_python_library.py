@@ -268,7 +268,7 @@ def test_the_files_that_the_sources_read_are_listed(tmp_path: Path) -> None:
     for each in ("x = GAIN\n", "x = absent\n"):  # also if the module fails
         rule.unlink(missing_ok=True)
         source.write_text(text + each)
-        words = [COMMAND, source, "-o", tmp_path / "source.so", "--depfile", rule]
+        words = [*map(str, (COMMAND, source, "-o", tmp_path / "source.so", "--depfile", rule))]
         subprocess.run(words, stderr=subprocess.PIPE, timeout=DEADLINE_S)
         listed = rule.read_text().replace(" \\\n", "").split("  ")
         files = [str(table).replace(" ", "\\ "), str(module.parent / "__init__.py"), module, source]

@@ -2,6 +2,7 @@
 
 import math
 import random
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -91,7 +92,7 @@ def _drawn(count: int) -> list[dict[str, Any]]:
     draw = random.Random(1)
     found = []
     for number in range(count):
-        any_float = draw.choice(
+        any_float: Callable[[], float] = draw.choice(
             [
                 lambda: draw.choice(FLOATS),
                 lambda: draw.uniform(-5.0, 5.0),
@@ -100,7 +101,7 @@ def _drawn(count: int) -> list[dict[str, Any]]:
                 lambda: draw.uniform(-1.0, 1.0) * 2.0 ** draw.randrange(-8, 8),
             ]
         )
-        any_int = draw.choice(
+        any_int: Callable[[], int] = draw.choice(
             [
                 lambda: draw.choice(INTS),
                 lambda: draw.randrange(70),
