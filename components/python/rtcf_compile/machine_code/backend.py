@@ -54,6 +54,18 @@ def _in_place(template: Any, args: Any, kws: Any) -> Any:
         return None
 
 
+_make_constant_array = cpu.CPUContext.make_constant_array
+
+
+def _constant_array(context: Any, *arguments: Any) -> Any:
+    """Return a constant array, whose elements are in the code.
+
+    Of a large array, numba's code otherwise contains the address in this process.
+    """
+    with mock.patch.object(cpu.CPUContext, "allow_dynamic_globals", False):
+        return _make_constant_array(context, *arguments)
+
+
 def initialise() -> None:
     """Load what numba otherwise loads when it compiles the first function."""
     cpu_target.typing_context.refresh()
@@ -125,8 +137,7 @@ def not_to_run() -> Iterator[None]:
 
     with (
         mock.patch.object(cgutils, "do_boundscheck", check_bounds),
-        # Otherwise code would contain the address of a large array in this process.
-        mock.patch.object(cpu.CPUContext, "allow_dynamic_globals", False),
+        mock.patch.object(cpu.CPUContext, "make_constant_array", _constant_array),
         mock.patch.object(cgutils, "pointer_add", _moved),
         mock.patch.object(cpu.CPUContext, "get_executable", executable),
         mock.patch.object(codegen.JITCPUCodegen, "_add_module", lambda self, module: None),
