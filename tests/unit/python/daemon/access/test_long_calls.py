@@ -11,6 +11,7 @@ from daemon_process import DEADLINE_S, wait_for
 from daemon_under_test import DaemonUnderTest
 from rtcf.v1 import control_pb2
 from rtcfctl.graph import component
+from rtcfctl.graph.compiler import SingleCompiler
 from rtcfctl.main import parser
 from rtcfctl.terminal.output import Output
 from strangers import open_to_strangers, root_only, stranger
@@ -93,7 +94,8 @@ def test_a_source_is_watched_while_its_component_exists(
         yield from [False] * 20
 
     with pytest.raises(rtcf.RefusedError, match="no component /a"):
-        component.watch(client, args, Output("table"), "/a", looks())
+        # Nothing is saved, so nothing is compiled.
+        component.watch(client, args, Output("table"), "/a", looks(), SingleCompiler(""))
 
 
 @root_only
