@@ -13,6 +13,7 @@ import signal
 from pathlib import Path
 from types import FrameType
 
+import forking  # noqa: F401, before gRPC is imported elsewhere: tests compile in child processes
 import pytest
 from failures_at_once import FailuresAtOnce
 from hypothesis import HealthCheck, errors, settings

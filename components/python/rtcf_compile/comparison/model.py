@@ -38,7 +38,8 @@ from rtcf_compile.rewriting.common_rewriting import CommonRewriting, call_of, in
 from rtcf_compile.rewriting.functions import HELPERS, drop_types, operator_functions
 from rtcf_compile.rewriting.functions import made as made_of
 from rtcf_compile.source.checks import resolve
-from rtcf_compile.source.modules import Source, is_own, read
+from rtcf_compile.source.modules import Source, read
+from rtcf_compile.source.parsed import is_own, opened
 
 
 class Model:
@@ -309,6 +310,7 @@ class _Functions:
         return None
 
     def _function(self, function: FunctionType, owner: type | None = None) -> FunctionType:
+        function = opened(function)
         if function in self._known:
             return self._known[function]
         source = read(function, is_whole=True)
@@ -323,7 +325,7 @@ class _Functions:
             if isinstance(value, type) and value in self._copies:
                 scope[name] = self._copies[value]
         self._known[function] = _in_class(tree, scope, source, owner)
-        for name in (*_global_names(function.__code__), *rewriting.constants):
+        for name in {*_global_names(function.__code__), *rewriting.constants}:
             value = scope.get(name)
             if isinstance(value, FunctionType) and is_own(value) and name not in HELPERS:
                 scope[name] = self._function(value)

@@ -343,10 +343,27 @@ def _reshape(a: Any, newshape: Any) -> Any:
     return reshape
 
 
-@compiled_as(own.rtcf_vector_as)
-def _vector_as(a: Any, shape: Any) -> Any:
-    needs(a, "a new axis", (1,))
-    return lambda a, shape: own.rtcf_reshape(a, shape)
+@compiled_as(own.rtcf_new_axes)
+def _new_axes(a: Any, axes: Any) -> Any:
+    needs(a, "a new axis", _ALL)
+    old = sum(isinstance(each, types.Boolean) for each in axes.types)
+    if old > a.ndim:
+        raise TypingError(f"RTCF:{old} indices of {words(a)}:write one for each dimension")
+    # ... stands for the other old axes; without it, they are at the end.
+    kinds = list(axes.types)
+    if not any(isinstance(each, types.Integer) for each in kinds):
+        kinds.append(types.int64)
+    place, shape, strides = 0, "", ""
+    for each in kinds:
+        if isinstance(each, types.NoneType):
+            shape, strides = f"{shape}1, ", f"{strides}0, "
+            continue
+        for _ in range(1 if isinstance(each, types.Boolean) else a.ndim - old):
+            shape, strides = f"{shape}a.shape[{place}], ", f"{strides}a.strides[{place}], "
+            place += 1
+    scope = {"view_of": view_of}
+    exec(f"def new_axes(a, axes):\n    return view_of(a, ({shape}), ({strides}))\n", scope)
+    return scope["new_axes"]
 
 
 def _filled(shape: Any, rest: Any) -> Any:

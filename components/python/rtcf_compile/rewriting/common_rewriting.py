@@ -21,7 +21,8 @@ from rtcf_compile.rewriting.references import is_copied, is_ellipsis, is_new_axi
 from rtcf_compile.rewriting.subscripts import Subscripts
 from rtcf_compile.source.checks import resolve
 from rtcf_compile.source.mistake import Mistake, Mistakes, at
-from rtcf_compile.source.modules import Source, is_of_user, is_own
+from rtcf_compile.source.modules import Source
+from rtcf_compile.source.parsed import is_of_user, is_own
 
 _Node = TypeVar("_Node", bound=ast.AST)
 _BY_NODE: tuple[Any, ...] = (operators.BINARY, operators.SHIFTS, operators.COMPARISONS)
@@ -296,8 +297,12 @@ class CommonRewriting(ast.NodeTransformer):
         )
 
     def visit_Compare(self, node: ast.Compare) -> ast.AST:
-        """Rewrite `x in (1, 2)` and comparisons with lists."""
+        """Rewrite `x in (1, 2)`, `key in LIMITS` of a dict, and comparisons with lists."""
         contained = node.comparators[0]
+        table = resolve(contained, self.source)
+        if isinstance(table, dict) and table and all(isinstance(each, int) for each in table):
+            keys: list[ast.expr] = [ast.Constant(int(each)) for each in table]
+            contained = like(contained, ast.Tuple(keys, ast.Load()))
         if (
             len(node.ops) == 1
             and isinstance(node.ops[0], ast.In | ast.NotIn)
@@ -749,16 +754,25 @@ class CommonRewriting(ast.NodeTransformer):
         return not _is_view(node) and not self._is_whole(node)
 
     def _with_new_axis(self, node: ast.Subscript, parts: list[ast.expr]) -> ast.AST:
-        """Rewrite `v[:, None]` and `v[None, :]`: a vector as a column or a row."""
+        """Rewrite `v[:, None]` and its like: the other indices first, then the new axes."""
         others = [each for each in parts if not is_new_axis(each)]
-        if len(parts) > 2 or len(others) > 1 or not all(_is_view(each) for each in others):
-            raise self.mistake(node, "a new axis of an array that is no vector", "use np.reshape")
-        is_row = is_new_axis(parts[0])
-        shape = ast.Tuple(
-            [ast.Constant(each) for each in ((1, -1) if is_row else (-1, 1))], ast.Load()
-        )
-        vector = ast.Subscript(node.value, others[0], ast.Load()) if others else node.value
-        return like(node, call_of("rtcf_vector_as", self.visit(like(node, vector)), shape))
+        # What numba can tell by its type: None for a new axis, 0 for ..., True for an old axis.
+        kept = [
+            ast.Constant(None if is_new_axis(each) else 0 if is_ellipsis(each) else True)
+            for each in parts
+            if _is_view(each) or is_new_axis(each)
+        ]
+        base: ast.expr = node.value
+        if not all(self._is_whole_axis(each) for each in others):
+            index = ast.Tuple(others, ast.Load()) if len(others) > 1 else others[0]
+            base = like(node, ast.Subscript(node.value, index, ast.Load()))
+        axes = ast.Tuple(list(kept), ast.Load())
+        return like(node, call_of("rtcf_new_axes", self.visit(base), axes))
+
+    def _is_whole_axis(self, node: ast.expr) -> bool:
+        """Tell whether an index is `:` or `...`."""
+        is_slice = isinstance(node, ast.Slice) and not (node.lower or node.upper or node.step)
+        return is_slice or is_ellipsis(node)
 
     def visit_Assign(self, node: ast.Assign) -> ast.AST | list[ast.stmt]:
         """Rewrite `x[1:3] = value`, `x[i] = value`, `a, b = f()`."""

@@ -23,7 +23,8 @@ from rtcf_compile.rewriting.rewrite import Hook
 from rtcf_compile.source import progress
 from rtcf_compile.source.checks import check, resolve
 from rtcf_compile.source.mistake import Mistake, Mistakes, at, written
-from rtcf_compile.source.modules import Source, is_own, read
+from rtcf_compile.source.modules import Source, read
+from rtcf_compile.source.parsed import is_own, opened
 from rtcf_compile.source.spelling import defaults_of
 
 # The helpers that rewritten functions call, by name.
@@ -109,6 +110,7 @@ class Functions:
         if dataclasses.is_dataclass(self._cls):
             remedy = "remove the decorator"
             self.mistakes.add(Mistake(file, line, "a component is no dataclass", remedy))
+            return
         if self._methods.find("update") is None:
             self.mistakes.add(Mistake(file, line, "has no update", "write `def update(self):`"))
         elif (own := self._methods.find("__init__")) is not None and own.function is not None:
@@ -250,7 +252,7 @@ class Functions:
         """Rewrite a function in the context, with its copies marked."""
         if function in self._making:
             raise Mistake(
-                source.file, source.tree.lineno, f"{function.__name__} calls itself", "use a loop"
+                source.file, source.tree.lineno, f"{_written(function)} calls itself", "use a loop"
             )
         self._making.append(function)
         try:
@@ -329,7 +331,7 @@ class Functions:
         variables = source.variables
         for node in ast.walk(tree):
             if isinstance(node, ast.Name) and node.id in scope and node.id not in variables:
-                value = scope[node.id] = frozen(scope[node.id])
+                value = scope[node.id] = frozen(opened(scope[node.id]))
                 if is_own(value) and node.id not in HELPERS:
                     scope[node.id] = self._own_function(value)
                 else:
@@ -339,6 +341,11 @@ class Functions:
                 what = "a function of another module"
                 self.mistakes.add(at(source.file, node, what, "import the function by name"))
         return scope
+
+
+def _written(function: FunctionType) -> str:
+    """Return the name of a function in the source; that of a copy differs."""
+    return function.__qualname__.rpartition(".")[2]
 
 
 def _find_messages(tree: ast.FunctionDef, method: Method) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 from rtcf.component import Component
 
 from rtcf_compile.source.checks import decorator_of
-from rtcf_compile.source.modules import is_of_user
+from rtcf_compile.source.parsed import is_of_user
 
 _DECORATED = "function with a decorator"
 

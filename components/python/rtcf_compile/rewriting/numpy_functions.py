@@ -126,11 +126,10 @@ def rtcf_reshape(a: Any, newshape: Any) -> Any:
     return np.reshape(a, newshape)
 
 
-def rtcf_vector_as(a: Any, shape: Any) -> Any:
-    """Return a vector as a row or a column."""
-    if np.ndim(a) != 1:
-        raise ValueError("a new axis of an array that is no vector")
-    return np.reshape(a, shape)
+def rtcf_new_axes(a: Any, axes: Any) -> Any:
+    """Return an array with new axes: None in `axes`; 0 stands for ..., True for an old axis."""
+    kinds = {None: None, True: slice(None), 0: ...}
+    return np.asarray(a)[tuple(kinds[each] for each in axes)]
 
 
 @_stands_for(np.ravel, method="ravel")
@@ -715,5 +714,5 @@ for _name, _c_name in LIBM.items():
     STANDS_FOR.append((getattr(np, _name), _own))
 
 _ALL: list[Function] = [own for _, own in STANDS_FOR]
-_ALL += [*METHODS.values(), rtcf_whole_pow, rtcf_vector_as]
+_ALL += [*METHODS.values(), rtcf_whole_pow, rtcf_new_axes]
 BY_NAME: dict[str, Function] = {each.__name__: each for each in _ALL}

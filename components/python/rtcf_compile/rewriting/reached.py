@@ -11,7 +11,8 @@ from rtcf_compile.rewriting.methods import Method, Methods, nested
 from rtcf_compile.rewriting.references import is_super
 from rtcf_compile.source.checks import resolve
 from rtcf_compile.source.mistake import Mistakes
-from rtcf_compile.source.modules import Source, is_own, read
+from rtcf_compile.source.modules import Source, read
+from rtcf_compile.source.parsed import is_own
 
 
 @dataclass(frozen=True)

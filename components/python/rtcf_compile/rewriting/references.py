@@ -38,7 +38,8 @@ from rtcf_compile.rewriting.subscripts import Subscripts
 from rtcf_compile.source.assigned import matches_all
 from rtcf_compile.source.checks import check, resolve
 from rtcf_compile.source.mistake import at, written
-from rtcf_compile.source.modules import Source, is_own, read
+from rtcf_compile.source.modules import Source, read
+from rtcf_compile.source.parsed import is_own
 from rtcf_compile.source.spelling import defaults_of
 
 # The name of an array, or of a place: its kind and what tells it from others of the kind.
@@ -1066,7 +1067,8 @@ class _Followed:
         parts = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
         views = [each for each in parts if _keeps(each)]
         axes = sum(map(is_new_axis, parts))
-        if len(parts) > 1 and any(map(is_ellipsis, parts)) and _flat(base):
+        others = [each for each in parts if not is_ellipsis(each) and not is_new_axis(each)]
+        if len(others) < len(parts) - axes and others and _flat(base):
             raise self._mistake(node, "... among other indices", "write : for each other index")
         if any(isinstance(each, ast.List | ast.Compare) for each in parts) or any(
             ref.thing[0] in _SURELY for ref in _flat(index)

@@ -40,7 +40,10 @@ from rtcf_compile.rewriting.ports import Ports, a_kind
 from rtcf_compile.rewriting.references import is_super
 from rtcf_compile.source.checks import METHODS, check_arguments, resolve
 from rtcf_compile.source.mistake import at, once
-from rtcf_compile.source.modules import Source
+from rtcf_compile.source.modules import Source, read
+
+# What other libraries call the object that logs.
+_LOGGERS = ("log", "logger", "_logger", "get_logger")
 
 
 class Hook(Ports):
@@ -443,17 +446,33 @@ class Hook(Ports):
     def _undeclared(self, node: ast.Attribute) -> Exception:
         names = [each for each in self._description.members if "__" not in each]
         words = (*names, *TIME_FIELDS, *LOG_LEVELS, *self._methods.names())
-        remedy = f"write `{node.attr}: State[float]` in the class"
+        kind = "Derived" if self._in_prepare(node.attr) else "State"
+        remedy = f"write `{node.attr}: {kind}[float]` in the class"
+        if kind == "Derived":
+            remedy += f", or {node.attr}: Derived[np.float64, 2, 3] for an array"
+        if node.attr in _LOGGERS:
+            return once(at(self.source.file, node, "is not declared", 'write self.info("…")'))
         written = written_name(self._owner, node.attr)
         if written != node.attr:
             own = private_name(written)
-            remedy = f"write `{own}: State[float]` in the class, and self.{own}"
+            remedy = f"write `{own}: {kind}[float]` in the class, and self.{own}"
         elif near := (
             [each for each in names if each.strip("_") == node.attr.strip("_")]
             or difflib.get_close_matches(node.attr, words, 1, 0.75)
         ):
             remedy = f"correct its name (self.{near[0]}), or {remedy}"
         return once(at(self.source.file, node, "is not declared", remedy))
+
+    def _in_prepare(self, name: str) -> bool:
+        """Tell whether prepare sets a member."""
+        prepare = self._methods.find("prepare")
+        tree = read(prepare.function).tree if prepare and prepare.function else None
+        return tree is not None and any(
+            isinstance(each, ast.Attribute)
+            and each.attr == name
+            and isinstance(each.ctx, ast.Store)
+            for each in ast.walk(tree)
+        )
 
     def _no_function(self, node: ast.Call, called: ast.Attribute) -> None:
         """Reject the call of a member, a time or a property of `self`."""

@@ -19,7 +19,8 @@ from rtcf.component.declaration import Declarable
 
 from rtcf_compile.source.assigned import check_assigned
 from rtcf_compile.source.mistake import Mistake, Mistakes, at, once
-from rtcf_compile.source.modules import Source, is_own
+from rtcf_compile.source.modules import Source
+from rtcf_compile.source.parsed import is_own, opened
 
 _REFUSED: dict[type[ast.AST], tuple[str, str]] = {
     ast.ListComp: ("a list allocates memory", "write np.array([… for …])"),
@@ -40,6 +41,7 @@ _REFUSED: dict[type[ast.AST], tuple[str, str]] = {
         'log with arguments: self.info("x {}", x)',
     ),
     ast.Global: ("a global variable is shared by all instances", "declare a State"),
+    ast.Nonlocal: ("nonlocal is not compiled", "declare a State, or return the value"),
     ast.Try: ("exceptions cannot be caught in the cycle", "test the condition with `if` first"),
     ast.With: ("the cycle cannot open or lock anything", "remove the `with`"),
     ast.Import: ("an import cannot be compiled", "import at the top of the file"),
@@ -275,13 +277,13 @@ def resolve(node: ast.AST, source: Source) -> Any:
         if node.id in source.variables:
             return None
         if node.id in scope:
-            return scope[node.id]
+            return opened(scope[node.id])
         builtins = scope.get("__builtins__", {})
         builtins = vars(builtins) if isinstance(builtins, ModuleType) else builtins
         return builtins.get(node.id)
     if isinstance(node, ast.Attribute):
         owner = resolve(node.value, source)
-        return getattr(owner, node.attr, None) if owner is not None else None
+        return opened(getattr(owner, node.attr, None)) if owner is not None else None
     return None
 
 

@@ -12,14 +12,25 @@ import copy
 import inspect
 import math
 from collections.abc import Callable, Iterator, Sequence
-from types import CodeType, FunctionType
+from types import FunctionType
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
+from rtcf_compile.source.given_functions import (
+    Given,
+    arguments,
+    calls,
+    is_function,
+    is_plain,
+    method_of,
+    owner_of,
+    without,
+)
 from rtcf_compile.source.mistake import at
+from rtcf_compile.source.parsed import is_own, opened, parsed
 from rtcf_compile.source.port_loops import by_port, is_member, leaves
-from rtcf_compile.source.scopes import bound, free
+from rtcf_compile.source.scopes import bound, everywhere, free
 
 _Node = TypeVar("_Node", bound=ast.AST)
 _Comprehension = ast.ListComp | ast.GeneratorExp
@@ -98,15 +109,29 @@ _FILLED = (
     "rtcf_place += 1",
 )
 
-# What was lifted: the tree of each function, and the functions that it may call.
-_trees: dict[CodeType, tuple[ast.FunctionDef, dict[str, FunctionType]]] = {}
-_made: dict[tuple[CodeType, str, int, int], FunctionType] = {}
+# How a nested function is called: its own arguments, and the variables that are passed before them.
+_Known = tuple[inspect.Signature, list[str]]
+
+
+class _Lifted(NamedTuple):
+    """A function that was lifted, and what it may call."""
+
+    tree: ast.FunctionDef
+    functions: dict[str, FunctionType]
+    known: dict[str, _Known]
+    owner: type | None
+    depth: int  # copies of copies, see _copy
+
+
+_lifted: dict[FunctionType, _Lifted] = {}
+_made: dict[tuple[Any, ...], FunctionType] = {}
+_copies: set[str] = set()  # their names
 
 
 def tree_of(function: FunctionType) -> ast.FunctionDef | None:
     """Return the tree of a function that was lifted, else None."""
-    known = _trees.get(function.__code__)
-    return copy.deepcopy(known[0]) if known else None
+    known = _lifted.get(function)
+    return copy.deepcopy(known.tree) if known else None
 
 
 def lift(tree: ast.FunctionDef, function: FunctionType, file: str) -> dict[str, FunctionType]:
@@ -129,13 +154,15 @@ class _Lifting(ast.NodeTransformer):
         self._first = arguments[0].arg if arguments else ""
         self._nested = {name for each in ast.walk(tree) for name, _ in _nested(each)} - {tree.name}
         self._variables = bound(tree) - self._nested
+        lifted = _lifted.get(function) or _Lifted(tree, {}, {}, owner_of(function), 0)
+        self.functions: dict[str, FunctionType] = dict(lifted.functions)
+        self._owner, self._depth = lifted.owner, lifted.depth
+        # The nested functions that may be called here.
+        self._known = {name: each for name, each in lifted.known.items() if name not in bound(tree)}
+        self._nested |= set(self._known)
         self._lists = self._arrays_for_lists()
         self._dicts = dict(self._local_dicts())
         self._port_tuples = dict(self._tuples_of_ports())
-        known = _trees.get(function.__code__)
-        self.functions: dict[str, FunctionType] = dict(known[1]) if known else {}
-        # The nested functions that may be called here: how they are called, and their variables.
-        self._known: dict[str, tuple[inspect.Signature, list[str]]] = {}
 
     def _mistake(self, node: ast.AST, what: str, remedy: str) -> Exception:
         return at(self._file, node, what, remedy)
@@ -220,7 +247,6 @@ class _Lifting(ast.NodeTransformer):
         tree = _located(ast.FunctionDef(name, _without_types(given), body, []), nested)
         signature = inspect.signature(self._compiled(_signature_only(tree)))
         tree = copy.deepcopy(tree)
-        _Passing(self._known, self._mistake).visit(tree)
         if name in free(tree):
             raise self._mistake(node, f"{name} calls itself", "use a loop")
         names = self._taken(tree)
@@ -231,21 +257,33 @@ class _Lifting(ast.NodeTransformer):
 
     def _taken(self, tree: ast.AST) -> list[str]:
         """Return the variables that a nested function takes from this one: the first argument,
-        which may be self, and those that it reads.
+        which may be self, and those that it or the functions that it calls read.
         """
-        others = sorted(free(tree) & self._variables - {self._first})
-        is_hidden = self._first in bound(tree)
-        return [self._first, *others] if self._first and not is_hidden else others
+        read, own = free(tree), bound(tree)
+        for name in sorted(read & set(self._known)):
+            for each in self._known[name][1]:
+                if each in own:
+                    use = next(of for of in ast.walk(tree) if getattr(of, "id", "") == name)
+                    what = f"passes {each} of the function around it, and has a variable {each}"
+                    raise self._mistake(use, what, "use two names")
+                read.add(each)
+        others = sorted(read & self._variables - {self._first})
+        return [self._first, *others] if self._first and self._first not in own else others
 
     def _add(self, name: str, tree: ast.FunctionDef, node: ast.expr | ast.stmt) -> None:
         """Make a function that can be called by its name."""
-        key = self._outer.__code__, name, node.lineno, node.col_offset
+        key = self._outer, name, node.lineno, node.col_offset
         if key not in _made:
             _made[key] = self._compiled(tree)
             if name.startswith("rtcf_"):
                 _made[key].__qualname__ = f"{self._outer.__qualname__}.<locals>.<comprehension>"
-            _trees[_made[key].__code__] = tree, dict(self.functions)
+            self._note(_made[key], tree)
         self.functions[name] = _made[key]
+
+    def _note(self, function: FunctionType, tree: ast.FunctionDef) -> None:
+        """Note the tree of a function that was lifted, and what it may call."""
+        functions, known = dict(self.functions), dict(self._known)
+        _lifted[function] = _Lifted(tree, functions, known, self._owner, self._depth)
 
     def _compiled(self, tree: ast.FunctionDef) -> FunctionType:
         module = ast.Module([copy.deepcopy(tree)], [])
@@ -253,6 +291,9 @@ class _Lifting(ast.NodeTransformer):
         exec(compile(module, self._file, "exec", dont_inherit=True), self._outer.__globals__, scope)
         function: FunctionType = scope[tree.name]
         function.__qualname__ = f"{self._outer.__qualname__}.<locals>.{tree.name}"
+        # Code objects of one text are equal, but those of two copies may call other functions.
+        name = f"{self._outer.__code__.co_name}.{tree.name}"
+        function.__code__ = function.__code__.replace(co_name=name)
         return function
 
     def visit_Name(self, node: ast.Name) -> ast.AST:
@@ -271,6 +312,8 @@ class _Lifting(ast.NodeTransformer):
         if any(isinstance(each, ast.Starred) for each in node.args):
             node = self._without_star(node)
         if isinstance(node.func, ast.Name) and node.func.id in self._known:
+            if (specialised := self._specialised(node)) is not None:
+                return self.visit_Call(specialised)
             new = _passed(node, self._known, self._mistake)
             new.args = [self.visit(each) for each in new.args]
             for keyword in new.keywords:
@@ -278,6 +321,8 @@ class _Lifting(ast.NodeTransformer):
             return new
         if isinstance(node.func, ast.Attribute) and (table := self._table(node.func.value)):
             return self._looked_up(node, table, node.args)
+        if (specialised := self._specialised(node)) is not None:
+            return self.visit_Call(specialised)
         target = self._target(node.func)
         if (reduced := self._reduced(node, target)) is not None:
             return reduced
@@ -298,6 +343,144 @@ class _Lifting(ast.NodeTransformer):
                 keyword.value = self.visit(keyword.value)
             return node
         return self.generic_visit(node)
+
+    def _taker(self, node: ast.expr) -> tuple[FunctionType, list[str], str] | None:
+        """Return a function of the user that is called, the names of the arguments that are passed
+        before those written, and the name of its own first argument if that is self.
+        """
+        if isinstance(node, ast.Name) and node.id in self._known:
+            names = self._known[node.id][1]
+            is_passed = bool(names) and names[0] == self._first
+            return (self.functions[node.id], names, self._first) if is_passed else None
+        if self._is_of_self(node):
+            method = method_of(self._owner, node.attr)  # type: ignore[attr-defined]
+            if isinstance(method, FunctionType):
+                first = next(iter(inspect.signature(method).parameters), "")
+                return (method, [self._first], first) if first else None
+            return None if method is None else (method.__func__, [], "")
+        target = self._target(node)
+        return (target, [], "") if is_own(target) else None
+
+    def _is_of_self(self, node: ast.expr) -> bool:
+        of = node.value if isinstance(node, ast.Attribute) else None
+        return isinstance(of, ast.Name) and of.id == self._first
+
+    def _specialised(self, node: ast.Call) -> ast.Call | None:
+        """Return the call of a copy of a function for the functions that it is given, or None."""
+        taker = self._taker(node.func)
+        if taker is None or not self._may_be_function(node):
+            return None
+        function, before, first = taker
+        tree = parsed(function) if function not in _lifted else tree_of(function)
+        assert tree is not None
+        names = [each.arg for each in (*tree.args.posonlyargs, *tree.args.args)]
+        placed = arguments(node, names[len(before) :])
+        if placed is None or not is_plain(function, tree):
+            return None
+        given = {name: found for name, each in placed.items()
+                 if (found := self._given(each, calls(tree, name))) is not None}  # fmt: skip
+        if not given:
+            return None
+        if self._depth > _MOST:
+            raise self._mistake(node, "functions are given to functions without end", "use a loop")
+        for name in given:
+            if any(_sets(each, name) for each in ast.walk(tree)):
+                what = f"{function.__name__} sets {name}, which is a function"
+                raise self._mistake(node, what, "use two names")
+        own = first or (self._first if self._first not in everywhere(tree) else "rtcf_self")
+        key = (function, self._owner, own, *((name, each.key) for name, each in given.items()))
+        passed = [part for each in given.values() if each.nested
+                  for part in self._known[each.nested][1] if part != self._first]  # fmt: skip
+        if key not in _made:
+            tree.name = "_".join([tree.name, "of", *(each.name for each in given.values())])
+            _made[key] = self._copy(function, tree, own, given, is_method=bool(first))
+        called = _made[key].__name__
+        self.functions[called] = _made[key]
+        if not first and self._first:
+            before = [self._first, *before]
+        own_names = [_name(each) for each in (*before[:1], *passed, *before[1:])]
+        rest = [each for name, each in zip(names[len(taker[1]) :], node.args, strict=False)
+                if name not in given]  # fmt: skip
+        keywords = [each for each in node.keywords if each.arg not in given]
+        return _located(ast.Call(_name(called), [*own_names, *rest], keywords), node)
+
+    def _may_be_function(self, node: ast.Call) -> bool:
+        """Tell whether an argument of a call may be a function: fast."""
+        return any(
+            isinstance(each, ast.Lambda | ast.Name) or self._is_of_self(each) or _is_dotted(each)
+            for each in (*node.args, *(each.value for each in node.keywords))
+        )
+
+    def _given(self, node: ast.expr, is_called: bool) -> Given | None:
+        """Return the function that an argument is, or None."""
+        if isinstance(node, ast.Lambda):
+            name = f"rtcf_lambda_{node.lineno}_{node.col_offset}"
+            self._define(ast.copy_location(ast.Pass(), node), name, node)
+            node = _located(_name(name), node)
+        if isinstance(node, ast.Name) and node.id in self._known:
+            name = "lambda" if node.id.startswith("rtcf_lambda") else node.id
+            return Given(name, (self.functions[node.id], *self._known[node.id][1]), nested=node.id)
+        if self._is_of_self(node):
+            name = node.attr  # type: ignore[attr-defined]
+            is_method = is_called and method_of(self._owner, name) is not None
+            return Given(name, name, method=name) if is_method else None
+        value = self._target(node) if is_called else None
+        return Given(value.__name__, value, of_module=value) if is_function(value) else None
+
+    def _copy(
+        self,
+        function: FunctionType,
+        tree: ast.FunctionDef,
+        own: str,
+        given: dict[str, Given],
+        is_method: bool,
+    ) -> FunctionType:
+        """Return a copy of a function for the functions that it is given.
+
+        `own`: its first argument, which is that of the function around the call.
+        """
+        without(tree, set(given))
+        while tree.name in _copies or tree.name in self._variables | set(self.functions):
+            tree.name += "_"
+        _copies.add(tree.name)
+        tree.args, tree.returns, tree.decorator_list = _without_types(tree.args), None, []
+        known = _lifted.get(function)
+        lifted = _Lifted(tree, {}, {}, self._owner, 0) if known is None else known
+        functions, nested = dict(lifted.functions), dict(lifted.known)
+        scope = dict(function.__globals__)
+        names: list[str] = []
+        methods: dict[str, ast.expr] = {}
+        for name, each in given.items():
+            if each.nested:
+                signature, taken = self._known[each.nested]
+                functions[name] = self.functions[each.nested]
+                new = {part: f"rtcf_{name}_{part}" for part in taken if part != self._first}
+                nested[name] = signature, [new.get(part, own) for part in taken]
+                names += new.values()
+            elif each.method:
+                called = ast.Attribute(_name(own), each.method, ast.Load())
+                methods[name] = _located(called, tree)
+            else:
+                scope[name] = each.of_module
+        body = ast.Module(tree.body, [])
+        _Named(methods).visit(body)
+        first = tree.args.posonlyargs or tree.args.args
+        if is_method:
+            first[1:1] = [ast.arg(each) for each in names]
+        else:
+            tree.args = _with_first([*([own] if self._first else []), *names], tree.args)
+        tree = _located(tree, tree)
+        new_scope: dict[str, Any] = {}
+        compiled = ast.Module([copy.deepcopy(tree)], [])
+        exec(
+            compile(compiled, function.__code__.co_filename, "exec", dont_inherit=True),
+            scope,
+            new_scope,
+        )
+        copied: FunctionType = new_scope[tree.name]
+        copied.__qualname__ = function.__qualname__
+        _lifted[copied] = _Lifted(tree, functions, nested, self._owner, self._depth + 1)
+        return copied
 
     def _without_star(self, node: ast.Call) -> ast.Call:
         """Return a call with the elements of `*values`, if their number is known."""
@@ -349,12 +532,12 @@ class _Lifting(ast.NodeTransformer):
         """Return the object that a dotted name refers to in the module, or None."""
         if isinstance(node, ast.Attribute):
             owner = self._target(node.value)
-            return None if owner is None else getattr(owner, node.attr, None)
+            return None if owner is None else opened(getattr(owner, node.attr, None))
         if not isinstance(node, ast.Name) or node.id in self._variables | self._nested:
             return None
         builtins = self._outer.__globals__.get("__builtins__", {})
         known = builtins if isinstance(builtins, dict) else vars(builtins)
-        return self._outer.__globals__.get(node.id, known.get(node.id))
+        return opened(self._outer.__globals__.get(node.id, known.get(node.id)))
 
     def _reduced(self, node: ast.Call, target: Any) -> ast.AST | None:
         """Return the call of a loop for `sum(x for x in …)` and its like, or None."""
@@ -565,7 +748,6 @@ class _Lifting(ast.NodeTransformer):
         name = f"rtcf_{kind}_{node.lineno}_{node.col_offset}"
         tree = ast.FunctionDef(name, _arguments([]), body, [])
         tree = copy.deepcopy(_located(tree, node))
-        _Passing(self._known, self._mistake).visit(tree)
         names = self._taken(tree)
         tree.args = _arguments(names)
         self._add(name, ast.fix_missing_locations(tree), node)
@@ -719,37 +901,6 @@ class _Lifting(ast.NodeTransformer):
             for part in parts:
                 if isinstance(part, ast.Name) and part.id == name:
                     yield part
-
-
-class _Passing(ast.NodeTransformer):
-    """Passes variables in the calls of nested functions that a nested function makes."""
-
-    def __init__(self, known: Any, mistake: Any) -> None:
-        self._known, self._mistake = known, mistake
-        self._own: list[set[str]] = []
-
-    def visit(self, node: ast.AST) -> Any:
-        """Follow the scopes of nested functions."""
-        if not isinstance(node, ast.FunctionDef | ast.Lambda | ast.ListComp | ast.GeneratorExp):
-            return super().visit(node)
-        self._own.append(bound(node))
-        new = self.generic_visit(node)
-        self._own.pop()
-        return new
-
-    def visit_Call(self, node: ast.Call) -> ast.AST:
-        """Pass the variables of a nested function that is known outside."""
-        self.generic_visit(node)
-        own = set().union(*self._own)
-        if not isinstance(node.func, ast.Name) or node.func.id not in self._known:
-            return node
-        if node.func.id in own:
-            return node
-        for each in self._known[node.func.id][1]:
-            if each in own:
-                what = f"passes {each} of the function around it, and has a variable {each}"
-                raise self._mistake(node, what, "use two names")
-        return _passed(node, self._known, self._mistake)
 
 
 class _Named(ast.NodeTransformer):

@@ -1,4 +1,4 @@
-"""The source of a component: runs a module once in Python, and parses its functions to trees."""
+"""The source of a component: runs a module once in Python, and reads its functions."""
 
 import ast
 import hashlib
@@ -11,12 +11,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import FunctionType, ModuleType
-from typing import Any
 
 from rtcf.component import Component, DeclarationError
 
-from rtcf_compile.source import dependencies, lifting, numpy_errors, progress, spelling
+from rtcf_compile.source import dependencies, lifting, numpy_errors, progress
 from rtcf_compile.source.mistake import Mistake, source_line
+from rtcf_compile.source.parsed import parsed
 from rtcf_compile.source.prefix_map import mapped
 from rtcf_compile.source.scopes import everywhere
 
@@ -111,44 +111,8 @@ def _check_names(module: ModuleType, found: Sequence[type]) -> None:
 def read(function: FunctionType, is_whole: bool = False) -> Source:
     """Return the syntax tree of a function. `is_whole`: with the functions nested in it."""
     file = inspect.getsourcefile(function) or "?"
-    tree = lifting.tree_of(function) or _parsed(function, file)
-    spelling.normalise(tree, function)
+    tree = lifting.tree_of(function) or parsed(function)
     return Source(function, tree, file, {} if is_whole else lifting.lift(tree, function, file))
-
-
-def _parsed(function: FunctionType, file: str) -> ast.FunctionDef:
-    try:
-        lines, begin = inspect.getsourcelines(function)
-    except OSError:
-        raise Mistake(
-            file, 0, f"{function.__name__} has no source", "define it in a file"
-        ) from None
-    if lines[0][:1].isspace():
-        # Parse a method inside a block, which keeps its column numbers.
-        block = ast.parse("".join(["if True:\n", *lines])).body[0]
-        tree, above = block.body[0], 2  # type: ignore[attr-defined]
-    else:
-        tree, above = ast.parse("".join(lines)).body[0], 1
-    ast.increment_lineno(tree, begin - above)
-    if not isinstance(tree, ast.FunctionDef):
-        kind = "is async" if isinstance(tree, ast.AsyncFunctionDef) else "is a lambda"
-        raise Mistake(file, begin, f"{function.__name__} {kind}", "write it with `def`")
-    return tree
-
-
-def is_own(value: Any) -> bool:
-    """Tell whether a value is a Python function of the user, which must be compiled too."""
-    if not isinstance(value, FunctionType):
-        return False
-    return value.__module__ == "rtcf.linear" or is_of_user(value)
-
-
-def is_of_user(value: Any) -> bool:
-    """Tell whether a function or a class is in a module of the user."""
-    module = sys.modules.get(value.__module__ or "")
-    file = getattr(module, "__file__", None) or ""
-    packages = ("/dist-packages/", "/site-packages/", "/lib/python3")
-    return bool(file) and not any(each in file for each in packages)
 
 
 def _moved(error: ImportError) -> tuple[str, str] | None:

@@ -1,11 +1,15 @@
 """Different ways to write the same: replaced by one of them when a function is read.
 
-An f-string in a log call becomes a format with arguments, an argument that is given only by its
-name an ordinary one, and `x[...]` becomes `x[:]`. A name that is private to a class, `self.__x`,
-becomes the name that Python uses, `self._Observer__x`.
+A text with values in a log call, such as an f-string, becomes a format with arguments; such a fault
+becomes a log call and a fault. An argument that is given only by its name becomes an ordinary one,
+and `x[...]` becomes `x[:]`. A name that is private to a class, `self.__x`, becomes the name that
+Python uses, `self._Observer__x`.
 """
 
 import ast
+import re
+import string
+from collections.abc import Collection
 from types import FunctionType
 from typing import Any
 
@@ -65,25 +69,117 @@ class _Spelling(ast.NodeTransformer):
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
         self.generic_visit(node)
-        called = node.func
-        if (
-            isinstance(called, ast.Attribute)
-            and called.attr in LOG_LEVELS
-            and len(node.args) == 1
-            and isinstance(node.args[0], ast.JoinedStr)
-        ):
-            text, values = "", []
-            for part in node.args[0].values:
-                if isinstance(part, ast.Constant):
-                    text += str(part.value).replace("{", "{{").replace("}", "}}")
-                    continue
-                assert isinstance(part, ast.FormattedValue)
-                if part.conversion != -1 or not _is_constant(part.format_spec):
-                    return node  # rejected as an f-string
-                text += "{" + _specification(part.format_spec) + "}"
-                values.append(part.value)
-            node.args = [ast.copy_location(ast.Constant(text), node.args[0]), *values]
+        if not _is_of_levels(node.func, LOG_LEVELS) or len(node.args) != 1:
+            return node
+        if isinstance(node.args[0], ast.Constant) or (found := _text(node.args[0])) is None:
+            return node  # rejected unless it is a text
+        text, values = found
+        node.args = [ast.copy_location(ast.Constant(text), node.args[0]), *values]
         return node
+
+    def visit_Expr(self, node: ast.Expr) -> ast.AST | list[ast.stmt]:
+        self.generic_visit(node)
+        call = node.value
+        if not isinstance(call, ast.Call) or not _is_of_levels(call.func, ("fault",)):
+            return node
+        of = call.args[0] if len(call.args) == 1 and not call.keywords else None
+        found = None if of is None or isinstance(of, ast.Constant) else _text(of)
+        if found is None or of is None:
+            return node
+        text, values = found
+        assert isinstance(call.func, ast.Attribute)
+        error = ast.Attribute(call.func.value, "error", ast.Load())
+        log = ast.Call(error, [ast.Constant(text), *values], [])
+        call.args = [ast.copy_location(ast.Constant(_without_values(text)), of)]
+        before = ast.fix_missing_locations(ast.copy_location(ast.Expr(log), node))
+        for each in ast.walk(log):
+            ast.copy_location(each, each if hasattr(each, "lineno") else node)
+        return [before, node]
+
+
+def _is_of_levels(node: ast.expr, names: Collection[str]) -> bool:
+    return isinstance(node, ast.Attribute) and node.attr in names
+
+
+_PERCENT = re.compile(r"%(?:%|([-+ #0]*)(\d*)(\.\d+)?([diouxXeEfFgGs]))")
+
+
+def _text(node: ast.expr) -> tuple[str, list[ast.expr]] | None:
+    """Return the format and the values of a text that is built from others, or None."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        return _escaped(node.value), []
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
+        left, right = _text(node.left), _text(node.right)
+        return None if left is None or right is None else (left[0] + right[0], left[1] + right[1])
+    if isinstance(node, ast.JoinedStr):
+        return _of_parts(node)
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod):
+        return _of_percent(node)
+    if not isinstance(node, ast.Call) or node.keywords:
+        return None
+    if isinstance(node.func, ast.Name) and node.func.id == "str" and len(node.args) == 1:
+        return "{}", list(node.args)
+    if isinstance(node.func, ast.Attribute) and node.func.attr == "format":
+        of = node.func.value
+        if isinstance(of, ast.Constant) and isinstance(of.value, str):
+            return of.value, list(node.args)
+    return None
+
+
+def _escaped(text: str) -> str:
+    return text.replace("{", "{{").replace("}", "}}")
+
+
+def _of_parts(node: ast.JoinedStr) -> tuple[str, list[ast.expr]] | None:
+    """Return the format and the values of an f-string."""
+    text, values = "", []
+    for part in node.values:
+        if isinstance(part, ast.Constant):
+            text += _escaped(str(part.value))
+            continue
+        assert isinstance(part, ast.FormattedValue)
+        if part.conversion != -1 or not _is_constant(part.format_spec):
+            return None
+        text += "{" + _specification(part.format_spec) + "}"
+        values.append(part.value)
+    return text, values
+
+
+def _of_percent(node: ast.BinOp) -> tuple[str, list[ast.expr]] | None:
+    """Return the format and the values of `"%d of %d" % (k, n)`."""
+    of, given = node.left, node.right
+    values = given.elts if isinstance(given, ast.Tuple) else [given]
+    if not isinstance(of, ast.Constant) or not isinstance(of.value, str):
+        return None
+    text, place, count = "", 0, 0
+    for found in _PERCENT.finditer(of.value):
+        between = of.value[place : found.start()]
+        if "%" in between:
+            return None
+        text += _escaped(between) + ("%" if found[0] == "%%" else _placeholder(*found.groups()))
+        count += found[0] != "%%"
+        place = found.end()
+    rest = of.value[place:]
+    if "%" in rest or count != len(values):
+        return None
+    return text + _escaped(rest), list(values)
+
+
+def _placeholder(flags: str, width: str, precision: str | None, kind: str) -> str:
+    """Return `{:5.1f}` for `%5.1f`."""
+    sign = next((each for each in "+ " if each in flags), "")
+    align = "" if not width else "<" if "-" in flags else ">" if kind == "s" else ""
+    zeros = "0" if "0" in flags and "-" not in flags and width and kind != "s" else ""
+    form = {"i": "d", "u": "d", "s": ""}.get(kind, kind)
+    hashed = "#" if "#" in flags else ""
+    found = f"{align}{sign}{hashed}{zeros}{width}{precision or ''}{form}"
+    return f"{{:{found}}}" if found else "{}"
+
+
+def _without_values(text: str) -> str:
+    """Return a format with … for each value."""
+    parts = string.Formatter().parse(text)
+    return "".join(before + ("" if name is None else "…") for before, name, _, _ in parts)
 
 
 def _is_constant(specification: ast.expr | None) -> bool:

@@ -284,7 +284,6 @@ def test_a_full_disk_does_no_harm(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     cache.write("second", b"content")
     monkeypatch.undo()
     assert [each.name for each in (tmp_path / "kept").iterdir()] == ["first"]
-    assert Cache(tmp_path / "nowhere" / "\0").read("key") is None
     Cache(Path("/dev/null/kept")).write("key", b"content")
 
 

@@ -150,7 +150,7 @@ IN_UPDATE = {
         "a constant of the module",
     ),
     "number among rows": ("a = np.array([self.z, 1.0])", "an array of arrays and numbers"),
-    "new axis of a matrix": ("a = A[None]", "a new axis of a matrix"),
+    "new axis of a number": ("a = self.u.value[None]", "a new axis of a float"),
     "constant set by another name": ("a = A\n        a[0, 0] = 2.0", "a constant of the module"),
     "float set to a whole element": (
         "i = np.zeros(2, np.int64)\n        i[self.n] = 0.5",
