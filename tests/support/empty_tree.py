@@ -9,7 +9,7 @@ from pages import TREE
 def make_empty_tree(folder: Path) -> Path:
     """Copy what pytest reads in this tree to a folder; return it."""
     (folder / "tests" / "support").mkdir(parents=True)
-    plugins = ("failures_at_once", "random_share", "time_table")
+    plugins = ("failures_at_once", "forking", "random_share", "time_table")
     for name in ("conftest.py", *(f"support/{each}.py" for each in plugins)):
         shutil.copy(TREE / "tests" / name, folder / "tests" / name)
     shutil.copy(TREE / "pyproject.toml", folder)

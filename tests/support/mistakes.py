@@ -221,7 +221,7 @@ UPDATE: dict[str, tuple[str, str]] = {
     "trace of three dimensions": ("self.f = np.trace(self.s)", "3 dimensions"),
     "array as an index of three dimensions": ("a = self.s[[0, 1]]", "a whole mask"),
     "mask of rows of three dimensions": ("self.s[self.z > 0.0] = 0.0", "a whole mask"),
-    "new axis of a matrix": ("a = self.m[None]", "a new axis"),
+    "new axis of a number": ("a = self.f[None]", "a new axis"),
     "hstack of other heights": ("a = np.hstack((self.m, B))", "fit"),
     "ragged array": ("a = np.array([[1.0, 2.0], [3.0]])", "rows"),
     "ragged constant": ("a = np.array(POINTS)", "rows"),
@@ -469,7 +469,7 @@ UPDATE: dict[str, tuple[str, str]] = {
     "f-string": ("name = f'{self.f:.2f}'", "text"),
     "texts added": ("name = 'a' + 'b'\nself.info(name)  # here", "constant text"),
     "f-string in a log": ("self.info(f'f {self.f!r}')", "text"),
-    "percent in a log": ("self.info('f %f' % self.f)", "text"),
+    "percent without its value": ("self.info('f %f of %f' % self.f)", "text"),
     "log as logging has it": ("self.info('f %f', self.f)", "place"),
     "log of an array": ("self.info('z {}', self.z)", "array"),
     "log of text": ("self.info('mode {}', 'fast')", "text"),
@@ -547,10 +547,11 @@ UPDATE: dict[str, tuple[str, str]] = {
     "vars": ("a = vars(self)", "vars"),
     "id": ("a = id(self.z)", "id"),
     "next": ("a = next(self.z)", "next"),
-    "function that a function returns": (
-        "def scaled(share):\n    def scale(x):\n        return share * x  # here\n\n"
-        "    return scale\n\n\nhalved = scaled(0.5)\n---\nself.f = halved(self.f)",
-        "share is a variable of scaled: define scale in the module",
+    "function that counts": (
+        "def counter(count):\n    def counted(x):\n        nonlocal count  # here\n"
+        "        count += 1\n        return count * x\n\n"
+        "    return counted\n\n\ncounted = counter(0)\n---\nself.f = counted(self.f)",
+        "nonlocal is not compiled: declare a State",
     ),
     "function with an own decorator": (
         "@wrapped  # here\ndef halved(x):\n    return 0.5 * x\n---\nself.f = halved(self.f)",
@@ -606,7 +607,7 @@ UPDATE: dict[str, tuple[str, str]] = {
     "super without its call": ("super.update()", "super"),
     "update called": ("self.update()", "hook"),
     "fault with a value": ("self.fault('f is {}', self.f)", "constant text"),
-    "fault with a text made": ("self.fault(f'f is {self.f}')", "text"),
+    "fault with a text of a list": ("self.fault('lost ' + NAMES[self.n])", "text"),
     "fault as a value": ("a = self.fault('x')", "statement"),
     # Messages.
     "message's field misspelt": ("self.f = self.t.value.linear.X", "linear.X"),
@@ -646,9 +647,10 @@ UPDATE: dict[str, tuple[str, str]] = {
         "LAWS = {Mode.OFF: abs, Mode.RUN: math.sqrt}\n---\nself.f = LAWS[self.mode](self.f)",
         "numbers as values",
     ),
-    "nested function passed to a function": (
-        "def applied(rule, x):\n    return rule(x)\n---\ndef double(x):\n    return 2.0 * x\n"
-        "\nself.f = applied(double, self.f)  # here",
+    "nested function that a function keeps": (
+        "def applied(rule, x):\n    kept = rule  # here\n    return kept(x)\n---\n"
+        "def double(x):\n    return 2.0 * x\n"
+        "\nself.f = applied(double, self.f)",
         "function",
     ),
     "nested function with self": (

@@ -19,7 +19,7 @@ import numpy as np
 
 from rtcf.component.message_type import Leaf, MessageType, is_message, message_type
 from rtcf.component.ros_name import advice, is_member_name
-from rtcf.component.value_type import DeclarationError, ValueType, value_type
+from rtcf.component.value_type import DeclarationError, ValueType, number_of, value_type
 
 # Fields in the record of every component, in addition to those of its members; see own_field().
 TIME_FIELDS = {
@@ -480,16 +480,18 @@ def _a(kind: type) -> str:
 def _initial(declared: ValueType, given: Any) -> np.ndarray[Any, Any]:
     if given is None:
         if declared.enumeration:
-            given = next(each for each in declared.enumeration)
+            given = next(iter(declared.enumeration))
         else:
             return np.zeros(declared.shape, declared.scalar)
+    of_enum = declared.enumeration is not None and isinstance(given, declared.enumeration)
     try:
-        value = np.asarray(given)
+        value = np.asarray(number_of(given) if of_enum else given)
     except ValueError:
         raise DeclarationError("has rows of different lengths: make them equal") from None
     if value.dtype.kind in "USO":
         raise DeclarationError(f"is {_number(declared)}, not {given!r}: use a number")
-    if declared.enumeration and value not in list(declared.enumeration):
+    numbers = list(map(number_of, declared.enumeration or ()))
+    if declared.enumeration and (value.shape != () or value.item() not in numbers):
         names = ", ".join(each.name for each in declared.enumeration)
         enumeration = declared.enumeration.__name__
         raise DeclarationError(

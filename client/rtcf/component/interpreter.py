@@ -30,7 +30,7 @@ from rtcf.component.declaration import (
 )
 from rtcf.component.memory import Memory
 from rtcf.component.message_view import MessageView, checked, copy, named, put
-from rtcf.component.value_type import ValueType
+from rtcf.component.value_type import ValueType, number_of
 
 
 class Fault(Exception):
@@ -90,7 +90,7 @@ class _Value:
             if value is None:
                 return
         if self._member.type.enumeration:
-            value = self._member.type.enumeration(value)
+            value = number_of(self._member.type.enumeration(value))
         new = checked(value, self._member.type, self._member.name)
         if self._member.kind is Output:
             self._memory.set(self._member.name, new)

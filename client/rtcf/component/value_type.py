@@ -38,7 +38,7 @@ class ValueType:
 
     scalar: np.dtype[Any]
     shape: tuple[int, ...] = ()
-    enumeration: type[enum.IntEnum] | None = None
+    enumeration: type[enum.Enum] | None = None
     optional: bool = False  # the value may be None
 
     @property
@@ -99,25 +99,44 @@ def value_type(declared: Any) -> ValueType:
             )
     if len(sizes) > 3:
         raise DeclarationError(f"has {len(sizes)} dimensions: declare one to three sizes")
-    if isinstance(element, type) and issubclass(element, enum.IntEnum):
+    if isinstance(element, type) and issubclass(element, enum.Enum):
         if sizes:
             raise DeclarationError("is an array of enums: declare an array of np.int64")
         _check_members(element)
         return ValueType(np.dtype(np.int64), (), element)
-    if isinstance(element, type) and issubclass(element, enum.Enum):
-        raise DeclarationError(f"is an enum {element.__name__}: derive it from enum.IntEnum")
     result = ValueType(_scalar(element), tuple(sizes))
     if result.count > _LARGEST:
         raise DeclarationError(f"has {result.count} elements: declare at most {_LARGEST}")
     return result
 
 
-def _check_members(enumeration: type[enum.IntEnum]) -> None:
+def is_enum(kind: Any) -> bool:
+    """Tell whether a type is an enum of ints."""
+    return (
+        isinstance(kind, type)
+        and issubclass(kind, enum.Enum)
+        and not issubclass(kind, enum.Flag)
+        and all(type(each.value) is int for each in kind)
+    )
+
+
+def number_of(member: enum.Enum) -> int:
+    """Return the number that stands for a member of an enum in the loop."""
+    return int(member.value)
+
+
+def _check_members(enumeration: type[enum.Enum]) -> None:
     name, limits = enumeration.__name__, np.iinfo(np.int64)
     if not list(enumeration):
         raise DeclarationError(f"is an enum {name}, which has no members: write `IDLE = 0` in it")
+    if issubclass(enumeration, enum.Flag):
+        raise DeclarationError(f"is a set of flags {name}: declare an int, and write int(…)")
     for each in enumeration:
-        if not limits.min <= each <= limits.max:
+        if not isinstance(each.value, int) or isinstance(each.value, bool):
+            raise DeclarationError(
+                f"has {name}.{each.name} = {each.value!r}, which is no int: write an int or auto()"
+            )
+        if not limits.min <= each.value <= limits.max:
             raise DeclarationError(
                 f"has {name}.{each.name}, which does not fit 64 bits: use a smaller value"
             )
@@ -136,6 +155,6 @@ def _scalar(element: Any) -> np.dtype[Any]:
         raise DeclarationError("is an array without element type and size: write np.float64, 3")
     name = getattr(element, "__name__", repr(element))
     raise DeclarationError(
-        f"has the unsupported type {name}: use float, int, bool, an enum.IntEnum, or a NumPy type "
+        f"has the unsupported type {name}: use float, int, bool, an enum of ints, or a NumPy type "
         "with a size, such as np.float64, 3"
     )

@@ -32,6 +32,7 @@ from rtcf.component.declaration import (
 from rtcf.component.interpreter import QueuePort
 from rtcf.component.memory import Memory
 from rtcf.component.message_view import MessageView, checked, copy
+from rtcf.component.value_type import number_of
 
 from rtcf_compile.rewriting import operators
 from rtcf_compile.rewriting.common_rewriting import CommonRewriting, call_of, index_of, like, loaded
@@ -101,7 +102,7 @@ def _stored(record: Any, member: Member, value: Any) -> None:
     if member.type.optional:
         record[member.known] = value is not None
     if value is not None:
-        record[member.name] = value
+        record[member.name] = number_of(value) if isinstance(value, enum.Enum) else value
 
 
 class _In:
@@ -174,7 +175,7 @@ class _Out:
             for leaf in self._member.leaves:
                 record[self._name + leaf.field] = written[self._name + leaf.field]
         else:
-            record[self._name] = self.value
+            _stored(record, self._member, self.value)
 
 
 class _Queued:

@@ -30,7 +30,7 @@ from rtcf.component.declaration import (
     own_field,
 )
 from rtcf.component.interpreter import QueuePort, fresh_record
-from rtcf.component.value_type import ValueType
+from rtcf.component.value_type import ValueType, number_of
 
 from rtcf_compile.comparison.inside import Inside
 from rtcf_compile.comparison.model import Branch, Model
@@ -474,7 +474,7 @@ class _Values:
         if kind.is_bool:
             values = draw.random(shape) < 0.5
         elif kind.enumeration:
-            values = draw.choice([int(each) for each in kind.enumeration], shape)
+            values = draw.choice([number_of(each) for each in kind.enumeration], shape)
         elif kind.is_float:
             scale = 10.0 ** draw.integers(-3, 4, (shape[0], *(1 for _ in shape[1:])))
             values = draw.normal(0.0, 1.0, shape) * scale
@@ -496,7 +496,7 @@ def _parameters(record: Any, parameters: list[Member], draw: Any) -> None:
         if member.type.is_bool:
             record[member.name] = draw.random(member.type.shape) < 0.5
         elif member.type.enumeration:
-            record[member.name] = draw.choice([int(each) for each in member.type.enumeration])
+            record[member.name] = draw.choice([number_of(each) for each in member.type.enumeration])
         elif low is not None and high is not None and member.type.is_float:
             record[member.name] = draw.uniform(low, high, member.type.shape)
         elif low is not None and high is not None:

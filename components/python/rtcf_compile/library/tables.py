@@ -20,7 +20,7 @@ from rtcf.component.declaration import (
     own_field,
 )
 from rtcf.component.message_type import MessageType
-from rtcf.component.value_type import ValueType
+from rtcf.component.value_type import ValueType, number_of
 
 from rtcf_compile.library import log_text, messages
 from rtcf_compile.library.llvm_data import NULL, Data, Value, pointer_to
@@ -208,10 +208,12 @@ class _Library:
         bounds = [options.get(each) for each in ("min", "max")]
         enumeration = member.type.enumeration
         # Aliases follow the canonical names.
-        named: dict[str, enum.IntEnum] = {}
+        named: dict[str, enum.Enum] = {}
         if enumeration:
             named = {each.name: each for each in enumeration} | dict(enumeration.__members__)
-        table = self._array([self.data.struct(name, int(each)) for name, each in named.items()])
+        table = self._array(
+            [self.data.struct(name, number_of(each)) for name, each in named.items()]
+        )
         return [
             self.data.struct(
                 name,

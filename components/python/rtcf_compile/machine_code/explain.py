@@ -24,6 +24,7 @@ _OPERATORS = {
     **{"eq": "==", "ne": "!=", "lt": "<", "le": "<=", "gt": ">", "ge": ">=", "is_": "is"},
     **{"neg": "-", "pos": "+", "invert": "~", "not_": "not", "contains": "in"},
 }
+_ENUM = "compare it with its members by == or is, or write .value"
 _COMPLEX = "use abs(z), z.real or z.imag, or a function of cmath"
 _BITS = ("&", "|", "^", "<<", ">>", "~")
 # The names of functions in the source, by the helpers that replace them.
@@ -67,7 +68,7 @@ _KNOWN: tuple[tuple[str, str, str], ...] = (
         "write 1e-9 * … for seconds",
     ),
     (
-        r"Unknown attribute '(\w+)' of type (IntEnum[^\n]*)",
+        r"Unknown attribute '(\w+)' of type ((?:Int)?Enum[^\n]*)",
         "methods of an enum are not compiled",
         "write a function of the module, called with the enum",
     ),
@@ -206,6 +207,8 @@ def _no_implementation(name: str, arguments: list[str], source: str) -> tuple[st
     short = name.rpartition(".")[2]
     if short in ("zeros", "ones", "empty", "full", "eye", "identity", "arange"):
         return f"{name} of {of}", "convert its sizes to ints: int(…)"
+    if any(each.startswith("an enum ") for each in kinds):
+        return f"{name} of {of}", _ENUM
     remedy = "give it an array or a tuple" if short in ("len", "sum", "min", "max") else ""
     if short in ("min", "max") and len(kinds) > 1:
         remedy = f"use np.{short}imum for elements, np.{short} for one array"
@@ -220,6 +223,8 @@ def _operator(operator: str, kinds: list[str]) -> tuple[str, str]:
         return joined, "use numbers: the cycle cannot build text"
     if "a complex number" in kinds:
         return joined, _COMPLEX
+    if any(each.startswith("an enum ") for each in kinds):
+        return joined, _ENUM
     if "a list or tuple" in kinds:
         return joined, "make it an array: np.array([…])"
     if operator == "not":
@@ -269,8 +274,10 @@ def kind_of(text: str) -> str:
         return _array(found[1], int(found[2]))
     if found := re.match(r"nestedarray\((\w+), \(([\d, ]+?),?\)\)", text):
         return _array(found[1], found[2].count(",") + 1)
-    if found := re.match(r"IntEnum class<\w+>?\((\w+)", text):
+    if found := re.match(r"(?:Int)?Enum class<\w+>?\((\w+)", text):
         return f"the enum {found[1]}"
+    if found := re.match(r"Enum<\w+>?\((\w+)", text):
+        return f"an enum {found[1]}"
     if found := re.match(r"IntEnum<\w+>?\((\w+)", text):
         return f"a {found[1]}"
     if re.match(r"(?:Uni)?Tuple\(", text):

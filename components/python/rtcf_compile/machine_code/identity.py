@@ -154,7 +154,7 @@ class Descriptions:
                 for field, each in kind.fields.items()
             ]
             return name, fields, kind.size, kind.aligned
-        if cls in (types.IntEnumClass, types.IntEnumMember):
+        if cls in (types.IntEnumClass, types.IntEnumMember, types.EnumClass, types.EnumMember):
             return name, self.of(kind.instance_class), self.type(kind.dtype)
         if cls is types.Function:
             return name, self.of(kind.typing_key)
@@ -198,10 +198,10 @@ class Descriptions:
             return "module", value.__name__
         if isinstance(value, np.ufunc) and getattr(np, value.__name__, None) is value:
             return "ufunc", value.__name__
-        if isinstance(value, enum.IntEnum):
+        if isinstance(value, enum.Enum):
             return "member", self.of(cls), value.name
-        if isinstance(value, type) and issubclass(value, enum.IntEnum):
-            members = [(each, int(member)) for each, member in value.__members__.items()]
+        if isinstance(value, type) and issubclass(value, enum.Enum):
+            members = [(each, member.value) for each, member in value.__members__.items()]
             return "enum", value.__module__, value.__qualname__, members
         if callable(value) and _is_named(value):
             return "named", value.__module__, value.__qualname__

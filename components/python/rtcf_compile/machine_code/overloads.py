@@ -1,5 +1,6 @@
 """The numba overloads of the helpers. Import this only to compile: it imports numba."""
 
+import enum
 import functools
 import inspect
 import math
@@ -13,6 +14,7 @@ from numba.core import cgutils, imputils
 from numba.core.errors import TypingError
 from numba.extending import intrinsic, lower_builtin, lower_cast, overload, register_jitable
 from numba.np.numpy_support import as_dtype
+from rtcf.component.value_type import number_of
 
 from rtcf_compile.machine_code import backend
 from rtcf_compile.machine_code.explain import NAMES, kind_of
@@ -126,7 +128,9 @@ def _enum_to_float(context, builder, kind, wanted, value):  # type: ignore[no-un
 @intrinsic
 def _member(typing, value, cls):  # type: ignore[no-untyped-def]
     """Return the member of an enum with a value."""
-    result = types.IntEnumMember(cls.instance_class, types.int64)
+    is_int = issubclass(cls.instance_class, enum.IntEnum)
+    kind = types.IntEnumMember if is_int else types.EnumMember
+    result = kind(cls.instance_class, types.int64)
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         return context.cast(builder, arguments[0], value, types.int64)
@@ -135,6 +139,7 @@ def _member(typing, value, cls):  # type: ignore[no-untyped-def]
 
 
 @lower_builtin(operator.is_, types.Optional, types.IntEnumMember)
+@lower_builtin(operator.is_, types.Optional, types.EnumMember)
 def _maybe_is(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
     """`x is Mode.RUN` for an optional value."""
     optional, member = signature.args
@@ -153,7 +158,7 @@ def _member_of(value: Any, cls: Any) -> Any:
 @compiled_as(helpers.rtcf_enum)
 def _enum(value: Any, cls: Any) -> Any:
     enumeration = cls.instance_class
-    if isinstance(value, types.IntEnumMember):
+    if isinstance(value, types.EnumMember):
         if value.instance_class is not enumeration:
             raise TypingError(
                 f"RTCF:{value.instance_class.__name__} is not {enumeration.__name__}:"
@@ -161,12 +166,8 @@ def _enum(value: Any, cls: Any) -> Any:
             )
         return lambda value, cls: value
     if not isinstance(value, types.Integer):
-        first = next(iter(enumeration))
-        raise TypingError(
-            f"RTCF:{words(value)} is not a {enumeration.__name__}:"
-            f"give it a member, such as {enumeration.__name__}.{first.name}"
-        )
-    test = " or ".join(f"value == {int(each)}" for each in enumeration)
+        raise _no_member(value, enumeration)
+    test = " or ".join(f"value == {number_of(each)}" for each in enumeration)
     text = f"""\
 def checked(value, cls):
     if {test}:
@@ -176,6 +177,20 @@ def checked(value, cls):
     scope: dict[str, Any] = {"member": _member}
     exec(text, scope)
     return scope["checked"]
+
+
+def _no_member(value: Any, enumeration: Any) -> TypingError:
+    name, first = enumeration.__name__, next(iter(enumeration))
+    return TypingError(
+        f"RTCF:{words(value)} is not a {name}:give it a member, such as {name}.{first.name}"
+    )
+
+
+@compiled_as(helpers.rtcf_stored_enum)
+def _stored_enum(value: Any, cls: Any) -> Any:
+    if not isinstance(value, types.EnumMember) and not issubclass(cls.instance_class, enum.IntEnum):
+        raise _no_member(value, cls.instance_class)
+    return lambda value, cls: helpers.rtcf_enum(value, cls)
 
 
 @compiled_as(helpers.rtcf_is)
@@ -284,7 +299,7 @@ def _array_of(value: Any, count: Any) -> Any:
 
 
 def _check_table(values: Any, key: Any) -> None:
-    if not isinstance(key, types.Integer | types.Boolean | types.IntEnumMember):
+    if not isinstance(key, types.Integer | types.Boolean | types.EnumMember):
         raise TypingError(f"RTCF:a key of a dict is {words(key)}:give it an int or an enum")
     numbers = types.Number | types.Boolean | types.IntEnumMember
     if not isinstance(values, types.UniTuple) or not isinstance(values.dtype, numbers):
@@ -296,7 +311,7 @@ def _looked_up_or(keys: Any, values: Any, key: Any, default: Any) -> Any:
     _check_table(values, key)
 
     def look(keys: Any, values: Any, key: Any, default: Any) -> Any:
-        number = helpers.rtcf_int(key)
+        number = helpers.rtcf_number(key)
         for place in range(len(keys)):
             if keys[place] == number:
                 return values[place]
@@ -310,7 +325,7 @@ def _looked_up(keys: Any, values: Any, key: Any) -> Any:
     _check_table(values, key)
 
     def look(keys: Any, values: Any, key: Any) -> Any:
-        number = helpers.rtcf_int(key)
+        number = helpers.rtcf_number(key)
         for place in range(len(keys)):
             if keys[place] == number:
                 return values[place]
@@ -368,13 +383,21 @@ def _complex(value: Any) -> Any:
     raise TypingError(f"RTCF:a complex number is set to {words(value)}:give it a number")
 
 
+@compiled_as(helpers.rtcf_number)
+def _number(value: Any) -> Any:
+    if isinstance(value, types.EnumMember):
+        return lambda value: value.value
+    return lambda value: helpers.rtcf_int(value)
+
+
 @compiled_as(helpers.rtcf_int)
 def _int(value: Any) -> Any:
     if isinstance(value, types.IntEnumMember):
         return lambda value: value.value
     if isinstance(value, types.Integer):
         return lambda value: value
-    raise TypingError(f"RTCF:a whole number is set to {words(value)}:convert it with int(…)")
+    remedy = "write .value" if isinstance(value, types.EnumMember) else "convert it with int(…)"
+    raise TypingError(f"RTCF:a whole number is set to {words(value)}:{remedy}")
 
 
 @compiled_as(helpers.rtcf_bool)
@@ -1764,6 +1787,8 @@ def words(value: Any) -> str:
         return "a list or tuple"
     if isinstance(value, types.IntEnumMember):
         return f"a {value.instance_class.__name__}"
+    if isinstance(value, types.EnumMember):
+        return f"an enum {value.instance_class.__name__}"
     if isinstance(value, types.Optional):
         return f"{words(value.type)} or None"
     return kind_of(str(value))

@@ -10,7 +10,7 @@ import numpy as np
 from rtcf.component import Component
 from rtcf.component.declaration import Description, Input, Member, Queue, describe
 from rtcf.component.interpreter import record_of
-from rtcf.component.value_type import ValueType
+from rtcf.component.value_type import ValueType, number_of
 
 from rtcf_compile.source import numpy_errors
 from rtcf_compile.source.mistake import Mistake, source_line
@@ -59,7 +59,7 @@ def _draw(record: Any, member: Member, draw: Any, cycle: int) -> None:
 
 def _value(kind: ValueType, draw: Any, cycle: int) -> Any:
     if kind.enumeration:
-        return draw.choice([int(each) for each in kind.enumeration])
+        return draw.choice([number_of(each) for each in kind.enumeration])
     value = draw.normal(0.0, 10.0 ** (cycle % 4), kind.shape)
     if kind.is_bool:
         value = value > 0

@@ -14,8 +14,9 @@ from types import ModuleType, SimpleNamespace
 from typing import Any, TypeVar
 
 import numpy as np
+from rtcf.component.value_type import is_enum
 
-from rtcf_compile.rewriting import math_functions, numpy_functions, operators
+from rtcf_compile.rewriting import helpers, math_functions, numpy_functions, operators
 from rtcf_compile.rewriting.helpers import IN_PLACE, INSTEAD, OF_LISTS, rtcf_round, rtcf_round_to
 from rtcf_compile.rewriting.references import is_copied, is_ellipsis, is_new_axis
 from rtcf_compile.rewriting.subscripts import Subscripts
@@ -73,7 +74,10 @@ class CommonRewriting(ast.NodeTransformer):
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
         """Rewrite `GAINS.kp` of a dataclass of constants, `Mode.RUN` of an enum."""
         owner = resolve(node.value, self.source)
-        if isinstance(member := resolve(node, self.source), enum.IntEnum):
+        member = resolve(node, self.source)
+        if isinstance(member, enum.IntFlag):
+            return like(node, ast.Constant(int(member)))
+        if is_enum(type(member)):
             return like(node, ast.Attribute(self._enum(type(member)), member.name, ast.Load()))
         if node.attr == "name" and (isinstance(owner, enum.Enum) or self._is_enum(node.value)):
             raise self.mistake(
@@ -103,7 +107,7 @@ class CommonRewriting(ast.NodeTransformer):
             name, number = f"{plain}_{number}", number + 1
         return name
 
-    def _enum(self, cls: type[enum.IntEnum]) -> ast.expr:
+    def _enum(self, cls: type[enum.Enum]) -> ast.expr:
         """Return an enum class as a constant."""
         name, number = f"rtcf_enum_{cls.__name__}", 0
         while self.constants.setdefault(name, cls) is not cls:
@@ -300,8 +304,8 @@ class CommonRewriting(ast.NodeTransformer):
         """Rewrite `x in (1, 2)`, `key in LIMITS` of a dict, and comparisons with lists."""
         contained = node.comparators[0]
         table = resolve(contained, self.source)
-        if isinstance(table, dict) and table and all(isinstance(each, int) for each in table):
-            keys: list[ast.expr] = [ast.Constant(int(each)) for each in table]
+        if isinstance(table, dict) and table and _has_number_keys(table):
+            keys = [self._number_key(each) for each in table]
             contained = like(contained, ast.Tuple(keys, ast.Load()))
         if (
             len(node.ops) == 1
@@ -331,6 +335,11 @@ class CommonRewriting(ast.NodeTransformer):
             compare = _OPERATORS[type(node.ops[0])].__name__
             return like(node, call_of(compare, node.left, node.comparators[0]))
         return node
+
+    def _number_key(self, key: Any) -> ast.expr:
+        if isinstance(key, enum.Enum):
+            return ast.Attribute(self._enum(type(key)), key.name, ast.Load())
+        return ast.Constant(int(key))
 
     def _may_be_none(self, node: ast.expr) -> bool:
         """Tell whether a comparison must check for None: a variable that is a parameter, or is set
@@ -524,7 +533,7 @@ class CommonRewriting(ast.NodeTransformer):
                 return like(node, call_of("rtcf_matmul", self.visit(node.func.value), *arguments))
             if node.func.attr in numpy_functions.METHODS:
                 return self._method(node, node.func)
-        if isinstance(target, type) and issubclass(target, enum.IntEnum) and len(node.args) == 1:
+        if is_enum(target) and len(node.args) == 1:
             return like(node, call_of("rtcf_enum", self.visit(node.args[0]), self._enum(target)))
         self._typed(node, target)
         if self._bytes(node, target) > ARENA - 64:
@@ -709,7 +718,7 @@ class CommonRewriting(ast.NodeTransformer):
                 raise self.mistake(node, what, f"use one of {keys}")
             return self._named_constant(node, table[node.slice.value])
         parts = self._table(node, name, table)
-        return like(node, call_of("rtcf_looked_up", *parts, self.visit(node.slice)))
+        return like(node, call_of("rtcf_looked_up", *parts, self._key(node.slice, table)))
 
     def _looked_up_or(self, node: ast.Call, of: ast.expr, table: dict[Any, Any]) -> ast.AST:
         """Rewrite `SPEEDS.get(key, default)` of a dict of the module."""
@@ -719,17 +728,22 @@ class CommonRewriting(ast.NodeTransformer):
                 return self.visit(default)  # type: ignore[no-any-return]
             element = like(node, ast.Subscript(of, key, ast.Load()))
             return self._named_constant(element, table[key.value])
-        parts = [*self._table(node, ast.unparse(of), table), self.visit(key), self.visit(default)]
-        return like(node, call_of("rtcf_looked_up_or", *parts))
+        parts = [*self._table(node, ast.unparse(of), table), self._key(key, table)]
+        return like(node, call_of("rtcf_looked_up_or", *parts, self.visit(default)))
+
+    def _key(self, node: ast.expr, table: dict[Any, Any]) -> ast.expr:
+        """Return a key for a dict; ints are no keys of a dict of enums that are no ints."""
+        cls, key = type(next(iter(table))), self.visit(node)
+        return call_of("rtcf_stored_enum", key, self._enum(cls)) if is_enum(cls) else key
 
     def _table(self, node: ast.expr, name: str, table: dict[Any, Any]) -> list[ast.expr]:
         """Return the keys and values of a dict of numbers as constants."""
-        numbers = all(isinstance(each, int) for each in table)
-        if not numbers or not all(isinstance(each, int | float) for each in table.values()):
+        numbers = all(isinstance(each, int | float) for each in table.values())
+        if not numbers or not _has_number_keys(table):
             remedy = "use ints or enums as keys, and numbers as values"
             raise self.mistake(node, f"{name} is a dict with other keys or values", remedy)
         keys, values = (self._name_for(table, f"{name} {each}") for each in ("keys", "values"))
-        self.constants[keys] = tuple(map(int, table))
+        self.constants[keys] = tuple(map(helpers.rtcf_number, table))
         kind = int if all(isinstance(each, int) for each in table.values()) else float
         self.constants[values] = tuple(map(kind, table.values()))
         return [ast.Name(each, ast.Load()) for each in (keys, values)]
@@ -1002,6 +1016,13 @@ class CommonRewriting(ast.NodeTransformer):
             and isinstance(node.value, ast.Name)
             and node.value.id == "self"
         )
+
+
+def _has_number_keys(table: dict[Any, Any]) -> bool:
+    """Tell whether the keys of a dict are ints, or members of one enum."""
+    kinds = {type(each) for each in table}
+    ints = all(isinstance(each, int) for each in table)
+    return ints or (len(kinds) == 1 and is_enum(kinds.pop()))
 
 
 def _is_namespace(value: Any) -> bool:

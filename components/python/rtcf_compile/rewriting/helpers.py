@@ -9,6 +9,7 @@ lists for it.
 import ast
 import builtins
 import cmath
+import enum
 import math
 import operator
 from collections.abc import Callable
@@ -269,8 +270,13 @@ def rtcf_complex(value: Any) -> Any:
 
 
 def rtcf_int(value: Any) -> Any:
-    """Return an int or an enum as an int."""
+    """Return an int or an enum of ints as an int."""
     return int(value)
+
+
+def rtcf_number(value: Any) -> Any:
+    """Return the number that stands for a member of an enum; ints as they are."""
+    return int(value.value if isinstance(value, enum.Enum) else value)
 
 
 def rtcf_bool(value: Any) -> Any:
@@ -306,7 +312,7 @@ def rtcf_array_of(value: Any, count: Any) -> Any:
 def rtcf_looked_up(keys: Any, values: Any, key: Any) -> Any:
     """Return an element of a dict of numbers."""
     for number in range(len(keys)):
-        if keys[number] == key:
+        if keys[number] == rtcf_number(key):
             return values[number]
     raise KeyError("no such key")
 
@@ -314,7 +320,7 @@ def rtcf_looked_up(keys: Any, values: Any, key: Any) -> Any:
 def rtcf_looked_up_or(keys: Any, values: Any, key: Any, default: Any) -> Any:
     """Return an element of a dict of numbers, or a default."""
     for number in range(len(keys)):
-        if keys[number] == key:
+        if keys[number] == rtcf_number(key):
             return values[number]
     return default
 
@@ -350,6 +356,15 @@ def rtcf_equal(a: Any, b: Any) -> Any:
 
 def rtcf_enum(value: Any, cls: Any) -> Any:
     """Return the member of an enum with a value; ValueError if there is none."""
+    return cls(value)
+
+
+def rtcf_stored_enum(value: Any, cls: Any) -> Any:
+    """Return a member of an enum, which a member of the component is set to; or of an int that
+    equals it.
+    """
+    if not isinstance(value, cls) and not issubclass(cls, enum.IntEnum):
+        raise TypeError(f"{value!r} is not a {cls.__name__}")
     return cls(value)
 
 
@@ -469,6 +484,7 @@ BY_NAME = {
             rtcf_set,
             rtcf_float,
             rtcf_int,
+            rtcf_number,
             rtcf_bool,
             rtcf_complex,
         ),
@@ -484,6 +500,7 @@ BY_NAME = {
             rtcf_is_known,
             rtcf_or_old,
             rtcf_enum,
+            rtcf_stored_enum,
             rtcf_member,
             rtcf_is,
         ),

@@ -51,6 +51,8 @@ def _typed(number: int, given: tuple[Any, ...]) -> tuple[Any, Any]:
         elif isinstance(each, types.Float):
             passed.append(types.float64)
         else:
+            if isinstance(each, types.EnumMember):
+                raise TypingError("RTCF:a log call stores numbers and bools:write .name, or .value")
             raise TypingError(
                 f"RTCF:a log call stores numbers and bools, not {_kind(each)}:"
                 "log each element, and write text into the constant text"

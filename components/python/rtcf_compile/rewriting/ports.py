@@ -18,7 +18,7 @@ from rtcf.component.declaration import (
     own_field,
 )
 from rtcf.component.message_type import MessageType
-from rtcf.component.value_type import ValueType
+from rtcf.component.value_type import ValueType, is_enum
 
 from rtcf_compile.rewriting.common_rewriting import CommonRewriting, call_of, like, loaded
 from rtcf_compile.rewriting.operators import is_narrow
@@ -42,9 +42,7 @@ class Ports(CommonRewriting):
         self._arguments = {
             each.arg: kind
             for each in source.tree.args.args
-            if each.annotation is not None
-            and isinstance(kind := resolve(each.annotation, source), type)
-            and issubclass(kind, enum.IntEnum)
+            if each.annotation is not None and is_enum(kind := resolve(each.annotation, source))
         }
         super().__init__(source, functions)
         self.used: set[str] = set()
@@ -65,7 +63,7 @@ class Ports(CommonRewriting):
             if member is not None and member.type.shape and is_value == (member.kind in PORTS):
                 check_index(node, member.type.shape, ast.unparse(base), self.source.file)
 
-    def _enum_of(self, node: ast.expr) -> type[enum.IntEnum] | None:
+    def _enum_of(self, node: ast.expr) -> type[enum.Enum] | None:
         """Return the declared enum of a member, of the value of a port, or of an argument with an
         annotation; None for others.
         """

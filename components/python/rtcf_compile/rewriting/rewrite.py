@@ -31,7 +31,7 @@ from rtcf.component.declaration import (
     private_name,
     written_name,
 )
-from rtcf.component.value_type import ValueType
+from rtcf.component.value_type import ValueType, number_of
 
 from rtcf_compile.rewriting.common_rewriting import call_of, changed_elements, like, loaded
 from rtcf_compile.rewriting.logs import Logs, with_name
@@ -286,7 +286,8 @@ class Hook(Ports):
                 if new is None:
                     raise self.mistake(call, "the name of an enum needs a plain {}", "write {}")
                 own = like(node, ast.Call(call.func, [ast.Constant(new), *rest], []))
-                test = ast.Compare(each.value, [ast.Eq()], [ast.Constant(int(member))])
+                value = ast.Attribute(each.value, "value", ast.Load())
+                test = ast.Compare(value, [ast.Eq()], [ast.Constant(number_of(member))])
                 statement = like(node, ast.Expr(copy.deepcopy(own)))
                 result = [like(node, ast.If(copy.deepcopy(test), [statement], result))]
             return result[0]
@@ -550,8 +551,8 @@ class Hook(Ports):
             call = call_of("rtcf_store", self._read(name, kind), value)
             return like(node, ast.Expr(call))
         if kind.enumeration:
-            member = call_of("rtcf_enum", value, self._enum(kind.enumeration))
-            return like(node, ast.Assign([self._field(name)], call_of("rtcf_int", member)))
+            member = call_of("rtcf_stored_enum", value, self._enum(kind.enumeration))
+            return like(node, ast.Assign([self._field(name)], call_of("rtcf_number", member)))
         of = {"f": "float", "b": "bool", "c": "complex"}.get(kind.scalar.kind, "int")
         convert = f"rtcf_{of}"
         return like(node, ast.Assign([self._field(name)], call_of(convert, value)))

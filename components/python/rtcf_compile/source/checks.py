@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 from rtcf.component.declaration import Declarable
+from rtcf.component.value_type import is_enum
 
 from rtcf_compile.source.assigned import check_assigned
 from rtcf_compile.source.mistake import Mistake, Mistakes, at, once
@@ -381,7 +382,7 @@ def _called(node: ast.Call, target: Any, source: Source) -> None:
         if hasattr(target, "_md5sum"):
             remedy = "set the fields of an Output: self.port.value.x = 1.0"
             raise at(file, node, "only an Output makes messages", remedy)
-        if issubclass(target, enum.Enum) and not issubclass(target, enum.IntEnum):
+        if issubclass(target, enum.Enum) and not is_enum(target):
             raise at(file, node, f"{name} is not an enum of ints", "derive it from enum.IntEnum")
     root = (getattr(target, "__module__", None) or "numpy").partition(".")[0]
     if target in (max, min) and any(each.arg == "key" for each in node.keywords):

@@ -642,7 +642,7 @@ class _Lifting(ast.NodeTransformer):
             name = ast.unparse(values)
             raise self._mistake(node, f"{name} has no {given[0].value!r}", f"use one of {has}")
         keys = [
-            ast.Call(_name("rtcf_int"), [copy.deepcopy(each)], []) for each in table.keys if each
+            ast.Call(_name("rtcf_number"), [copy.deepcopy(each)], []) for each in table.keys if each
         ]
         function = "rtcf_looked_up" if len(given) == 1 else "rtcf_looked_up_or"
         parts = [ast.Tuple(keys, ast.Load()), values, *(self.visit(each) for each in given)]

@@ -13,12 +13,18 @@ from collections.abc import Collection
 from types import FunctionType
 from typing import Any
 
+from rtcf.component import Component
 from rtcf.component.declaration import LOG_LEVELS
 
 
 def normalise(tree: ast.AST, function: FunctionType) -> None:
     """Change the tree of a function in place."""
-    _Spelling(_class_of(function)).visit(tree)
+    owner = _class_of(function)
+    cls = function.__globals__.get(owner)
+    # A method of the user hides a level.
+    levels = [each for each in ("error", "fatal", "warn")
+              if getattr(cls, each, None) is getattr(Component, each)]  # fmt: skip
+    _Spelling(owner, levels[0] if levels else "error").visit(tree)
 
 
 def _class_of(function: FunctionType) -> str:
@@ -41,7 +47,8 @@ _NAMES: dict[type[ast.AST], str] = {
 
 
 class _Spelling(ast.NodeTransformer):
-    def __init__(self, owner: str) -> None:
+    def __init__(self, owner: str, level: str) -> None:
+        self._level = level
         self._prefix = f"_{owner.lstrip('_')}" if owner.strip("_") else ""
 
     def visit(self, node: ast.AST) -> Any:
@@ -88,7 +95,7 @@ class _Spelling(ast.NodeTransformer):
             return node
         text, values = found
         assert isinstance(call.func, ast.Attribute)
-        error = ast.Attribute(call.func.value, "error", ast.Load())
+        error = ast.Attribute(call.func.value, self._level, ast.Load())
         log = ast.Call(error, [ast.Constant(text), *values], [])
         call.args = [ast.copy_location(ast.Constant(_without_values(text)), of)]
         before = ast.fix_missing_locations(ast.copy_location(ast.Expr(log), node))

@@ -1,5 +1,6 @@
 """Ordinary ways to write Python in a component: they are accepted, and mean what Python means."""
 
+import ast
 import random
 from pathlib import Path
 from typing import Any
@@ -71,6 +72,14 @@ WAYS = {
     "infinity as text": "self.y.write(min(float('inf'), max(self.u.value, float('-inf'))))",
     "all elements": "self.a[...] = 0; self.a[0] = self.u.value; self.m[...] = self.u.value",
     "f-string in a log": 'self.info(f"u {{self.u.value:.3f}} {{{{}}}} {{self.mode.name}}")',
+    "percent in a log": 'self.info("u %5.2f of %d, %s, 100 %%" % (self.u.value, self.i.value, 1))',
+    "texts joined in a log": 'self.warn("u = " + str(self.u.value) + " {{}} m")',
+    "format in a log": 'self.warn("u {{:.3f}} of {{}}".format(self.u.value, self.i.value))',
+    "fault with values": """
+        if self.u.value > 2.0:
+            self.fault(f"u is {{self.u.value:.1f}} in {{self.i.value}}")""",
+    "key in a dict": "self.y.write(1.0 if self.mode in SPEEDS else 0.0)",
+    "int in a dict": "self.y.write(1.0 if self.i.value not in SPEEDS else 0.0)",
     "unsigned default": "self.crc = np.uint32(self.i.value & 255); self.k.write(int(self.crc))",
     "round to digits": "self.y.write(round(self.u.value, 2))",
     "remainder": "self.y.write(math.remainder(self.u.value, 2.0 * math.pi))",
@@ -93,6 +102,28 @@ def test_it_is_accepted_and_means_what_python_means(way: str, tmp_path: Path) ->
     found = verify.compare(cls, object_file.compile_component(cls), 400)
     assert found.differences == []
     assert found.raised < 100
+
+
+def test_texts_with_values_are_logged_as_written(tmp_path: Path) -> None:
+    texts = {
+        "'%5.2f|%-6d|%+d|%04d|%x|%s|%5s|%%|{{}}' % (1.5, 2, 3, 4, 255, 6.25, 7)": 7,
+        "'a' + str(1.5) + 'b{{}}' + str(2)": 2,
+        "'{{:.3f}} {{}}'.format(1.5, 2)": 2,
+        "f'{{1.5:8.3f}} {{2}} {{{{x}}}}'": 2,
+    }
+    body = "\n        ".join(f"self.info({text})" for text in texts)
+    file = tmp_path / "texts.py"
+    file.write_text(HEAD.format(helper="math", text=body.replace("{{", "{").replace("}}", "}")))
+    (cls,) = modules.components(modules.load(file))
+    tree = modules.read(cls.update).tree
+    calls = [each.value for each in tree.body if isinstance(each, ast.Expr)]
+    logged = []
+    for call in calls:
+        assert isinstance(call, ast.Call)
+        text, *values = map(ast.literal_eval, call.args)
+        logged.append(text.format(*values))
+    assert logged == [eval(text.replace("{{", "{").replace("}}", "}")) for text in texts]
+    assert [len(each.args) - 1 for each in calls] == list(texts.values())  # type: ignore[attr-defined]
 
 
 def test_floats_are_rounded_to_digits_as_in_python(tmp_path: Path) -> None:
