@@ -480,7 +480,7 @@ def _a(kind: type) -> str:
 def _initial(declared: ValueType, given: Any) -> np.ndarray[Any, Any]:
     if given is None:
         if declared.enumeration:
-            given = next(iter(declared.enumeration))
+            given = next(each for each in declared.enumeration)
         else:
             return np.zeros(declared.shape, declared.scalar)
     of_enum = declared.enumeration is not None and isinstance(given, declared.enumeration)

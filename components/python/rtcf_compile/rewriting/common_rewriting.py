@@ -733,7 +733,8 @@ class CommonRewriting(ast.NodeTransformer):
 
     def _key(self, node: ast.expr, table: dict[Any, Any]) -> ast.expr:
         """Return a key for a dict; ints are no keys of a dict of enums that are no ints."""
-        cls, key = type(next(iter(table))), self.visit(node)
+        cls = type(next(iter(table)))
+        key: ast.expr = self.visit(node)
         return call_of("rtcf_stored_enum", key, self._enum(cls)) if is_enum(cls) else key
 
     def _table(self, node: ast.expr, name: str, table: dict[Any, Any]) -> list[ast.expr]:
