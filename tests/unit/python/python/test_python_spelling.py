@@ -115,7 +115,8 @@ def test_texts_with_values_are_logged_as_written(tmp_path: Path) -> None:
     file = tmp_path / "texts.py"
     file.write_text(HEAD.format(helper="math", text=body.replace("{{", "{").replace("}}", "}")))
     (cls,) = modules.components(modules.load(file))
-    tree = modules.read(cls.update).tree
+    update: Any = cls.update
+    tree = modules.read(update).tree
     calls = [each.value for each in tree.body if isinstance(each, ast.Expr)]
     logged = []
     for call in calls:
