@@ -402,14 +402,21 @@ class _Operations(CommonRewriting):
         if target is sum:
             self.scope["rtcf_sum_in_order"] = _sum_in_order
             node.func = like(node.func, ast.Name("rtcf_sum_in_order", ast.Load()))
-        if target is sum or isinstance(of, ast.GeneratorExp | ast.ListComp):
+        owner = node.func.value if isinstance(node.func, ast.Attribute) else node.func
+        is_table = isinstance(resolve(owner, self.source), dict)
+        if is_table or target is sum or isinstance(of, ast.GeneratorExp | ast.ListComp):
             return self.generic_visit(node)
         return super().visit_Call(node)
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
-        if isinstance(resolve(node.value, self.source), type(np.r_) | type(np.c_)):
+        if isinstance(resolve(node.value, self.source), type(np.r_) | type(np.c_) | dict):
             return self.generic_visit(node)
         return super().visit_Subscript(node)
+
+    def visit_Compare(self, node: ast.Compare) -> ast.AST:
+        if isinstance(resolve(node.comparators[0], self.source), dict):
+            return self.generic_visit(node)
+        return super().visit_Compare(node)
 
     def visit_If(self, node: ast.If) -> ast.AST:
         return self._counted(node)

@@ -42,6 +42,8 @@ def checked(call: LogCall) -> tuple[str, list[str]]:
     for _, field, form, conversion in fields:
         if field is None:
             continue
+        if conversion == "s":
+            raise _mistake(call, "joins a number to a text", "write str(…), or a {} for it")
         if conversion:
             raise _mistake(call, f"!{conversion} is not supported", "write {}")
         if field and not field.isdigit():

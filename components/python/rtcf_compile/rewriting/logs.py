@@ -65,11 +65,13 @@ def with_name(text: str, number: int, name: str) -> str | None:
         result += literal.replace("{", "{{").replace("}", "}}")
         if field_name is None:
             continue
-        if field_name or conversion:
+        if field_name or conversion not in (None, "s"):
             return None
         if place == number:
             result += format(name, form or "").replace("{", "{{").replace("}", "}}")
         else:
-            result += f"{{:{form}}}" if form else "{}"
+            result += (
+                "{" + (f"!{conversion}" if conversion else "") + (f":{form}" if form else "") + "}"
+            )
         place += 1
     return result if place > number else None

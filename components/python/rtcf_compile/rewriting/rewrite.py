@@ -42,6 +42,7 @@ from rtcf_compile.source.checks import METHODS, check_arguments, resolve
 from rtcf_compile.source.mistake import at, once
 from rtcf_compile.source.modules import Source, read
 
+_MOST_TEXTS = 32  # of a dict, tuple or list
 # What other libraries call the object that logs.
 _LOGGERS = ("log", "logger", "_logger", "get_logger")
 
@@ -273,6 +274,8 @@ class Hook(Ports):
         if call.func.attr in self._own_names():
             return None
         for number, each in enumerate(call.args[1:]):
+            if (logged := self._with_text(node, call, number)) is not None:
+                return logged
             if not isinstance(each, ast.Attribute) or each.attr != "name":
                 continue
             enumeration = self._enum_of(each.value)
@@ -292,6 +295,62 @@ class Hook(Ports):
                 result = [like(node, ast.If(copy.deepcopy(test), [statement], result))]
             return result[0]
         return None
+
+    def _with_text(self, node: ast.Expr, call: ast.Call, number: int) -> ast.stmt | None:
+        """Return a log call with a text as an argument, or with one of several texts of the module,
+        as calls with constant texts; None for other arguments.
+        """
+        given, text = call.args[number + 1], call.args[0]
+        if not isinstance(text, ast.Constant) or not isinstance(text.value, str):
+            return None
+        form = text.value
+        rest = [*call.args[1 : number + 1], *call.args[number + 2 :]]
+
+        def logged(value: str) -> ast.stmt | None:
+            new = with_name(form, number, value)
+            if new is None:
+                return None
+            own = ast.Call(copy.deepcopy(call.func), [ast.Constant(new), *copy.deepcopy(rest)], [])
+            return like(node, ast.Expr(like(call, own)))
+
+        if isinstance(given, ast.Constant) and isinstance(given.value, str):
+            return logged(given.value)
+        table = resolve(given.value, self.source) if isinstance(given, ast.Subscript) else None
+        if not isinstance(table, dict | tuple | list) or not 0 < len(table) <= _MOST_TEXTS:
+            return None
+        texts = list(table.values() if isinstance(table, dict) else table)
+        assert isinstance(given, ast.Subscript)
+        if not all(isinstance(each, str) for each in texts) or not self._only_reads(given.slice):
+            return None
+        error = "KeyError" if isinstance(table, dict) else "IndexError"
+        raised = ast.Raise(
+            call_of(error, ast.Constant(f"{ast.unparse(given.value)} has no such text"))
+        )
+        result: list[ast.stmt] = [like(node, raised)]
+        keys = list(table) if isinstance(table, dict) else list(range(len(table)))
+        for key, value in zip(keys, texts, strict=True):
+            if (own := logged(value)) is None:
+                raise self.mistake(call, "the text of a log needs a plain {}", "write {}")
+            tests = [self._number_key(key)]
+            if not isinstance(table, dict):
+                tests.append(ast.Constant(key - len(table)))
+            test: ast.expr = ast.Compare(
+                copy.deepcopy(given.slice), [ast.In()], [ast.Tuple(tests, ast.Load())]
+            )
+            result = [like(node, ast.If(test, [own], result))]
+        return result[0]
+
+    def _only_reads(self, node: ast.expr) -> bool:
+        """Tell whether an expression has no calls and no properties."""
+        return not any(
+            isinstance(each, ast.Call)
+            or (
+                isinstance(each, ast.Attribute)
+                and self._is_self(each.value)
+                and each.attr not in self._description.members
+            )
+            for each in ast.walk(node)
+        )
 
     def _own_names(self) -> set[str]:
         """Return the names that hide the methods of Component."""

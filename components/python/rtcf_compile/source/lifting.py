@@ -29,8 +29,9 @@ from rtcf_compile.source.given_functions import (
 )
 from rtcf_compile.source.mistake import at
 from rtcf_compile.source.parsed import is_own, opened, parsed
-from rtcf_compile.source.port_loops import by_port, is_member, leaves
+from rtcf_compile.source.port_loops import by_port, is_member
 from rtcf_compile.source.scopes import bound, everywhere, free
+from rtcf_compile.source.text_loops import Written, rounds_of, written
 
 _Node = TypeVar("_Node", bound=ast.AST)
 _Comprehension = ast.ListComp | ast.GeneratorExp
@@ -188,16 +189,33 @@ class _Lifting(ast.NodeTransformer):
         """
         if isinstance(node, ast.With) and all(map(self._is_errstate, node.items)):
             return [part for each in node.body for part in self._simpler(each)]
-        if isinstance(node, ast.For) and not node.orelse and not leaves(node.body):
-            rounds = by_port(node.target, self._ports(node.iter), node.body)
-            if rounds is not None:
-                return [
-                    part
-                    for ports, before in rounds
-                    for each in [*before, *node.body]
-                    for part in self._simpler(_Named(ports).visit(copy.deepcopy(each)))
-                ]
+        if isinstance(node, ast.For) and not node.orelse:
+            loop = ast.copy_location(
+                ast.For(node.target, self._ports(node.iter), node.body, []), node
+            )
+            prefix = f"rtcf_of_{node.lineno}_{node.col_offset}"
+            found = written(loop, self._target, prefix)
+            if found is not None:
+                return self._written(node, found, prefix)
         return [node]
+
+    def _written(self, node: ast.For, loop: Written, prefix: str) -> list[ast.stmt]:
+        """Return a loop that is written out."""
+        rounds = []
+        for k, (names, sets, longer) in enumerate(loop.rounds):
+            body = [_Named(names).visit(copy.deepcopy(each)) for each in node.body]
+            tests: list[ast.expr] = [
+                ast.Compare(ast.Constant(k), [ast.Lt()], [ast.Call(_name("len"), [each], [])])
+                for each in longer
+            ]
+            rounds.append((copy.deepcopy(sets), body, copy.deepcopy(tests)))
+        statements = [*loop.before, *rounds_of(rounds, prefix)]
+        for each in statements:
+            for part in ast.walk(each):
+                if isinstance(part, ast.stmt) and not hasattr(part, "lineno"):
+                    ast.copy_location(part, node)
+            ast.fix_missing_locations(each)
+        return [part for each in statements for part in self._simpler(each)]
 
     def _is_errstate(self, item: ast.withitem) -> bool:
         call = item.context_expr

@@ -4,13 +4,6 @@ import ast
 from collections.abc import Sequence
 
 
-def leaves(body: Sequence[ast.stmt]) -> bool:
-    """Tell whether statements leave their loop, or begin its next iteration."""
-    return any(
-        isinstance(part, ast.Break | ast.Continue) for each in body for part in ast.walk(each)
-    )
-
-
 def by_port(
     target: ast.expr, iterated: ast.expr, body: Sequence[ast.stmt]
 ) -> list[tuple[dict[str, ast.expr], list[ast.stmt]]] | None:
@@ -36,7 +29,7 @@ def by_port(
         for name, value, is_port in zip(targets, values, are_ports, strict=True):
             if not isinstance(name, ast.Name) or isinstance(value, ast.Starred):
                 return None
-            if is_port and _uses_attributes(name.id, body):
+            if is_port and uses_attributes(name.id, body):
                 ports[name.id] = value
             elif isinstance(value, ast.Constant):
                 stored = ast.Name(name.id, ast.Store())
@@ -52,7 +45,7 @@ def is_member(node: ast.AST) -> bool:
     return isinstance(node, ast.Attribute) and ast.unparse(node.value) == "self"
 
 
-def _uses_attributes(name: str, body: Sequence[ast.stmt]) -> bool:
+def uses_attributes(name: str, body: Sequence[ast.stmt]) -> bool:
     """Tell whether statements use only attributes of ports of a variable."""
     ports = ("value", "new", "valid", "age", "connected", "write", "publish", "size", "front",
              "pop", "dropped")  # fmt: skip

@@ -117,6 +117,9 @@ def _text(node: ast.expr) -> tuple[str, list[ast.expr]] | None:
         return _escaped(node.value), []
     if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
         left, right = _text(node.left), _text(node.right)
+        if left is None and right is None:
+            return None
+        left, right = left or _maybe_text(node.left), right or _maybe_text(node.right)
         return None if left is None or right is None else (left[0] + right[0], left[1] + right[1])
     if isinstance(node, ast.JoinedStr):
         return _of_parts(node)
@@ -131,6 +134,13 @@ def _text(node: ast.expr) -> tuple[str, list[ast.expr]] | None:
         if isinstance(of, ast.Constant) and isinstance(of.value, str):
             return of.value, list(node.args)
     return None
+
+
+def _maybe_text(node: ast.expr) -> tuple[str, list[ast.expr]] | None:
+    """Return the format and the value of what must be a text, `{!s}`, or None."""
+    is_known = isinstance(node, ast.Name | ast.Subscript)
+    is_name = isinstance(node, ast.Attribute) and node.attr == "name"
+    return ("{!s}", [node]) if is_known or is_name else None
 
 
 def _escaped(text: str) -> str:
