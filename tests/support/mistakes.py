@@ -472,7 +472,7 @@ UPDATE: dict[str, tuple[str, str]] = {
     "percent without its value": ("self.info('f %f of %f' % self.f)", "text"),
     "log as logging has it": ("self.info('f %f', self.f)", "place"),
     "log of an array": ("self.info('z {}', self.z)", "array"),
-    "log of text": ("self.info('mode {}', 'fast')", "text"),
+    "log of text": ("name = 'fast'\nself.info('mode {}', name)  # here", "text"),
     "log of None": ("self.info('o {}', self.o)", "None"),
     "log without a text": ("self.info(self.f)", "constant text"),
     "log without arguments": ("self.info()", "constant text"),
@@ -607,7 +607,7 @@ UPDATE: dict[str, tuple[str, str]] = {
     "super without its call": ("super.update()", "super"),
     "update called": ("self.update()", "hook"),
     "fault with a value": ("self.fault('f is {}', self.f)", "constant text"),
-    "fault with a text of a list": ("self.fault('lost ' + NAMES[self.n])", "text"),
+    "fault with a text of a list": ("self.fault(NAMES[self.n])", "text"),
     "fault as a value": ("a = self.fault('x')", "statement"),
     # Messages.
     "message's field misspelt": ("self.f = self.t.value.linear.X", "linear.X"),
@@ -721,7 +721,7 @@ UPDATE: dict[str, tuple[str, str]] = {
     ),
     "front of a queue called": ("self.f = self.q.front()", "front"),
     "update of the base by its name": ("Component.update(self)", "self"),
-    "text from a table in a log": ("self.info(f'at {NAMES[self.n]}')", "text"),
+    "text by a call in a log": ("self.info(f'at {NAMES[int(self.f)]}')", "text"),
     "digits from a state in a log": ("self.info(f'f {self.f:.{self.n}f}')", "log with"),
     "stamped message that is not stamped": ("self.f = self.t.value.twist.linear.x", "angular"),
 }

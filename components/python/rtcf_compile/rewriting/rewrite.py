@@ -341,9 +341,9 @@ class Hook(Ports):
         return result[0]
 
     def _only_reads(self, node: ast.expr) -> bool:
-        """Tell whether an expression has no calls and no properties."""
+        """Tell whether an expression has no calls, properties and slices."""
         return not any(
-            isinstance(each, ast.Call)
+            isinstance(each, ast.Call | ast.Slice)
             or (
                 isinstance(each, ast.Attribute)
                 and self._is_self(each.value)
