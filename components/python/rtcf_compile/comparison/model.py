@@ -41,6 +41,7 @@ from rtcf_compile.rewriting.functions import made as made_of
 from rtcf_compile.source.checks import resolve
 from rtcf_compile.source.modules import Source, read
 from rtcf_compile.source.parsed import is_own, opened
+from rtcf_compile.source.spelling import defaults_of
 
 
 class Model:
@@ -361,11 +362,13 @@ def _in_class(
     tree: ast.FunctionDef, scope: dict[str, Any], source: Source, owner: type | None
 ) -> FunctionType:
     """Return a function of a rewritten tree whose super() refers to its class."""
+    tree.args.defaults = [ast.Constant(None) for _ in tree.args.defaults]
     place = ast.arguments([], [ast.arg("__class__")], None, [], [], None, [])
     name = ast.Return(ast.Name(tree.name, ast.Load()))
     outer = ast.FunctionDef("rtcf_in_class", place, [tree, name], [])
     ast.copy_location(outer, tree)
     made: FunctionType = made_of(outer, scope, source)(owner)
+    made.__defaults__ = defaults_of(source.function)
     return made
 
 
@@ -404,7 +407,16 @@ class _Operations(CommonRewriting):
             node.func = like(node.func, ast.Name("rtcf_sum_in_order", ast.Load()))
         owner = node.func.value if isinstance(node.func, ast.Attribute) else node.func
         is_table = isinstance(resolve(owner, self.source), dict)
-        if is_table or target is sum or isinstance(of, ast.GeneratorExp | ast.ListComp):
+        # A method of the class may have the name of one of arrays.
+        arguments = self.source.tree.args.args
+        is_self = isinstance(owner, ast.Name) and [each.arg for each in arguments[:1]] == [owner.id]
+        is_method = is_self and owner is not node.func
+        if (
+            is_method
+            or is_table
+            or target is sum
+            or isinstance(of, ast.GeneratorExp | ast.ListComp)
+        ):
             return self.generic_visit(node)
         return super().visit_Call(node)
 
@@ -412,6 +424,9 @@ class _Operations(CommonRewriting):
         if isinstance(resolve(node.value, self.source), type(np.r_) | type(np.c_) | dict):
             return self.generic_visit(node)
         return super().visit_Subscript(node)
+
+    def _flags(self, node: ast.expr) -> ast.expr | None:
+        return None
 
     def visit_Compare(self, node: ast.Compare) -> ast.AST:
         if isinstance(resolve(node.comparators[0], self.source), dict):

@@ -202,7 +202,8 @@ class Descriptions:
             return "member", self.of(cls), value.name
         if isinstance(value, type) and issubclass(value, enum.Enum):
             members = [(each, member.value) for each, member in value.__members__.items()]
-            return "enum", value.__module__, value.__qualname__, members
+            bases = [each.__qualname__ for each in value.__mro__]
+            return "enum", value.__module__, value.__qualname__, bases, members
         if callable(value) and _is_named(value):
             return "named", value.__module__, value.__qualname__
         raise UnknownError(f"{cls.__name__} {value!r:.80}")

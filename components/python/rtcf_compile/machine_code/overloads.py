@@ -1553,6 +1553,13 @@ def _round(value: Any) -> Any:
     return lambda value: helpers.rtcf_to_int(np.rint(value))
 
 
+@compiled_as(helpers.rtcf_one_index)
+def _one_index(value: Any) -> Any:
+    if isinstance(value, types.Integer | types.IntEnumMember):
+        return lambda value: value
+    raise TypingError(f"RTCF:a new axis beside {words(value)} as an index:index first, then add it")
+
+
 @compiled_as(helpers.rtcf_index)
 def _index(value: Any) -> Any:
     if isinstance(value, types.IntEnumMember):

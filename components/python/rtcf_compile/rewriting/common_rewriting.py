@@ -63,6 +63,7 @@ class CommonRewriting(ast.NodeTransformer):
         self._lists: set[str] = set()
         self._lists = self._find_lists()
         self._uncertain = self._find_uncertain()
+        self._uses_flags = self._has_flags()
         self.large: list[ast.AST] = []
         # Calls that may need functions that the loop does not have.
         self.others: list[ast.Call] = []
@@ -74,9 +75,9 @@ class CommonRewriting(ast.NodeTransformer):
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
         """Rewrite `GAINS.kp` of a dataclass of constants, `Mode.RUN` of an enum."""
         owner = resolve(node.value, self.source)
+        if (number := self._flags(node)) is not None:
+            return number
         member = resolve(node, self.source)
-        if isinstance(member, enum.IntFlag):
-            return like(node, ast.Constant(int(member)))
         if is_enum(type(member)):
             return like(node, ast.Attribute(self._enum(type(member)), member.name, ast.Load()))
         if node.attr == "name" and (isinstance(owner, enum.Enum) or self._is_enum(node.value)):
@@ -92,6 +93,29 @@ class CommonRewriting(ast.NodeTransformer):
             return self._named_constant(node, value)
         self.generic_visit(node)
         return node
+
+    def _flags(self, node: ast.expr) -> ast.expr | None:
+        """Return a member of a set of flags, or its `~`, which is within the flags of its class, as
+        an int; None for another expression.
+        """
+        is_inverted = isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Invert)
+        of = node.operand if isinstance(node, ast.UnaryOp) and is_inverted else node
+        flags = resolve(of, self.source)
+        if isinstance(flags, enum.IntFlag):
+            return like(node, ast.Constant(int(~flags if is_inverted else flags)))
+        if is_inverted and not isinstance(of, ast.Call | ast.Constant) and self._uses_flags:
+            remedy = "write int(…) for all bits, or ~ of a member"
+            raise self.mistake(node, "~ of flags keeps to the bits of their class", remedy)
+        return None
+
+    def _has_flags(self) -> bool:
+        """Tell whether the function uses sets of flags."""
+        nodes = [each for each in ast.walk(self.source.tree)
+                 if isinstance(each, ast.Name | ast.Attribute)]  # fmt: skip
+        values = [resolve(each, self.source) for each in nodes]
+        return any(isinstance(each, enum.IntFlag) or (
+            isinstance(each, type) and issubclass(each, enum.IntFlag)
+        ) for each in values)  # fmt: skip
 
     def _named_constant(self, node: ast.expr, value: Any) -> ast.expr:
         """Return a constant, or a function of another module, by a name of its own."""
@@ -385,7 +409,9 @@ class CommonRewriting(ast.NodeTransformer):
         return node
 
     def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.AST:
-        """Rewrite `-a`."""
+        """Rewrite `-a`, and `~Fault.HOT` of flags."""
+        if (number := self._flags(node)) is not None:
+            return number
         is_constant = isinstance(node.operand, ast.Constant)
         self.generic_visit(node)
         if type(node.op) not in self._functions or is_constant:
@@ -723,7 +749,7 @@ class CommonRewriting(ast.NodeTransformer):
     def _looked_up_or(self, node: ast.Call, of: ast.expr, table: dict[Any, Any]) -> ast.AST:
         """Rewrite `SPEEDS.get(key, default)` of a dict of the module."""
         key, default = node.args
-        if isinstance(key, ast.Constant):
+        if isinstance(key, ast.Constant) and not self._acts(default):
             if key.value not in table:
                 return self.visit(default)  # type: ignore[no-any-return]
             element = like(node, ast.Subscript(of, key, ast.Load()))
@@ -778,6 +804,12 @@ class CommonRewriting(ast.NodeTransformer):
             if _is_view(each) or is_new_axis(each)
         ]
         base: ast.expr = node.value
+        others = [
+            each
+            if _is_view(each) or isinstance(each, ast.Constant)
+            else like(each, call_of("rtcf_one_index", each))
+            for each in others
+        ]
         if not all(self._is_whole_axis(each) for each in others):
             index = ast.Tuple(others, ast.Load()) if len(others) > 1 else others[0]
             base = like(node, ast.Subscript(node.value, index, ast.Load()))

@@ -254,6 +254,13 @@ def rtcf_round_to(value: Any, digits: Any) -> Any:
     return round(float(value), digits)
 
 
+def rtcf_one_index(value: Any) -> Any:
+    """Return an index that is one number; raise for an array."""
+    if np.ndim(value):
+        raise TypeError("a new axis beside an array as an index")
+    return value
+
+
 def rtcf_index(value: Any) -> Any:
     """Return an argument of range() as an int."""
     return operator.index(value)
@@ -504,7 +511,16 @@ BY_NAME = {
             rtcf_member,
             rtcf_is,
         ),
-        *(rtcf_items, rtcf_front, rtcf_age, rtcf_after, rtcf_pow, rtcf_round, rtcf_index),
+        *(
+            rtcf_items,
+            rtcf_front,
+            rtcf_age,
+            rtcf_after,
+            rtcf_pow,
+            rtcf_round,
+            rtcf_index,
+            rtcf_one_index,
+        ),
         rtcf_round_to,
         *(rtcf_negative_pow, rtcf_changed, rtcf_complex_pow),
         *IN_PLACE.values(),

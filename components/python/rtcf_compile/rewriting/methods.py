@@ -115,7 +115,7 @@ def _is_of_decorator(value: Any, owner: type) -> bool:
     the method's own source.
     """
     if inspect.isfunction(value):
-        is_own = value.__qualname__.startswith(f"{owner.__qualname__}.")
+        is_own = value.__code__.co_qualname.startswith(f"{owner.__qualname__}.")
         return not is_own and "<locals>" in value.__qualname__ and bool(value.__code__.co_freevars)
     others = (staticmethod, classmethod, property, functools.cached_property, type)
     if isinstance(value, others):

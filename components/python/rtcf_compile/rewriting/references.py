@@ -457,8 +457,13 @@ class _Followed:
         return [state]
 
     def _loop(
-        self, node: ast.While | ast.For, state: Bindings, next_value: Value | None = None
+        self,
+        node: ast.While | ast.For,
+        state: Bindings,
+        next_value: Value | None = None,
+        held: Cell | None = None,
     ) -> list[Bindings]:
+        """Follow a loop. `held`: what it iterates, which `else` does not know any more."""
         frame = self._frame
         frame.breaks.append([])
         frame.continues.append([])
@@ -481,17 +486,15 @@ class _Followed:
         left = frame.breaks.pop()
         if isinstance(node, ast.While) and _is_true(node.test):
             return left
+        for each in (*ended, *left):
+            each.pop(held, None)  # type: ignore[arg-type]
         return [*self._statements(node.orelse, _distinct(ended)), *left]
 
     def _for(self, node: ast.For, state: Bindings) -> list[Bindings]:
         iterated = self._value(node.iter, state)
         arrays = self._iterated.get(node.iter, NOTHING)
         held = self._hold((iterated, arrays) if arrays else iterated, node.iter, state)
-        value = _elements(iterated)
-        ends = self._loop(node, state, value)
-        for each in ends:
-            each.pop(held, None)
-        return ends
+        return self._loop(node, state, _elements(iterated), held)
 
     def _match(self, node: ast.Match, state: Bindings) -> list[Bindings]:
         subject = self._value(node.subject, state)

@@ -320,7 +320,10 @@ class Hook(Ports):
             return None
         texts = list(table.values() if isinstance(table, dict) else table)
         assert isinstance(given, ast.Subscript)
-        if not all(isinstance(each, str) for each in texts) or not self._only_reads(given.slice):
+        is_first = not any(map(self._acts, rest))  # the text is chosen before they are computed
+        if not all(isinstance(each, str) for each in texts) or not is_first:
+            return None
+        if not self._only_reads(given.slice):
             return None
         error = "KeyError" if isinstance(table, dict) else "IndexError"
         raised = ast.Raise(

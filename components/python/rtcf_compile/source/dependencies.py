@@ -1,5 +1,7 @@
 """The files that Python reads when it runs the sources: modules, and data such as tables."""
 
+import importlib
+import importlib.util
 import os
 import sys
 import sysconfig
@@ -21,6 +23,7 @@ _SYSTEM = tuple(
     )
 )
 _recorded: set[str] = set()
+_machinery: Any = importlib.import_module("importlib._bootstrap_external")
 _is_recording = False
 _is_hooked = False
 
@@ -34,15 +37,28 @@ def recorded() -> Iterator[None]:
         _is_hooked = True
     before = set(sys.modules)
     _is_recording = True
+    place_of = _machinery.cache_from_source
+    _machinery.cache_from_source = _place
     try:
         yield
     finally:
+        _machinery.cache_from_source = place_of
         _is_recording = False
         # Python opens compiled files in place of unchanged modules.
         for name in set(sys.modules) - before:
             file = getattr(sys.modules[name], "__file__", None)
             if isinstance(file, str):
                 _recorded.add(file)
+
+
+def _place(path: Any, *options: Any, **named: Any) -> str:
+    """Return the place of a compiled file of Python; there is none for a file that may change.
+
+    For Python, one is fresh if the source had the same size and was saved in the same second.
+    """
+    if not os.path.realpath(path).startswith(_SYSTEM):
+        raise NotImplementedError
+    return importlib.util.cache_from_source(path, *options, **named)
 
 
 def files() -> list[str]:

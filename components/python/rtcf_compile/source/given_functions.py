@@ -33,10 +33,11 @@ def owner_of(function: FunctionType) -> type | None:
 
 def method_of(owner: type | None, name: str) -> Any:
     """Return a method, or staticmethod, that no class below its own replaces, or None."""
-    found = [vars(each)[name] for each in owner.__mro__ if name in vars(each)] if owner else []
-    if owner is None or not found or any(name in vars(each) for each in _below(owner)):
+    if owner is None:
         return None
-    of = found[0]
+    of = inspect.getattr_static(owner, name, None)
+    if any(inspect.getattr_static(each, name, None) is not of for each in _below(owner)):
+        return None
     is_method = isinstance(of, FunctionType | staticmethod) and is_own(getattr(of, "__func__", of))
     return of if is_method else None
 
@@ -80,11 +81,15 @@ def arguments(call: ast.Call, names: list[str]) -> dict[str, ast.expr] | None:
     return found
 
 
-def without(tree: ast.FunctionDef, names: set[str]) -> None:
-    """Drop arguments, and their defaults, from a function."""
-    every = [*tree.args.posonlyargs, *tree.args.args]
-    by_name = dict(zip([each.arg for each in every[::-1]], tree.args.defaults[::-1], strict=False))
+def without(
+    tree: ast.FunctionDef, names: set[str], values: tuple[Any, ...] | None
+) -> tuple[Any, ...] | None:
+    """Drop arguments, and their defaults, from a function; return the values of those left."""
+    every = [each.arg for each in (*tree.args.posonlyargs, *tree.args.args)]
+    nodes = dict(zip(every[::-1], tree.args.defaults[::-1], strict=False))
+    known = dict(zip(every[::-1], (values or ())[::-1], strict=False))
     tree.args.posonlyargs = [each for each in tree.args.posonlyargs if each.arg not in names]
     tree.args.args = [each for each in tree.args.args if each.arg not in names]
-    left = [*tree.args.posonlyargs, *tree.args.args]
-    tree.args.defaults = [by_name[each.arg] for each in left if each.arg in by_name]
+    left = [each for each in every if each in nodes and each not in names]
+    tree.args.defaults = [nodes[each] for each in left]
+    return tuple(known[each] for each in left) or None

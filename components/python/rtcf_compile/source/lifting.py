@@ -16,6 +16,7 @@ from types import FunctionType
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
+from rtcf.component.value_type import is_enum
 
 from rtcf_compile.source.given_functions import (
     Given,
@@ -28,14 +29,16 @@ from rtcf_compile.source.given_functions import (
     without,
 )
 from rtcf_compile.source.mistake import at
-from rtcf_compile.source.parsed import is_own, opened, parsed
-from rtcf_compile.source.port_loops import by_port, is_member
+from rtcf_compile.source.parsed import is_own, opened, parsed, without_defaults
+from rtcf_compile.source.port_loops import by_port, is_port
 from rtcf_compile.source.scopes import bound, everywhere, free
+from rtcf_compile.source.spelling import defaults_of
 from rtcf_compile.source.text_loops import Written, rounds_of, written
 
 _Node = TypeVar("_Node", bound=ast.AST)
 _Comprehension = ast.ListComp | ast.GeneratorExp
 _COMPREHENSIONS = (ast.ListComp, ast.GeneratorExp)
+_SCOPES = (ast.FunctionDef, ast.Lambda, *_COMPREHENSIONS, ast.SetComp, ast.DictComp)
 # Builtins for which a list and an array are the same.
 _NEUTRAL = (len, sum, any, all, max, min, enumerate, zip, reversed, math.prod)
 _ITERATORS = (enumerate, zip, reversed)
@@ -194,7 +197,7 @@ class _Lifting(ast.NodeTransformer):
                 ast.For(node.target, self._ports(node.iter), node.body, []), node
             )
             prefix = f"rtcf_of_{node.lineno}_{node.col_offset}"
-            found = written(loop, self._target, prefix)
+            found = written(loop, self._target, self._is_port, prefix)
             if found is not None:
                 return self._written(node, found, prefix)
         return [node]
@@ -239,7 +242,8 @@ class _Lifting(ast.NodeTransformer):
                 setattr(node, field, self.visit(value))
         return node
 
-    def _define(self, node: ast.stmt, name: str, nested: ast.FunctionDef | ast.Lambda) -> None:
+    def _define(self, node: ast.stmt, name: str, nested: ast.FunctionDef | ast.Lambda) -> str:
+        """Lift a nested function; return its name."""
         if isinstance(nested, ast.FunctionDef) and nested.decorator_list:
             decorator = nested.decorator_list[0]
             raise self._mistake(decorator, "a decorator is not compiled", "remove it")
@@ -270,8 +274,9 @@ class _Lifting(ast.NodeTransformer):
         names = self._taken(tree)
         tree.args = _with_first(names, tree.args)
         ast.fix_missing_locations(tree)
-        self._add(name, tree, nested)
+        name = self._add(name, tree, nested)
         self._known[name] = signature, names
+        return name
 
     def _taken(self, tree: ast.AST) -> list[str]:
         """Return the variables that a nested function takes from this one: the first argument,
@@ -288,15 +293,25 @@ class _Lifting(ast.NodeTransformer):
         others = sorted(read & self._variables - {self._first})
         return [self._first, *others] if self._first and self._first not in own else others
 
-    def _add(self, name: str, tree: ast.FunctionDef, node: ast.expr | ast.stmt) -> None:
-        """Make a function that can be called by its name."""
-        key = self._outer, name, node.lineno, node.col_offset
+    def _add(self, name: str, tree: ast.FunctionDef, node: ast.expr | ast.stmt) -> str:
+        """Make a function that can be called by its name; return the name.
+
+        Where a loop is written out, several functions have one place in the text.
+        """
+        key = self._outer, node.lineno, node.col_offset, ast.dump(tree)
+        if self.functions.get(name, _made.get(key)) is not _made.get(key):
+            if not name.startswith("rtcf_"):
+                remedy = "define it before the loop"
+                raise self._mistake(node, f"{name} differs between iterations", remedy)
+            name = tree.name = f"{name}_{len(self.functions)}"
+            key = self._outer, node.lineno, node.col_offset, ast.dump(tree)
         if key not in _made:
             _made[key] = self._compiled(tree)
             if name.startswith("rtcf_"):
                 _made[key].__qualname__ = f"{self._outer.__qualname__}.<locals>.<comprehension>"
             self._note(_made[key], tree)
         self.functions[name] = _made[key]
+        return name
 
     def _note(self, function: FunctionType, tree: ast.FunctionDef) -> None:
         """Note the tree of a function that was lifted, and what it may call."""
@@ -433,7 +448,7 @@ class _Lifting(ast.NodeTransformer):
         """Return the function that an argument is, or None."""
         if isinstance(node, ast.Lambda):
             name = f"rtcf_lambda_{node.lineno}_{node.col_offset}"
-            self._define(ast.copy_location(ast.Pass(), node), name, node)
+            name = self._define(ast.copy_location(ast.Pass(), node), name, node)
             node = _located(_name(name), node)
         if isinstance(node, ast.Name) and node.id in self._known:
             name = "lambda" if node.id.startswith("rtcf_lambda") else node.id
@@ -457,7 +472,7 @@ class _Lifting(ast.NodeTransformer):
 
         `own`: its first argument, which is that of the function around the call.
         """
-        without(tree, set(given))
+        defaults = without(tree, set(given), defaults_of(function))
         while tree.name in _copies or tree.name in self._variables | set(self.functions):
             tree.name += "_"
         _copies.add(tree.name)
@@ -489,7 +504,7 @@ class _Lifting(ast.NodeTransformer):
             tree.args = _with_first([*([own] if self._first else []), *names], tree.args)
         tree = _located(tree, tree)
         new_scope: dict[str, Any] = {}
-        compiled = ast.Module([copy.deepcopy(tree)], [])
+        compiled = ast.Module([without_defaults(tree)], [])
         exec(
             compile(compiled, function.__code__.co_filename, "exec", dont_inherit=True),
             scope,
@@ -497,6 +512,7 @@ class _Lifting(ast.NodeTransformer):
         )
         copied: FunctionType = new_scope[tree.name]
         copied.__qualname__ = function.__qualname__
+        copied.__defaults__ = defaults
         _lifted[copied] = _Lifted(tree, functions, nested, self._owner, self._depth + 1)
         return copied
 
@@ -574,6 +590,8 @@ class _Lifting(ast.NodeTransformer):
         given = [*node.args[1:], *(each.value for each in node.keywords)]
         if len(given) > 1 or not {each.arg for each in node.keywords} <= {reduction.option}:
             return None
+        if not all(map(self._is_plain, given)):
+            return None  # when it is computed, if at all, depends on the function
         if target is next and not given:
             raise self._mistake(node, "next without a default may raise", "write next(…, default)")
         text = reduction.text if not given else reduction.with_option
@@ -650,7 +668,8 @@ class _Lifting(ast.NodeTransformer):
         """Return the call that looks up a key, perhaps with a default."""
         constants = [each.value for each in table.keys if isinstance(each, ast.Constant)]
         values: ast.expr = node.func.value if isinstance(node, ast.Call) else node.value  # type: ignore[attr-defined]
-        if isinstance(given[0], ast.Constant) and len(constants) == len(table.keys):
+        is_known = len(given) == 1 or self._is_plain(given[1])
+        if isinstance(given[0], ast.Constant) and len(constants) == len(table.keys) and is_known:
             if given[0].value in constants:
                 place = ast.Constant(constants.index(given[0].value))
                 return _located(ast.Subscript(values, place, ast.Load()), node)
@@ -663,7 +682,12 @@ class _Lifting(ast.NodeTransformer):
             ast.Call(_name("rtcf_number"), [copy.deepcopy(each)], []) for each in table.keys if each
         ]
         function = "rtcf_looked_up" if len(given) == 1 else "rtcf_looked_up_or"
-        parts = [ast.Tuple(keys, ast.Load()), values, *(self.visit(each) for each in given)]
+        key, *default = [self.visit(each) for each in given]
+        kind, first = self._kind_of_keys(table.keys), table.keys[0]
+        if is_enum(kind) and isinstance(first, ast.Attribute):
+            # Ints are no keys of a dict of enums that are no ints.
+            key = ast.Call(_name("rtcf_stored_enum"), [key, copy.deepcopy(first.value)], [])
+        parts = [ast.Tuple(keys, ast.Load()), values, key, *default]
         return _located(ast.Call(_name(function), parts, []), node)
 
     def _local_dicts(self) -> Iterator[tuple[str, ast.Dict]]:
@@ -674,12 +698,38 @@ class _Lifting(ast.NodeTransformer):
             target, keys = each.targets[0], each.value.keys
             if len(each.targets) > 1 or not isinstance(target, ast.Name) or not keys:
                 continue
+            inner = [of for of in ast.walk(self._tree) if isinstance(of, _SCOPES)]
+            hidden = {id(part) for of in inner if of is not self._tree for part in ast.walk(of)}
+            if any(id(of) in hidden for of in _uses_of(self._tree, target.id)) or (
+                self._kind_of_keys(keys) is None
+            ):
+                continue
             is_constant = [isinstance(key, ast.Constant) or _is_dotted(key) for key in keys]
             names = [name for name in ast.walk(self._tree) if isinstance(name, ast.Name)
                      and name.id == target.id]  # fmt: skip
             uses = [of for of in ast.walk(self._tree) if _is_look_up(of, target.id)]
             if all(is_constant) and len(names) == 1 + len(uses):
                 yield target.id, each.value
+
+    def _is_plain(self, node: ast.expr) -> bool:
+        """Tell whether an expression has no effect: no call and no property."""
+        return not any(
+            isinstance(each, ast.Call | ast.NamedExpr)
+            or (
+                isinstance(each, ast.Attribute)
+                and isinstance(inspect.getattr_static(self._owner, each.attr, None), property)
+            )
+            for each in ast.walk(node)
+        )
+
+    def _kind_of_keys(self, keys: Sequence[ast.expr | None]) -> type | None:
+        """Return the class of the keys of a dict that differ: int, text or an enum; else None."""
+        values = [each.value if isinstance(each, ast.Constant) else self._target(each)
+                  for each in keys if each is not None]  # fmt: skip
+        kinds = {type(each) for each in values}
+        is_whole = len(values) == len(keys) == len(set(values)) and len(kinds) == 1
+        kind = kinds.pop() if is_whole else None
+        return kind if kind in (int, str) or is_enum(kind) else None
 
     def visit_For(self, node: ast.For) -> ast.AST:
         """Fill an array that is iterated."""
@@ -768,7 +818,7 @@ class _Lifting(ast.NodeTransformer):
         tree = copy.deepcopy(_located(tree, node))
         names = self._taken(tree)
         tree.args = _arguments(names)
-        self._add(name, ast.fix_missing_locations(tree), node)
+        name = self._add(name, ast.fix_missing_locations(tree), node)
         call = ast.Call(_name(name), [_name(each) for each in names], [])
         return _located(call, node)
 
@@ -776,7 +826,7 @@ class _Lifting(ast.NodeTransformer):
         """Return the elements of a comprehension over ports, or None."""
         first, conditions = node.generators[0], node.generators[0].ifs
         used = [ast.Expr(each) for each in (node.elt, *conditions)]
-        rounds = by_port(first.target, self._ports(first.iter), used)
+        rounds = by_port(first.target, self._ports(first.iter), used, self._is_port)
         if len(node.generators) > 1 or rounds is None or any(before for _, before in rounds):
             return None
         return [_Named(ports).visit(copy.deepcopy(node.elt)) for ports, _ in rounds]
@@ -792,6 +842,9 @@ class _Lifting(ast.NodeTransformer):
             ):
                 each.value = ast.copy_location(ast.Constant(0), each.value)
 
+    def _is_port(self, node: ast.expr) -> bool:
+        return is_port(node, self._owner)
+
     def _ports(self, node: ast.expr) -> ast.expr:
         """Return an iterable with variables that are tuples of ports replaced by these."""
         return _Named(dict(self._port_tuples)).visit(copy.deepcopy(node))  # type: ignore[no-any-return]
@@ -803,7 +856,7 @@ class _Lifting(ast.NodeTransformer):
             if not isinstance(target, ast.Name) or not isinstance(each, ast.Assign):
                 continue
             is_display = isinstance(each.value, ast.Tuple | ast.List)
-            if not is_display or not all(map(is_member, each.value.elts)):  # type: ignore[attr-defined]
+            if not is_display or not all(map(self._is_port, each.value.elts)):  # type: ignore[attr-defined]
                 continue
             loops = [
                 of for of in ast.walk(self._tree) if isinstance(of, ast.For | ast.comprehension)
@@ -967,6 +1020,11 @@ def _is_dotted(node: ast.AST | None) -> bool:
     while isinstance(node, ast.Attribute):
         node = node.value
     return isinstance(node, ast.Name) and node.id != "self"
+
+
+def _uses_of(tree: ast.AST, name: str) -> list[ast.Name]:
+    """Return the places where a variable is read or set."""
+    return [each for each in ast.walk(tree) if isinstance(each, ast.Name) and each.id == name]
 
 
 def _is_look_up(node: ast.AST, name: str) -> bool:

@@ -110,7 +110,7 @@ def _check_names(module: ModuleType, found: Sequence[type]) -> None:
 
 def read(function: FunctionType, is_whole: bool = False) -> Source:
     """Return the syntax tree of a function. `is_whole`: with the functions nested in it."""
-    file = inspect.getsourcefile(function) or "?"
+    file = inspect.getsourcefile(function.__code__) or "?"
     tree = lifting.tree_of(function) or parsed(function)
     return Source(function, tree, file, {} if is_whole else lifting.lift(tree, function, file))
 

@@ -20,11 +20,11 @@ def parsed(function: FunctionType) -> ast.FunctionDef:
     """Return the syntax tree of a function in the file of its module, in one spelling."""
     if function in _opened:
         return copy.deepcopy(_opened[function])
-    file = inspect.getsourcefile(function) or "?"
+    file = inspect.getsourcefile(function.__code__) or "?"
     if function.__name__ == "<lambda>" and (found := _lambda(function, file)) is not None:
         return found
     try:
-        lines, begin = inspect.getsourcelines(function)
+        lines, begin = inspect.getsourcelines(function.__code__)  # not what it wraps
     except OSError:
         raise Mistake(
             file, 0, f"{function.__name__} has no source", "define it in a file"
@@ -41,6 +41,14 @@ def parsed(function: FunctionType) -> ast.FunctionDef:
         raise Mistake(file, begin, f"{function.__name__} {kind}", "write it with `def`")
     spelling.normalise(tree, function)
     return tree
+
+
+def without_defaults(tree: ast.FunctionDef) -> ast.FunctionDef:
+    """Return a function whose defaults are not computed again; they are set later."""
+    new = copy.deepcopy(tree)
+    new.args.defaults = [ast.copy_location(ast.Constant(None), each) for each in new.args.defaults]
+    new.decorator_list = []
+    return new
 
 
 def _lambda(function: FunctionType, file: str) -> ast.FunctionDef | None:
@@ -78,7 +86,7 @@ def opened(value: Any) -> Any:
     """
     if not isinstance(value, FunctionType) or not value.__closure__ or not is_own(value):
         return value
-    if hasattr(value, "__wrapped__") or value.__qualname__.count("<locals>") != 1:
+    if value.__code__.co_qualname.count("<locals>") != 1:
         return value
     if value.__module__.partition(".")[0] == "rtcf_compile":
         return value
@@ -87,17 +95,22 @@ def opened(value: Any) -> Any:
             names = {name: opened(cell.cell_contents) for name, cell in zip(
                 value.__code__.co_freevars, value.__closure__, strict=True)}  # fmt: skip
             tree = parsed(value)
+            tree.decorator_list = []  # applied
         except (ValueError, Mistake):
             return value
         if any(isinstance(each, ast.Nonlocal) for each in ast.walk(tree)):
             return value  # rejected
-        module = ast.Module([copy.deepcopy(tree)], [])
+        module = ast.Module([without_defaults(tree)], [])
         scope: dict[str, Any] = {}
         code = compile(module, value.__code__.co_filename, "exec", dont_inherit=True)
         exec(code, {**value.__globals__, **names}, scope)
-        _functions[value] = scope[tree.name]
-        _functions[value].__qualname__ = value.__qualname__
-        _opened[_functions[value]] = tree
+        made = _functions[value] = scope[tree.name]
+        made.__qualname__ = value.__qualname__
+        made.__defaults__ = spelling.defaults_of(value)
+        # Code objects of one text are equal, but those of two closures differ in their variables.
+        name = f"{value.__name__}.{len(_functions)}"
+        made.__code__ = made.__code__.replace(co_name=name)
+        _opened[made] = tree
     return _functions[value]
 
 

@@ -1,11 +1,17 @@
 """Loops over ports, such as `for port in (self.left, self.right):`, which are written out."""
 
 import ast
-from collections.abc import Sequence
+import inspect
+from collections.abc import Callable, Sequence
+
+from rtcf.component.declaration import Declarable, Declared, MemberAttribute
 
 
 def by_port(
-    target: ast.expr, iterated: ast.expr, body: Sequence[ast.stmt]
+    target: ast.expr,
+    iterated: ast.expr,
+    body: Sequence[ast.stmt],
+    is_port: Callable[[ast.expr], bool],
 ) -> list[tuple[dict[str, ast.expr], list[ast.stmt]]] | None:
     """Return the ports for the variables of a loop over ports, and assignments of its other
     variables, for each iteration; None for another loop.
@@ -21,15 +27,15 @@ def by_port(
     ):
         return None
     columns = [each.elts for each in several]  # type: ignore[attr-defined]
-    are_ports = [all(map(is_member, each)) for each in columns]
+    are_ports = [all(map(is_port, each)) for each in columns]
     rounds: list[tuple[dict[str, ast.expr], list[ast.stmt]]] = []
     for values in zip(*columns, strict=False):
         ports: dict[str, ast.expr] = {}
         before: list[ast.stmt] = []
-        for name, value, is_port in zip(targets, values, are_ports, strict=True):
+        for name, value, of_port in zip(targets, values, are_ports, strict=True):
             if not isinstance(name, ast.Name) or isinstance(value, ast.Starred):
                 return None
-            if is_port and uses_attributes(name.id, body):
+            if of_port and uses_attributes(name.id, body):
                 ports[name.id] = value
             elif isinstance(value, ast.Constant):
                 stored = ast.Name(name.id, ast.Store())
@@ -40,9 +46,23 @@ def by_port(
     return rounds if rounds and all(ports for ports, _ in rounds) else None
 
 
-def is_member(node: ast.AST) -> bool:
-    """Tell whether a node is `self.name`."""
-    return isinstance(node, ast.Attribute) and ast.unparse(node.value) == "self"
+def is_port(node: ast.AST, owner: type | None) -> bool:
+    """Tell whether a node is `self.name` of a port; if the class does not declare it, a class
+    derived from it may.
+    """
+    if not isinstance(node, ast.Attribute) or ast.unparse(node.value) != "self":
+        return False
+    for each in owner.__mro__ if owner else ():
+        if node.attr in vars(each) and not isinstance(
+            vars(each)[node.attr], Declarable | MemberAttribute
+        ):
+            return False
+        declared = inspect.get_annotations(each).get(node.attr)
+        if isinstance(declared, str):
+            return declared.partition("[")[0].rpartition(".")[2] in ("Input", "Output", "Queue")
+        if isinstance(declared, Declared):
+            return declared.kind.__name__ in ("Input", "Output", "Queue")
+    return True
 
 
 def uses_attributes(name: str, body: Sequence[ast.stmt]) -> bool:

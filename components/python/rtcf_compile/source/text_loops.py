@@ -7,7 +7,8 @@ import ast
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
-from rtcf_compile.source.port_loops import is_member, uses_attributes
+from rtcf_compile.source.port_loops import uses_attributes
+from rtcf_compile.source.scopes import everywhere
 
 _MOST = 16  # iterations
 
@@ -31,7 +32,12 @@ class Written(NamedTuple):
     rounds: list[tuple[dict[str, ast.expr], list[ast.stmt], list[ast.expr]]]
 
 
-def written(loop: ast.For, constant: Callable[[ast.expr], Any], prefix: str) -> Written | None:
+def written(
+    loop: ast.For,
+    constant: Callable[[ast.expr], Any],
+    is_port: Callable[[ast.expr], bool],
+    prefix: str,
+) -> Written | None:
     """Return a loop over texts or ports, or None for another.
 
     `constant` returns the value of a name of the module, or None. `prefix`: of names of variables.
@@ -41,7 +47,7 @@ def written(loop: ast.For, constant: Callable[[ast.expr], Any], prefix: str) -> 
     if any(each.elements is None and each.array is None for each in columns) or not known:
         return None
     rounds = min(len(each.elements or ()) for each in known)
-    replaced = [_is_replaced(each, loop.body) for each in columns]
+    replaced = [_is_replaced(each, loop.body, is_port) for each in columns]
     if not any(replaced) or not 0 < rounds <= _MOST:
         return None
     result = Written([], [({}, [], []) for _ in range(rounds)])
@@ -137,7 +143,7 @@ def _of_call(
 
 def _of_value(value: Any, place: ast.expr) -> ast.expr:
     """Return a constant of the module as an expression: texts and their tuples written out."""
-    if isinstance(value, str | int | float | bool):
+    if type(value) in (str, int, float, bool):
         return ast.Constant(value)
     if isinstance(value, tuple | list):
         parts = [_of_value(each, ast.Subscript(place, ast.Constant(k), ast.Load()))
@@ -153,13 +159,17 @@ def _is_constant(node: ast.expr, constant: Callable[[ast.expr], Any]) -> bool:
     return isinstance(node, ast.Constant) or constant(node) is not None
 
 
-def _is_replaced(column: _Column, body: Sequence[ast.stmt]) -> bool:
+def _is_replaced(
+    column: _Column, body: list[ast.stmt], is_port: Callable[[ast.expr], bool]
+) -> bool:
     """Tell whether a variable is replaced by what it stands for: texts, or ports."""
     if not isinstance(column.target, ast.Name) or not column.elements:
         return False
+    if column.target.id in everywhere(ast.Module(body, [])):
+        return False
     texts = all(isinstance(each, ast.Constant) and isinstance(each.value, str)
                 for each in column.elements)  # fmt: skip
-    ports = all(map(is_member, column.elements)) and uses_attributes(column.target.id, body)
+    ports = all(map(is_port, column.elements)) and uses_attributes(column.target.id, body)
     return texts or ports
 
 

@@ -3,8 +3,11 @@
 import errno
 import hashlib
 import os
+import py_compile
 import subprocess
+import sys
 from collections.abc import Iterator
+from enum import Enum, IntEnum
 from pathlib import Path
 
 import pytest
@@ -12,6 +15,8 @@ from daemon_process import BUILD_TREE
 from pages import TREE
 from rtcf_compile.machine_code import cache as cache_module
 from rtcf_compile.machine_code.cache import Cache
+from rtcf_compile.machine_code.identity import Descriptions
+from rtcf_compile.source import modules
 from rtcfctl.graph.compiler import WarmCompiler
 
 COMMAND = str(BUILD_TREE / "bin" / "rtcf-compile")
@@ -299,3 +304,24 @@ def test_the_files_used_last_remain(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     cache.remove_old()
     left = {each.name for each in (tmp_path / "kept").iterdir()}
     assert left == {names[0], *names[3:]}
+
+
+def test_enums_with_other_bases_are_told_apart() -> None:
+    made = [base("Mode", {"A": 1}, module="own", qualname="Mode") for base in (IntEnum, Enum)]
+    first, second = (Descriptions().of(each) for each in made)
+    assert first != second
+
+
+def test_a_module_that_is_saved_twice_in_a_second_is_read_again(tmp_path: Path) -> None:
+    source, other = tmp_path / "saved.py", tmp_path / "saved_other.py"
+    for first, second in (("1.0", "2.0"), ("3.0", "4.0")):
+        for file, text in ((source, "from saved_other import K\nOWN = {}\n"), (other, "K = {}\n")):
+            file.write_text(text.format(first))
+            os.utime(file, (1e9, 1e9))
+            py_compile.compile(str(file))
+            file.write_text(text.format(second))
+            os.utime(file, (1e9, 1e9))
+        module = modules.load(source)
+        del sys.modules["saved_other"]
+        assert module.OWN == float(second)
+        assert module.K == float(second)

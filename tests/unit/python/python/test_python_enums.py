@@ -88,6 +88,7 @@ COMPONENT = """
         if self.last is Phase.HOLD:
             y += 10.0
         flags = Fault.NONE
+        y += int(~Fault.HOT) + (~CRITICAL ^ Fault.LATE)
         if self.u.value > 0:
             flags |= Fault.HOT
         if y > 1:
@@ -142,6 +143,18 @@ REJECTED = {
     "key that is a constant": ("y = SPEED[1]", "SPEED has no 1"),
     "search for an int": ("y = 1.0 if self.n in SPEED else 2.0", _VALUE),
     "index": ("y = np.zeros(3)[self.phase]", "cannot be indexed by an enum Phase"),
+    "all other flags of a variable": (
+        "flags = Fault.HOT\n        y = float(~flags)",
+        "~ of flags keeps to the bits of their class",
+    ),
+    "key of a dict of the hook": (
+        "t = {Phase.OPEN: 1.0, Phase.HOLD: 2.0}\n        y = t.get(self.n, 9.0)",
+        "an int is not a Phase",
+    ),
+    "keys of two kinds": (
+        "t = {Phase.OPEN: 1.0, 7: 2.0}\n        y = t.get(self.phase, 9.0)",
+        "a dict allocates memory",
+    ),
     "member of a flag": ("self.n = Bits.A", "write .value"),
 }
 DECLARED = {

@@ -11,6 +11,7 @@ from rtcf_compile.source import modules
 from rtcf_compile.source.mistake import Mistake
 
 HEAD = """\
+import functools
 import math
 
 import numpy as np
@@ -41,6 +42,46 @@ def twice(g, x):
 
 def applied(h, x):
     return h(x)
+
+
+K = 1.0
+
+
+def scaled(g, x, k=K):
+    return k * g(x)
+
+
+K = 2.0
+LIMIT = 100.0
+
+
+def made(k):
+    c = 2.0
+
+    def f(x, g=k):
+        return c * g * x
+
+    return f
+
+
+k = 5.0
+tripled = made(3.0)
+
+
+def plain(x):
+    return 2.0 * x
+
+
+def wrapped(f):
+    @functools.wraps(f)
+    def inner(x):
+        return 2.0 * f(x)
+
+    return inner
+
+
+doubled = wrapped(plain)
+again = made(made(3.0)(1.0))
 
 
 def shifted(f, x):
@@ -102,11 +143,17 @@ counted = counter()
 
 class Given(Component):
     u: Input[float]
+    p: Input[float]
     v: Input[np.float64, 3]
     y: Output[float]
     x: State[np.float64, 2]
     m: State[np.float64, 3, 3]
     w: Parameter[float] = 3.0
+
+    LIMIT = 3.0
+
+    def top(self, f, x, limit=LIMIT):
+        return min(f(x), limit)
 
     def dynamics(self, x, u):
         return np.array([x[1], -self.w**2 * x[0] + u])
@@ -152,6 +199,14 @@ WAYS = {
     "functions that differ in what they are given": """
         self.y.write(shifted(up, u) + 2.0 * shifted(down, u) + shifted(math.sin, u))
         self.x[0] = shifted(lambda x: x * k, u) - shifted(lambda x: x / k, u)
+""",
+    "defaults, which are computed once": """
+        self.y.write(scaled(math.cos, u) + self.top(lambda x: x * 10.0, u) + tripled(u) + again(u))
+""",
+    "a function that wraps another": "self.y.write(doubled(u))",
+    "lambdas of a loop that is written out": """
+        for port in (self.u, self.p, self.u):
+            self.x[0] = 2.0 * self.x[0] + applied(lambda x: port.value * x, 1.0)
 """,
     "nested functions that take functions": """
         def own(q, v):

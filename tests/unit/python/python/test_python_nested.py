@@ -281,6 +281,18 @@ def test_a_nested_function_means_what_python_means(tmp_path: Path, way: str) -> 
 
 
 REJECTED = {
+    "dict in a comprehension": (
+        "t = {3: 5.0, 2: 7.0}  # here\n        self.y.write(sum(t[k] for k in (2, 3)))",
+        "a dict allocates memory",
+    ),
+    "dict with a key twice": (
+        "t = {1: 9.0, 1: 11.0}  # here\n        self.y.write(t[self.n])",
+        "a dict allocates memory",
+    ),
+    "start with an effect": (
+        "self.y.write(sum((x for x in v), self.bump()))  # here",
+        "a generator cannot be compiled",
+    ),
     "function as a value": (
         "f = lambda x: x  # defined\n        g = f  # here",
         "`f`: f is a function, used as a value: call it",

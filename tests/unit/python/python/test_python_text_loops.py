@@ -38,6 +38,10 @@ class Loops(Component):
     n: State[np.int64, 4]
     k: State[int]
 
+    def moved(self):
+        self.k += 1
+        return self.k
+
     def update(self):
         self.phase = Phase.B if self.k % 2 else Phase.A
         self.k += 1
@@ -98,6 +102,26 @@ WAYS = {
                 self.info("%s is %.1f" % (name, port.value))
                 total += port.value
 """,
+    "comprehensions in it": """
+        for name in ("base", "wrist"):
+            total = 2.0 * total + sum(LIMITS[name] * x for x in tau)
+        for port in (self.left, self.right):
+            total = 3.0 * total + sum(port.value * x for x in tau)
+""",
+    "enums, which are no ports": """
+        for phase in (self.phase, self.phase):
+            self.phase = Phase.B
+            total = 10.0 * total + phase.value
+""",
+    "else and continue": """
+        for i in range(3):
+            for x in tau:
+                if x > 0.5:
+                    break
+            else:
+                continue
+            total += i
+""",
     "ports and break": """
         for port in (self.left, self.right):
             if port.value > 0.0:
@@ -147,6 +171,14 @@ def test_the_texts_of_log_calls_are_constants(tmp_path: Path) -> None:
 REJECTED = {
     "number joined to a text": ('self.info("k " + self.k)', "a log call needs a constant text"),
     "element joined to a text": ('self.info("k " + tau[0])', "joins a number to a text"),
+    "text that is set": (
+        'for name in JOINTS:\n            name = "base"\n            total += LIMITS[name]',
+        "LIMITS is a dict with other keys or values",
+    ),
+    "text of a log beside a call": (
+        'self.info("{} {}", self.moved(), JOINTS[self.k % 4])',
+        "a log call stores numbers and bools, not text",
+    ),
     "text that is kept": (
         "for name in JOINTS:\n            last = name\n        self.info(last)",
         "a log call needs a constant text",
