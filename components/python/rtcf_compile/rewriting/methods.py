@@ -116,7 +116,8 @@ def _is_of_decorator(value: Any, owner: type) -> bool:
     """
     if inspect.isfunction(value):
         is_own = value.__code__.co_qualname.startswith(f"{owner.__qualname__}.")
-        return not is_own and "<locals>" in value.__qualname__ and bool(value.__code__.co_freevars)
+        is_inner = "<locals>" in value.__code__.co_qualname
+        return not is_own and is_inner and bool(value.__code__.co_freevars)
     others = (staticmethod, classmethod, property, functools.cached_property, type)
     if isinstance(value, others):
         return False

@@ -414,7 +414,7 @@ def decorator_of(target: Any) -> str:
     another one returned.
     """
     if isinstance(target, FunctionType):
-        return target.__qualname__.partition(".<locals>")[0]
+        return target.__code__.co_qualname.partition(".<locals>")[0]
     module, kind = type(target).__module__.partition(".")[0], type(target).__name__
     return "jit" if module == "numba" else kind.strip("_").removesuffix("_wrapper")
 

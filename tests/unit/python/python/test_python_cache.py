@@ -323,5 +323,6 @@ def test_a_module_that_is_saved_twice_in_a_second_is_read_again(tmp_path: Path) 
             os.utime(file, (1e9, 1e9))
         module = modules.load(source)
         del sys.modules["saved_other"]
-        assert module.OWN == float(second)
-        assert module.K == float(second)
+        expected = float(second)
+        assert module.OWN == expected
+        assert module.K == expected
