@@ -838,7 +838,7 @@ CLASS: dict[str, tuple[str, str]] = {
     ),
     "hook with a decorator that wraps it": (
         "@wrapped\ndef start(self):\n    self.f = 1.0",
-        "not compiled: remove the decorator",
+        "remove the decorator from def start",
     ),
     "hook with a class as its decorator": (
         "@Timed\ndef start(self):\n    self.f = 1.0",
