@@ -71,6 +71,21 @@ def compiled(
     file = Path(source).resolve()
     if not file.is_file():
         raise NotCompiledError(f"{source}: no such file")
+    try:
+        return _compiled(source, file, build_tree, progress, verify, compiler)
+    except OSError as error:
+        where = error.filename or compiled_folder()
+        raise NotCompiledError(f"{where}: {error.strerror or error}") from None
+
+
+def _compiled(
+    source: str,
+    file: Path,
+    build_tree: Path | None,
+    progress: Callable[[str], None],
+    verify: bool,
+    compiler: Compiler | None,
+) -> str:
     place = _Place(file)
     saved = place.saved()
     current = fingerprint(file, saved.dependencies)
@@ -83,6 +98,8 @@ def compiled(
         options = [*(["--verify", _VERIFY] if verify else []), *place.depfile()]
         if not is_compiled:
             options += ["-o", str(place.library)]
+            # Until this is saved again, the library may be that of another text.
+            place.save(_Saved("", False, saved.dependencies))
         begin_ns = time.time_ns()
         status, errors = compiler.run([source, *options], progress)
         others = place.dependencies()
@@ -99,6 +116,8 @@ def compiled(
         if is_current and not any(map(partial(_is_newer, than_ns=begin_ns), new)):
             break
         current, is_compiled = saved.fingerprint, False
+    else:
+        saved = _Saved("", False, others)  # compiled again at the next load
     # rtcfd loads libraries only from folders without write permission for others; the umask may
     # permit more.
     for each in (place.library, place.library.parent, place.library.parents[1]):
@@ -125,7 +144,8 @@ class _Place:
         self.library = compiled_folder() / self.package / f"{source.stem}.so"
         # These files are beside the package's folder, which has only libraries.
         self._saved = compiled_folder() / f".{self.package}"
-        self._rule = compiled_folder() / f".{self.package}.d"
+        # Of this process: another may compile the same source.
+        self._rule = compiled_folder() / f".{self.package}.{os.getpid()}.d"
 
     def saved(self) -> _Saved:
         """Return what is known about the library; nothing if there is none."""
@@ -152,11 +172,13 @@ class _Place:
         return ["--depfile", str(self._rule)]
 
     def dependencies(self) -> list[Path]:
-        """Return the dependencies of the last compilation."""
+        """Return the dependencies of the last compilation, once."""
         try:
             return dependencies(self._rule.read_text())
         except OSError:
             return []
+        finally:
+            self._rule.unlink(missing_ok=True)
 
 
 def _is_newer(file: Path, than_ns: int) -> bool:

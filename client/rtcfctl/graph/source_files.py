@@ -1,5 +1,6 @@
 """The files that a compiled Python source depends on, and whether they have changed."""
 
+import contextlib
 import hashlib
 import importlib.util
 import platform
@@ -7,6 +8,7 @@ import re
 import sysconfig
 import time
 from collections.abc import Iterable
+from importlib import metadata
 from pathlib import Path
 
 import rtcf
@@ -42,6 +44,9 @@ def compiler_version() -> str:
         folder = Path(compiler.origin).parent
         files += sorted(each for each in folder.rglob("*") if each.suffix in (".py", ".hpp"))
         digest.update(f"{_runtime(folder)}\n".encode())
+    for name in ("numba", "llvmlite", "numpy"):
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            digest.update(f"{name} {metadata.version(name)}\n".encode())
     for file in files:
         content = file.read_bytes()
         digest.update(f"{file.name} {len(content)}\n".encode() + content)
