@@ -316,7 +316,7 @@ def test_a_module_that_is_saved_twice_in_a_second_is_read_again(tmp_path: Path) 
     source, other = tmp_path / "saved.py", tmp_path / "saved_other.py"
     for first, second in (("1.0", "2.0"), ("3.0", "4.0")):
         for file, text in (
-            (source, "from saved_other import gain\nown = {}\n"),
+            (source, "from saved_other import gain\nbias = {}\n"),
             (other, "gain = {}\n"),
         ):
             file.write_text(text.format(first))
@@ -326,5 +326,5 @@ def test_a_module_that_is_saved_twice_in_a_second_is_read_again(tmp_path: Path) 
             os.utime(file, (1e9, 1e9))
         module = modules.load(source)
         del sys.modules["saved_other"]
-        assert module.own == float(second)
+        assert module.bias == float(second)
         assert module.gain == float(second)
