@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator
 from enum import Enum, IntEnum
 from pathlib import Path
+from typing import Any
 
 import pytest
 from daemon_process import BUILD_TREE
@@ -307,8 +308,10 @@ def test_the_files_used_last_remain(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 
 def test_enums_with_other_bases_are_told_apart() -> None:
-    made = [base("Mode", {"A": 1}, module="own", qualname="Mode") for base in (IntEnum, Enum)]
-    first, second = (Descriptions().of(each) for each in made)
+    bases: list[Any] = [IntEnum, Enum]
+    first, second = (
+        Descriptions().of(base("Mode", {"A": 1}, module="own", qualname="Mode")) for base in bases
+    )
     assert first != second
 
 
