@@ -2,6 +2,7 @@
 library of another text. The compiler here copies the source into the library.
 """
 
+import os
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -102,7 +103,7 @@ def test_two_processes_do_not_take_each_others_dependencies(
 ) -> None:
     def other() -> None:
         # Another process begins to compile, and is interrupted.
-        monkeypatch.setattr(python_source.os, "getpid", lambda: 1)
+        monkeypatch.setattr(os, "getpid", lambda: 1)
         python_source._Place(sources.source).depfile()
         monkeypatch.undo()
         monkeypatch.setenv("XDG_CACHE_HOME", str(sources.folder / "cache"))
