@@ -327,7 +327,7 @@ class _Functions:
             if isinstance(value, type) and value in self._copies:
                 scope[name] = self._copies[value]
         self._known[function] = _in_class(tree, scope, source, owner)
-        for name in {*_global_names(function.__code__), *rewriting.constants}:
+        for name in dict.fromkeys((*_global_names(function.__code__), *rewriting.constants)):
             value = scope.get(name)
             if isinstance(value, FunctionType) and is_own(value) and name not in HELPERS:
                 scope[name] = self._function(value)

@@ -74,12 +74,11 @@ class CommonRewriting(ast.NodeTransformer):
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
         """Rewrite `GAINS.kp` of a dataclass of constants, `Mode.RUN` of an enum."""
-        owner = resolve(node.value, self.source)
         if (number := self._flags(node)) is not None:
             return number
-        member = resolve(node, self.source)
-        if is_enum(type(member)):
-            return like(node, ast.Attribute(self._enum(type(member)), member.name, ast.Load()))
+        owner, value = resolve(node.value, self.source), resolve(node, self.source)
+        if is_enum(type(value)):
+            return like(node, ast.Attribute(self._enum(type(value)), value.name, ast.Load()))
         if node.attr == "name" and (isinstance(owner, enum.Enum) or self._is_enum(node.value)):
             raise self.mistake(
                 node, "text cannot be built in the cycle", 'log it: self.info("{}", self.mode.name)'
@@ -87,7 +86,6 @@ class CommonRewriting(ast.NodeTransformer):
         if owner is not None and not isinstance(node.ctx, ast.Load):
             name = ast.unparse(node.value)
             raise self.mistake(node, f"{name} is a constant of the module", "declare a State")
-        value = resolve(node, self.source)
         is_module = isinstance(owner, ModuleType)
         if is_own(value) if is_module else _is_namespace(owner) and _is_constant(value):
             return self._named_constant(node, value)
@@ -109,9 +107,10 @@ class CommonRewriting(ast.NodeTransformer):
         return None
 
     def _has_flags(self) -> bool:
-        """Tell whether the function uses sets of flags."""
-        nodes = [each for each in ast.walk(self.source.tree)
-                 if isinstance(each, ast.Name | ast.Attribute)]  # fmt: skip
+        """Tell whether the function uses `~` and sets of flags."""
+        nodes = list(ast.walk(self.source.tree))
+        if not any(isinstance(each, ast.Invert) for each in nodes):
+            return False
         values = [resolve(each, self.source) for each in nodes]
         return any(isinstance(each, enum.IntFlag) or (
             isinstance(each, type) and issubclass(each, enum.IntFlag)
@@ -797,7 +796,7 @@ class CommonRewriting(ast.NodeTransformer):
     def _with_new_axis(self, node: ast.Subscript, parts: list[ast.expr]) -> ast.AST:
         """Rewrite `v[:, None]` and its like: the other indices first, then the new axes."""
         others = [each for each in parts if not is_new_axis(each)]
-        # What numba can tell by its type: None for a new axis, 0 for ..., True for an old axis.
+        # Told apart by type: None for a new axis, 0 for ..., True for an old axis.
         kept = [
             ast.Constant(None if is_new_axis(each) else 0 if is_ellipsis(each) else True)
             for each in parts

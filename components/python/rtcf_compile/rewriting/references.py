@@ -463,7 +463,7 @@ class _Followed:
         next_value: Value | None = None,
         held: Cell | None = None,
     ) -> list[Bindings]:
-        """Follow a loop. `held`: what it iterates, which `else` does not know any more."""
+        """Follow a loop. `held`: the cell of the iterated value, absent in `else`."""
         frame = self._frame
         frame.breaks.append([])
         frame.continues.append([])

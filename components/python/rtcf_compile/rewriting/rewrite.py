@@ -43,7 +43,7 @@ from rtcf_compile.source.mistake import at, once
 from rtcf_compile.source.modules import Source, read
 
 _MOST_TEXTS = 32  # of a dict, tuple or list
-# What other libraries call the object that logs.
+# Names of loggers in other libraries.
 _LOGGERS = ("log", "logger", "_logger", "get_logger")
 
 

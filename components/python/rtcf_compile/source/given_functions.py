@@ -18,7 +18,7 @@ class Given(NamedTuple):
     """A function that is given to another."""
 
     name: str  # for names of copies
-    key: Any  # what differs between copies
+    key: Any  # of the copy
     of_module: Any = None  # function of a module
     method: str = ""  # self.method
     nested: str = ""  # nested function

@@ -118,7 +118,7 @@ _Known = tuple[inspect.Signature, list[str]]
 
 
 class _Lifted(NamedTuple):
-    """A function that was lifted, and what it may call."""
+    """A lifted function and its callees."""
 
     tree: ast.FunctionDef
     functions: dict[str, FunctionType]
@@ -314,7 +314,7 @@ class _Lifting(ast.NodeTransformer):
         return name
 
     def _note(self, function: FunctionType, tree: ast.FunctionDef) -> None:
-        """Note the tree of a function that was lifted, and what it may call."""
+        """Note the tree and the callees of a lifted function."""
         functions, known = dict(self.functions), dict(self._known)
         _lifted[function] = _Lifted(tree, functions, known, self._owner, self._depth)
 
@@ -404,8 +404,7 @@ class _Lifting(ast.NodeTransformer):
         if taker is None or not self._may_be_function(node):
             return None
         function, before, first = taker
-        tree = parsed(function) if function not in _lifted else tree_of(function)
-        assert tree is not None
+        tree = tree_of(function) or parsed(function)
         names = [each.arg for each in (*tree.args.posonlyargs, *tree.args.args)]
         placed = arguments(node, names[len(before) :])
         if placed is None or not is_plain(function, tree):

@@ -24,7 +24,7 @@ def parsed(function: FunctionType) -> ast.FunctionDef:
     if function.__name__ == "<lambda>" and (found := _lambda(function, file)) is not None:
         return found
     try:
-        lines, begin = inspect.getsourcelines(function.__code__)  # not what it wraps
+        lines, begin = inspect.getsourcelines(function.__code__)  # not the wrapped function
     except OSError:
         raise Mistake(
             file, 0, f"{function.__name__} has no source", "define it in a file"

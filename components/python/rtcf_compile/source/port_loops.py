@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 
 from rtcf.component.declaration import Declarable, Declared, MemberAttribute
 
+_PORTS = ("Input", "Output", "Queue")
+
 
 def by_port(
     target: ast.expr,
@@ -59,9 +61,9 @@ def is_port(node: ast.AST, owner: type | None) -> bool:
             return False
         declared = inspect.get_annotations(each).get(node.attr)
         if isinstance(declared, str):
-            return declared.partition("[")[0].rpartition(".")[2] in ("Input", "Output", "Queue")
+            return declared.partition("[")[0].rpartition(".")[2] in _PORTS
         if isinstance(declared, Declared):
-            return declared.kind.__name__ in ("Input", "Output", "Queue")
+            return declared.kind.__name__ in _PORTS
     return True
 
 

@@ -99,8 +99,6 @@ class _Spelling(ast.NodeTransformer):
         log = ast.Call(error, [ast.Constant(text), *values], [])
         call.args = [ast.copy_location(ast.Constant(_without_values(text)), of)]
         before = ast.fix_missing_locations(ast.copy_location(ast.Expr(log), node))
-        for each in ast.walk(log):
-            ast.copy_location(each, each if hasattr(each, "lineno") else node)
         return [before, node]
 
 
@@ -137,7 +135,7 @@ def _text(node: ast.expr) -> tuple[str, list[ast.expr]] | None:
 
 
 def _maybe_text(node: ast.expr) -> tuple[str, list[ast.expr]] | None:
-    """Return the format and the value of what must be a text, `{!s}`, or None."""
+    """Return the format `{!s}` and the value of a possible text, or None."""
     is_known = isinstance(node, ast.Name | ast.Subscript)
     is_name = isinstance(node, ast.Attribute) and node.attr == "name"
     return ("{!s}", [node]) if is_known or is_name else None

@@ -14,7 +14,7 @@ _MOST = 16  # iterations
 
 
 class _Column(NamedTuple):
-    """A target of a loop and what it iterates: the elements, an array, or neither if unknown."""
+    """A target of a loop, and its iterated elements or array; neither if unknown."""
 
     target: ast.expr
     elements: list[ast.expr] | None
@@ -24,8 +24,8 @@ class _Column(NamedTuple):
 class Written(NamedTuple):
     """A loop that can be written out.
 
-    `rounds`: in each iteration, the texts and ports by name, what is set first, and the arrays that
-    are iterated.
+    `rounds`: for each iteration, the texts and ports by name, the assignments before the body, and
+    the iterated arrays.
     """
 
     before: list[ast.stmt]
@@ -162,7 +162,7 @@ def _is_constant(node: ast.expr, constant: Callable[[ast.expr], Any]) -> bool:
 def _is_replaced(
     column: _Column, body: list[ast.stmt], is_port: Callable[[ast.expr], bool]
 ) -> bool:
-    """Tell whether a variable is replaced by what it stands for: texts, or ports."""
+    """Tell whether texts or ports replace a variable."""
     if not isinstance(column.target, ast.Name) or not column.elements:
         return False
     if column.target.id in everywhere(ast.Module(body, [])):
@@ -178,8 +178,8 @@ def rounds_of(
 ) -> list[ast.stmt]:
     """Return the statements of a loop that is written out.
 
-    Each iteration has what it sets first, its body, and tests of whether it takes place. `break`
-    and `continue` leave a loop of one iteration.
+    Each iteration has its assignments, its body, and the tests for its existence. `break` and
+    `continue` leave a loop of one iteration.
     """
     over = f"{prefix}_over"
     has_break = any(_leaves(body, ast.Break) for _, body, _ in rounds)

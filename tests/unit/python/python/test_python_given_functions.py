@@ -196,7 +196,7 @@ WAYS = {
         self.x = self.integrated(lambda v: -v * k, self.x, 0.01)
         self.x = self.euler(lambda v: -v * k, self.x, 0.01)
 """,
-    "functions that differ in what they are given": """
+    "copies for different functions": """
         self.y.write(shifted(up, u) + 2.0 * shifted(down, u) + shifted(math.sin, u))
         self.x[0] = shifted(lambda x: x * k, u) - shifted(lambda x: x / k, u)
 """,
