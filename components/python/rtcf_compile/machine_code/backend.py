@@ -13,7 +13,7 @@ from unittest import mock
 import llvmlite.binding as llvm
 import numba
 from numba import types
-from numba.core import cgutils, codegen, config, cpu
+from numba.core import cgutils, codegen, compiler_machinery, config, cpu
 from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import cpu_target
 from numba.core.typing import npydecl
@@ -32,6 +32,8 @@ types.Boolean.bitwidth = 8
 # numba optimises each function on its own. Loops become vectors only in whole hooks, where sizes
 # are known: before that, vectors would multiply the code and hide the sizes.
 config.LOOP_VECTORIZE = config.SLP_VECTORIZE = 0
+# Before each pass numba prints its options, for listeners that rtcf does not have: 7 % of the time.
+compiler_machinery.pformat = lambda _: ""
 if POINTERS_HAVE_TYPES:
     llvm.initialize()
 llvm.initialize_native_target()
