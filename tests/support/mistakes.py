@@ -30,6 +30,7 @@ A = np.eye(2)
 B = np.ones((3, 2))
 TABLE = [1.0, 2.0, 3.0]
 LIMITS = (0.5, 1.5)
+BLOCK = np.ones((2, 2, 2))
 GAINS = {"kp": 1.0}
 NAMES = ["arm", "leg"]
 POINTS = [[1.0, 2.0], [3.0]]
@@ -286,7 +287,6 @@ UPDATE: dict[str, tuple[str, str]] = {
     "member that an enum has not": ("self.mode = Mode.STOP", "STOP"),
     "mode counted up": ("self.mode += 0.5", "Mode"),
     "modes in a loop": ("for each in Mode:\n    self.n += each", "Mode"),
-    "number of modes": ("self.n = len(Mode)", "Mode"),
     "None to a number": ("self.f = None", "None"),
     "None to an array": ("self.z = None", "None"),
     "None written": ("self.y.write(None)", "None"),
@@ -361,9 +361,13 @@ UPDATE: dict[str, tuple[str, str]] = {
     "tuple element set": ("a = (1.0, 2.0)\na[0] = 2.0  # here", "list or tuple"),
     "elements of a constant tuple": ("LIMITS[0] = 1.0", "LIMITS"),
     # NumPy's functions.
-    "einsum to three dimensions": (
-        "a = np.einsum('ij,k->ijk', self.m, self.z)",
-        "one or two dimensions",
+    "einsum to four dimensions": (
+        "a = np.einsum('ij,kl->ijkl', self.m, self.m)",
+        "at most 3 dimensions",
+    ),
+    "einsum that transposes a block": (
+        "a = np.einsum('ijk->kji', BLOCK)",
+        "this is a view of a block: write a loop over its matrices",
     ),
     "einsum of variable subscripts": ("a = np.einsum(NAMES[0], self.z)", "constant subscripts"),
     "einsum with ellipsis": ("a = np.einsum('...i,i', self.m, self.z)", "any number"),
@@ -857,6 +861,11 @@ CLASS: dict[str, tuple[str, str]] = {
     "property set": (
         "@property\ndef k(self):\n    return 1.0\n\ndef start(self):\n    self.k = 1.0  # here",
         "k is a read-only property: set the members that it is computed from",
+    ),
+    "property set beside another": (
+        "@property\ndef k(self):\n    return self.f\n\n@k.setter\ndef k(self, x):\n    self.f = x\n\n"
+        "def start(self):\n    self.k, self.n = 1.0, 2  # here",
+        "k has a setter: write self.k = … on a line of its own",
     ),
     "method without its call": (
         "def k(self):\n    return 1.0\n\ndef start(self):\n    self.f = self.k  # here",

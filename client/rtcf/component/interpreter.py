@@ -348,7 +348,10 @@ class Component:
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Set a state or a derived member; raise AttributeError for any other name."""
-        if isinstance(getattr(type(self), name, None), property):
+        if isinstance(found := getattr(type(self), name, None), property):
+            if found.fset is not None:
+                found.fset(self, value)
+                return
             raise AttributeError(
                 f"{name} is a read-only property: set the members that it is computed from, "
                 f"or write a method: self.set_{name}(…)"

@@ -41,7 +41,7 @@ from rtcf_compile.rewriting.functions import made as made_of
 from rtcf_compile.source.checks import resolve
 from rtcf_compile.source.modules import Source, read
 from rtcf_compile.source.parsed import is_own, opened
-from rtcf_compile.source.spelling import defaults_of
+from rtcf_compile.source.spelling import SETTER, defaults_of
 
 
 class Model:
@@ -308,6 +308,8 @@ class _Functions:
             function: Any = value.__func__
             return staticmethod(self._function(function, owner))
         if isinstance(value, property) and isinstance(value.fget, FunctionType):
+            if isinstance(value.fset, FunctionType):
+                setattr(owner, f"{SETTER}{value.fget.__name__}", self._function(value.fset, owner))
             return property(self._function(value.fget, owner), value.fset)
         return None
 

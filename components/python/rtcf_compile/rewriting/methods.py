@@ -12,6 +12,7 @@ from rtcf.component import Component
 
 from rtcf_compile.source.checks import decorator_of
 from rtcf_compile.source.parsed import is_of_user
+from rtcf_compile.source.spelling import SETTER
 
 _DECORATED = "function with a decorator"
 
@@ -90,6 +91,9 @@ class Methods:
         for place, each in enumerate(self._classes[begin:], begin):
             if name in vars(each):
                 return _method(name, each, place, vars(each)[name])
+            of = vars(each).get(name.removeprefix(SETTER))
+            if isinstance(of, property) and inspect.isfunction(of.fset):
+                return Method(name, each, place, "method", of.fset)
         return None
 
 

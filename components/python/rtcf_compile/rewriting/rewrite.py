@@ -41,6 +41,7 @@ from rtcf_compile.rewriting.references import is_super
 from rtcf_compile.source.checks import METHODS, check_arguments, resolve
 from rtcf_compile.source.mistake import at, once
 from rtcf_compile.source.modules import Source, read
+from rtcf_compile.source.spelling import SETTER
 
 _MOST_TEXTS = 32  # of a dict, tuple or list
 # Names of loggers in other libraries.
@@ -485,6 +486,9 @@ class Hook(Ports):
                     node, "is a constant of the class", f"declare {node.attr}: State[…]"
                 )
             method = self._methods.find(node.attr)
+            if self._methods.find(SETTER + node.attr) is not None:
+                what = f"{node.attr} has a setter"
+                raise self.mistake(node, what, f"write self.{node.attr} = … on a line of its own")
             if method is not None and method.kind == "property":
                 raise self.mistake(
                     node,

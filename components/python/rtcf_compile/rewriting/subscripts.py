@@ -1,6 +1,7 @@
 """The subscripts of np.einsum, such as `ij,j->i`."""
 
 MOST_OPERANDS = 3
+MOST_DIMENSIONS = 3
 
 
 class Subscripts:
@@ -26,8 +27,12 @@ class Subscripts:
                 f"the result {result} has subscripts that are not those of the operands",
                 "write each subscript once behind ->",
             )
-        if max(map(len, (*self.operands, result))) > 2:
-            raise ValueError("arrays have one or two dimensions", "use parts of the arrays")
+        if max(map(len, (*self.operands, result))) > MOST_DIMENSIONS:
+            raise ValueError(
+                f"arrays have at most {MOST_DIMENSIONS} dimensions", "use parts of the arrays"
+            )
+        if self.is_view and len(self.operands[0]) > 2:
+            raise ValueError("this is a view of a block", "write a loop over its matrices")
         if len(self.operands) > MOST_OPERANDS:
             raise ValueError(
                 f"more than {MOST_OPERANDS} operands", "write two calls, or use @ and *"

@@ -140,7 +140,7 @@ _REJECTED = (
     )),
 )  # fmt: skip
 # Decorators that leave the body of a function as it is.
-_DECORATORS = ("property", "staticmethod", "override", "final")
+_DECORATORS = ("setter", "property", "staticmethod", "override", "final")
 # Packages whose functions are compiled, or rejected individually.
 _COMPILED = ("builtins", "cmath", "math", "numpy", "operator", "rtcf", "_operator")
 _LARGEST, _SMALLEST = 2**63 - 1, -(2**63)

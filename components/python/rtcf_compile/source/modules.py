@@ -17,7 +17,7 @@ from rtcf.component import Component, DeclarationError
 
 from rtcf_compile.source import dependencies, lifting, numpy_errors, progress
 from rtcf_compile.source.mistake import Mistake, source_line
-from rtcf_compile.source.parsed import parsed
+from rtcf_compile.source.parsed import is_of_user, parsed
 from rtcf_compile.source.prefix_map import mapped
 from rtcf_compile.source.scopes import everywhere
 
@@ -94,10 +94,29 @@ def components(module: ModuleType) -> list[type[Component]]:
         and not each.__name__.startswith("_")
     ]
     bases = {base for each in found for base in each.__mro__[1:]}
-    # A base class without update is not a component.
-    whole = [each for each in found if each not in bases or each.update is not Component.update]
+    # A base class without update, or with a method that subclasses must define, is not a component.
+    whole = [each for each in found if each not in bases or not _is_abstract(each)]
     _check_names(module, found)
     return sorted(dict.fromkeys(whole), key=lambda each: inspect.getsourcelines(each)[1])
+
+
+def _is_abstract(cls: type[Component]) -> bool:
+    """Tell whether subclasses must define update, or a method that raises NotImplementedError."""
+    if cls.update is Component.update:
+        return True
+    functions = [each for name in dir(cls) if isinstance(each := getattr(cls, name), FunctionType)]
+    return any(_is_missing(each) for each in functions if is_of_user(each))
+
+
+def _is_missing(function: FunctionType) -> bool:
+    if "NotImplementedError" not in function.__code__.co_names:
+        return False
+    first, *rest = parsed(function).body
+    if isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant) and rest:
+        first, *rest = rest
+    raised = first.exc if isinstance(first, ast.Raise) else None
+    raised = raised.func if isinstance(raised, ast.Call) else raised
+    return isinstance(raised, ast.Name) and raised.id == "NotImplementedError" and not rest
 
 
 def _check_names(module: ModuleType, found: Sequence[type]) -> None:

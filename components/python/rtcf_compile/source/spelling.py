@@ -3,18 +3,25 @@
 A text with values in a log call, such as an f-string, becomes a format with arguments; such a fault
 becomes a log call and a fault. An argument that is given only by its name becomes an ordinary one,
 and `x[...]` becomes `x[:]`. A name that is private to a class, `self.__x`, becomes the name that
-Python uses, `self._Observer__x`.
+Python uses, `self._Observer__x`. A constant slice becomes its numbers, `len(Axis)` of an enum a
+number, and an assignment to a property a call of its setter.
 """
 
 import ast
+import copy
+import enum
+import inspect
 import re
 import string
 from collections.abc import Collection
+from operator import index
 from types import FunctionType
 from typing import Any
 
 from rtcf.component import Component
 from rtcf.component.declaration import LOG_LEVELS
+
+from rtcf_compile.source.scopes import everywhere
 
 
 def normalise(tree: ast.AST, function: FunctionType) -> None:
@@ -24,7 +31,7 @@ def normalise(tree: ast.AST, function: FunctionType) -> None:
     # A method of the user hides a level.
     levels = [each for each in ("error", "fatal", "warn")
               if getattr(cls, each, None) is getattr(Component, each)]  # fmt: skip
-    _Spelling(owner, levels[0] if levels else "error").visit(tree)
+    _Spelling(owner, levels[0] if levels else "error", cls, function, tree).visit(tree)
 
 
 def _class_of(function: FunctionType) -> str:
@@ -46,9 +53,18 @@ _NAMES: dict[type[ast.AST], str] = {
 }
 
 
+# Before the name of a property: the name of its setter.
+SETTER = "rtcf_set_"
+
+
 class _Spelling(ast.NodeTransformer):
-    def __init__(self, owner: str, level: str) -> None:
-        self._level = level
+    def __init__(
+        self, owner: str, level: str, cls: Any, function: FunctionType, tree: ast.AST
+    ) -> None:
+        self._level, self._cls = level, cls
+        self._globals, self._bound = function.__globals__, everywhere(tree)
+        arguments = tree.args.args if isinstance(tree, ast.FunctionDef) else []
+        self._first = arguments[0].arg if arguments and isinstance(cls, type) else ""
         self._prefix = f"_{owner.lstrip('_')}" if owner.strip("_") else ""
 
     def visit(self, node: ast.AST) -> Any:
@@ -70,12 +86,71 @@ class _Spelling(ast.NodeTransformer):
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
         self.generic_visit(node)
-        if isinstance(node.slice, ast.Constant) and node.slice.value is ...:
-            node.slice = ast.copy_location(ast.Slice(None, None, None), node.slice)
+        place = node.slice
+        if isinstance(place, ast.Constant) and place.value is ...:
+            node.slice = ast.copy_location(ast.Slice(None, None, None), place)
+        elif isinstance(place, ast.Tuple):
+            place.elts = [self._sliced(each) for each in place.elts]
+        else:
+            node.slice = self._sliced(place)
         return node
+
+    def _sliced(self, node: ast.expr) -> ast.expr:
+        """Return the slice for the name of a constant one; other indices as they are."""
+        value = self._constant(node)
+        if not isinstance(value, slice):
+            return node
+        numbers = (value.start, value.stop, value.step)
+        parts = [None if each is None else ast.Constant(index(each)) for each in numbers]
+        return ast.fix_missing_locations(ast.copy_location(ast.Slice(*parts), node))
+
+    def _constant(self, node: ast.expr) -> Any:
+        """Return the value of a name of the module, or of an attribute of a class; else None."""
+        if isinstance(node, ast.Name):
+            return None if node.id in self._bound else self._globals.get(node.id)
+        if not isinstance(node, ast.Attribute) or not isinstance(node.value, ast.Name):
+            return None
+        of = self._cls if self._is_self(node.value) else self._constant(node.value)
+        return inspect.getattr_static(of, node.attr, None) if isinstance(of, type) else None
+
+    def _is_self(self, node: ast.AST) -> bool:
+        return isinstance(node, ast.Name) and node.id == self._first
+
+    def visit_Assign(self, node: ast.Assign) -> ast.AST:
+        self.generic_visit(node)
+        target, *others = node.targets
+        return node if others or not self._has_setter(target) else self._set(target, node.value)
+
+    def visit_AugAssign(self, node: ast.AugAssign) -> ast.AST | list[ast.stmt]:
+        self.generic_visit(node)
+        if not self._has_setter(node.target):
+            return node
+        # The value may be an array, which then changes in place.
+        name = f"rtcf_old_{node.lineno}_{node.col_offset}"
+        old = copy.copy(node.target)
+        old.ctx = ast.Load()
+        read = ast.Assign([ast.Name(name, ast.Store())], old)
+        change = ast.AugAssign(ast.Name(name, ast.Store()), node.op, node.value)
+        placed = [ast.copy_location(each, node) for each in (read, change)]
+        call = self._set(node.target, ast.copy_location(ast.Name(name, ast.Load()), node))
+        return [*map(ast.fix_missing_locations, placed), call]
+
+    def _has_setter(self, node: ast.expr) -> bool:
+        if not isinstance(node, ast.Attribute) or not self._is_self(node.value):
+            return False
+        found = inspect.getattr_static(self._cls, node.attr, None)
+        return isinstance(found, property) and found.fset is not None
+
+    def _set(self, target: ast.expr, value: ast.expr) -> ast.stmt:
+        assert isinstance(target, ast.Attribute)
+        setter = ast.Attribute(target.value, SETTER + target.attr, ast.Load())
+        call = ast.copy_location(ast.Expr(ast.Call(setter, [value], [])), target)
+        return ast.fix_missing_locations(call)
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
         self.generic_visit(node)
+        if self._is_len(node) and isinstance(of := self._constant(node.args[0]), enum.EnumMeta):
+            return ast.copy_location(ast.Constant(len(of)), node)
         if not _is_of_levels(node.func, LOG_LEVELS) or len(node.args) != 1:
             return node
         if isinstance(node.args[0], ast.Constant) or (found := _text(node.args[0])) is None:
@@ -83,6 +158,11 @@ class _Spelling(ast.NodeTransformer):
         text, values = found
         node.args = [ast.copy_location(ast.Constant(text), node.args[0]), *values]
         return node
+
+    def _is_len(self, node: ast.Call) -> bool:
+        of = node.func
+        is_len = isinstance(of, ast.Name) and of.id == "len" and "len" not in self._bound
+        return is_len and "len" not in self._globals and len(node.args) == 1 and not node.keywords
 
     def visit_Expr(self, node: ast.Expr) -> ast.AST | list[ast.stmt]:
         self.generic_visit(node)

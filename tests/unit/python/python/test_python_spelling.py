@@ -35,6 +35,9 @@ class Gains:
 
 FILTER = SimpleNamespace(alpha=0.25, order=2)
 LIMITS = {{"low": -1.0, "high": 1.5}}
+FIRST, REST = slice(0, 2), np.s_[2:]
+CYCLIC = np.zeros((2, 2, 2))
+CYCLIC[0, 1, 0] = CYCLIC[1, 0, 1] = 1.5
 SPEEDS = {{Mode.OFF: 0.0, Mode.RUN: 1.0, Mode.HOLD: 0.5}}
 
 
@@ -53,8 +56,27 @@ class Written(Component):
     m: State[np.float64, 2, 2]
     crc: State[np.uint32] = State(0xFFFF)
 
+    ENDS = slice(None, None, 3)
+
     def error(self, x):
         return x - 1.0
+
+    @property
+    def level(self):
+        return self.a[0]
+
+    @level.setter
+    def level(self, x):
+        self.k.write(self.k.value + 1)
+        self.a[0] = min(x, 1.5)
+
+    @property
+    def part(self):
+        return self.a[1:]
+
+    @part.setter
+    def part(self, x):
+        self.a[:3] = 2.0 * x
 
     def update(self):
         self.mode = Mode.RUN if self.u.value > 0.0 else Mode.OFF
@@ -83,6 +105,13 @@ WAYS = {
     "unsigned default": "self.crc = np.uint32(self.i.value & 255); self.k.write(int(self.crc))",
     "round to digits": "self.y.write(round(self.u.value, 2))",
     "remainder": "self.y.write(math.remainder(self.u.value, 2.0 * math.pi))",
+    "length of an enum": "self.a[len(Mode)] = self.u.value",
+    "constant slices": "self.a[FIRST] = self.w.value[REST]; self.m[0, FIRST] = self.a[FIRST]",
+    "slice of the class": "self.a[self.ENDS] = self.u.value; self.m[0] = self.a[Written.ENDS]",
+    "setter": "self.level = self.u.value",
+    "setter in place": "self.level += self.u.value",
+    "setter of a view in place": "self.a += self.w.value; self.part += 1.0; self.part *= 0.25",
+    "sum over three dimensions": "self.a[:2] = np.einsum('ijk,j,k', CYCLIC, self.a[:2], self.w.value[2:])",
     "append": "self.a = np.append(self.w.value[1:], self.u.value)",
     "append of a vector": "self.a = np.append(self.w.value[:1], self.w.value[1:])",
     "tile": "self.a = np.tile(self.w.value[:2], 2)",
@@ -125,6 +154,37 @@ def test_texts_with_values_are_logged_as_written(tmp_path: Path) -> None:
         logged.append(text.format(*values))
     assert logged == [eval(text.replace("{{", "{").replace("}}", "}")) for text in texts]
     assert [len(each.args) - 1 for each in calls] == list(texts.values())  # type: ignore[attr-defined]
+
+
+ABSTRACT = """from rtcf.component import Component, Input, Output
+
+
+class Filter(Component):
+    u: Input[float]
+    y: Output[float]
+
+    def step(self, x):
+        \"\"\"Return the next output.\"\"\"
+        raise NotImplementedError("step")
+
+    def update(self):
+        self.y.write(self.step(self.u.value))
+
+
+class Half(Filter):
+    def step(self, x):
+        return 0.5 * x
+"""
+
+
+def test_a_base_with_a_method_that_subclasses_define_is_no_component(tmp_path: Path) -> None:
+    file = tmp_path / "abstract.py"
+    file.write_text(ABSTRACT)
+    assert [each.__name__ for each in modules.components(modules.load(file))] == ["Half"]
+    file = tmp_path / "whole.py"
+    file.write_text(ABSTRACT.replace('raise NotImplementedError("step")', "return x"))
+    names = [each.__name__ for each in modules.components(modules.load(file))]
+    assert names == ["Filter", "Half"]
 
 
 def test_floats_are_rounded_to_digits_as_in_python(tmp_path: Path) -> None:
