@@ -305,6 +305,17 @@ def test_the_files_used_last_remain(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     cache.remove_old()
     left = {each.name for each in (tmp_path / "kept").iterdir()}
     assert left == {names[0], *names[3:]}
+    cache.write(names[1], bytes(4000))
+    cache.remove_old()
+    assert (tmp_path / "kept" / names[3]).exists()  # the folder was looked at a moment ago
+    mark = tmp_path / "kept-looked"
+    for age_s in (601, -3600):
+        cache.write(names[1], bytes(4000))
+        os.utime(tmp_path / "kept" / names[1], ns=(1, 1))
+        then = mark.stat().st_mtime_ns - age_s * 10**9
+        os.utime(mark, ns=(then, then))
+        cache.remove_old()
+        assert not (tmp_path / "kept" / names[1]).exists()
 
 
 def test_enums_with_other_bases_are_told_apart() -> None:
