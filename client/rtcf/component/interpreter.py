@@ -6,6 +6,7 @@ Compiled code has one record of all members. Each call of `cycle()` runs one `up
 import enum
 from dataclasses import dataclass, field
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -312,6 +313,9 @@ def record_of(component: "Component") -> Any:
     return _values(component).memory.whole()
 
 
+_descriptions: WeakKeyDictionary[type, Description] = WeakKeyDictionary()
+
+
 class Component:
     """Base class of components in Python. Derived classes declare members and implement hooks."""
 
@@ -327,7 +331,8 @@ class Component:
 
     def __init__(self, **parameters: Any) -> None:
         """Create a component in the interpreter. `parameters` override defaults."""
-        description: Description = describe(type(self))
+        description = _descriptions.get(type(self)) or describe(type(self))
+        _descriptions[type(self)] = description
         for name, member in description.members.items():
             setattr(type(self), name, _Attribute(member))
         record = fresh_record(description)
