@@ -863,7 +863,8 @@ CLASS: dict[str, tuple[str, str]] = {
         "k is a read-only property: set the members that it is computed from",
     ),
     "property set beside another": (
-        "@property\ndef k(self):\n    return self.f\n\n@k.setter\ndef k(self, x):\n    self.f = x\n\n"
+        "@property\ndef k(self):\n    return self.f\n\n"
+        "@k.setter\ndef k(self, x):\n    self.f = x\n\n"
         "def start(self):\n    self.k, self.n = 1.0, 2  # here",
         "k has a setter: write self.k = … on a line of its own",
     ),

@@ -111,7 +111,9 @@ WAYS = {
     "setter": "self.level = self.u.value",
     "setter in place": "self.level += self.u.value",
     "setter of a view in place": "self.a += self.w.value; self.part += 1.0; self.part *= 0.25",
-    "sum over three dimensions": "self.a[:2] = np.einsum('ijk,j,k', CYCLIC, self.a[:2], self.w.value[2:])",
+    "sum over three dimensions": (
+        "self.a[:2] = np.einsum('ijk,j,k', CYCLIC, self.a[:2], self.w.value[2:])"
+    ),
     "append": "self.a = np.append(self.w.value[1:], self.u.value)",
     "append of a vector": "self.a = np.append(self.w.value[:1], self.w.value[1:])",
     "tile": "self.a = np.tile(self.w.value[:2], 2)",
