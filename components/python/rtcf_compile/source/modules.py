@@ -142,8 +142,8 @@ def read(function: FunctionType, is_whole: bool = False) -> Source:
         lifted = lifting.lift(tree, function, file)
         # Pickle copies a tree in a fifth of the time of deepcopy.
         _read[function] = pickle.dumps(tree), lifted
-    tree, lifted = _read[function]
-    return Source(function, pickle.loads(tree), file, lifted)
+    data, functions = _read[function]
+    return Source(function, pickle.loads(data), file, functions)
 
 
 def _moved(error: ImportError) -> tuple[str, str] | None:

@@ -131,9 +131,11 @@ class _Spelling(ast.NodeTransformer):
         old.ctx = ast.Load()
         read = ast.Assign([ast.Name(name, ast.Store())], old)
         change = ast.AugAssign(ast.Name(name, ast.Store()), node.op, node.value)
-        placed = [ast.copy_location(each, node) for each in (read, change)]
         call = self._set(node.target, ast.copy_location(ast.Name(name, ast.Load()), node))
-        return [*map(ast.fix_missing_locations, placed), call]
+        statements: list[ast.stmt] = [read, change]
+        for each in statements:
+            ast.fix_missing_locations(ast.copy_location(each, node))
+        return [*statements, call]
 
     def _has_setter(self, node: ast.expr) -> bool:
         if not isinstance(node, ast.Attribute) or not self._is_self(node.value):
