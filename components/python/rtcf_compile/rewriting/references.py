@@ -77,7 +77,9 @@ _UNCHANGED = ("input", "read-only")  # places that a hook does not change
 _SURELY = ("begin", "own", "shared", "read", "read-only")
 # One of the values that a condition selects: a number, or a new array.
 _NEW = ("selected",)
-_MOST_STATES = 12  # different bindings at one place, before they are merged
+# Different bindings at one place before they are merged, and statements to follow before that
+# number is too large: nested loops and calls multiply both.
+_EFFORT = ((12, 5000), (1, 8000))
 
 # Functions and methods whose result refers to their first argument, in NumPy.
 _SAME = (np.asarray, np.ascontiguousarray)
@@ -104,6 +106,14 @@ _ITERATORS = (enumerate, zip, reversed, iter)
 _TUPLES = (tuple, list)
 
 
+class _Exhausted(Exception):
+    """Raised when there are too many statements to follow."""
+
+    def __init__(self, mistake: Exception) -> None:
+        super().__init__()
+        self.mistake = mistake
+
+
 class References:
     """The copies that the functions of a component need."""
 
@@ -113,9 +123,16 @@ class References:
         # The largest absolute int that calls pass for an argument; None: also other values.
         self.constants: dict[tuple[CodeType, str], int | None] = {}
         found = -1
+        effort = list(_EFFORT)
         while len(self.copies) > found:
             found = len(self.copies)
-            _Followed(description, methods, self.copies, self.constants).hooks()
+            try:
+                _Followed(description, methods, self.copies, self.constants, *effort[0]).hooks()
+            except _Exhausted as error:
+                effort.pop(0)
+                if not effort:
+                    raise error.mistake from None
+                found = -1
 
     def mark(self, source: Source) -> None:
         """Mark the expressions of a function that must be copied, see `is_copied`."""
@@ -227,9 +244,10 @@ def _begin(cell: Cell) -> Refs:
 
 
 class _States:
-    """Different bindings at one place, merged if they become many."""
+    """Different bindings at one place, merged if they become more than `most`."""
 
-    def __init__(self) -> None:
+    def __init__(self, most: int) -> None:
+        self._most = most
         self._seen: set[frozenset[tuple[Cell, Value]]] = set()
         self.all: list[Bindings] = []
 
@@ -242,7 +260,7 @@ class _States:
                 self._seen.add(frozen)
                 new.append(each)
                 self.all.append(each)
-        if len(self.all) <= _MOST_STATES:
+        if len(self.all) <= self._most:
             return new
         merged = _merged(self.all)
         self.all, frozen = [merged], frozenset(merged.items())
@@ -250,12 +268,6 @@ class _States:
             return []
         self._seen.add(frozen)
         return [merged]
-
-
-def _distinct(states: Sequence[Bindings]) -> list[Bindings]:
-    found = _States()
-    found.add(states)
-    return found.all
 
 
 class _Frame:
@@ -283,7 +295,13 @@ class _Followed:
         methods: Methods,
         copies: set[Site],
         ints: dict[tuple[CodeType, str], int | None],
+        most: int,
+        left: int,
     ) -> None:
+        """`most`: different bindings at one place before they are merged. Raises _Exhausted after
+        `left` statements.
+        """
+        self._most, self._left = most, left
         self._members, self._constants = description.members, description.constants
         self._methods, self._copies, self._ints = methods, copies, ints
         self._names = {*description.members, *description.constants, *methods.names()}
@@ -299,7 +317,7 @@ class _Followed:
         """Follow prepare and start, then update and safe until their bindings repeat."""
         begin: Bindings = {}
         self._hook("prepare", [begin])
-        states = _States()
+        states = _States(self._most)
         new = states.add([begin])
         while new:
             ends = [
@@ -391,13 +409,18 @@ class _Followed:
 
     # Statements.
 
+    def _distinct(self, states: Sequence[Bindings]) -> list[Bindings]:
+        found = _States(self._most)
+        found.add(states)
+        return found.all
+
     def _statements(self, body: Sequence[ast.stmt], states: Sequence[Bindings]) -> list[Bindings]:
         current = list(states)
         for node in body:
             after = [end for each in current for end in self._statement(node, dict(each))]
             live = self._frame.names.after(node)
             depth = self._frame.depth
-            current = _distinct(
+            current = self._distinct(
                 [
                     {
                         cell: value
@@ -411,6 +434,10 @@ class _Followed:
 
     def _statement(self, node: ast.stmt, state: Bindings) -> list[Bindings]:
         """Follow a statement; return the bindings after it, none if it never ends here."""
+        self._left -= 1
+        if not self._left:
+            what = "too many names of arrays in loops and calls to follow"
+            raise _Exhausted(self._mistake(node, what, "bind copies, as in x = self.a.copy()"))
         frame = self._frame
         frame.live = frame.names.during(node)
         if isinstance(node, ast.Assign):
@@ -467,7 +494,7 @@ class _Followed:
         frame = self._frame
         frame.breaks.append([])
         frame.continues.append([])
-        states, ended = _States(), []
+        states, ended = _States(self._most), []
         new = states.add([state])
         while new:
             begins = []
@@ -488,7 +515,7 @@ class _Followed:
             return left
         for each in (*ended, *left):
             each.pop(held, None)  # type: ignore[arg-type]
-        return [*self._statements(node.orelse, _distinct(ended)), *left]
+        return [*self._statements(node.orelse, self._distinct(ended)), *left]
 
     def _for(self, node: ast.For, state: Bindings) -> list[Bindings]:
         iterated = self._value(node.iter, state)
@@ -621,8 +648,8 @@ class _Followed:
             state[cell] = value  # its arrays are copied, not the iterator
             return cell
         site = self._site(node) if may_copy else None
-        if site is not None:
-            self._written.setdefault(site, (node.lineno, "", self._text(node)))
+        if site is not None and site not in self._written:
+            self._written[site] = (node.lineno, "", self._text(node))
         self._bound(cell, value, site, state)
         return cell
 
@@ -637,7 +664,7 @@ class _Followed:
     ) -> None:
         """Bind a variable."""
         value = _computed(value)
-        if given is not None:
+        if given is not None and self._written.get(site, ())[:2] != (given.lineno, name):
             self._written[site] = (given.lineno, name, self._text(given))
         elif site not in self._written:
             self._written[site] = (self._frame.source.tree.lineno, name, name)
@@ -724,7 +751,8 @@ class _Followed:
         if not self._is_array(name):
             return
         place, refs, site = ("self", name), _flat(_computed(value)), self._site(given)
-        self._written[site] = (given.lineno, target, self._text(given))
+        if self._written.get(site, ())[:2] != (given.lineno, target):
+            self._written[site] = (given.lineno, target, self._text(given))
         now = self._of_member(name, state)
         things = {ref.thing for ref in now}
         if (
@@ -1185,7 +1213,7 @@ class _Followed:
         if not ends:
             return NOTHING
         if frame.statement is node:
-            frame.ends = _distinct([each for each, _ in ends])
+            frame.ends = self._distinct([each for each, _ in ends])
         result: Value = ends[0][1]
         for _, value in ends[1:]:
             result = _either(result, value)

@@ -23,6 +23,7 @@ from rtcf.component.interpreter import fresh_record
 from rtcf_compile.comparison import verify
 from rtcf_compile.comparison.inside import Inside
 from rtcf_compile.machine_code import object_file
+from rtcf_compile.rewriting import references
 from rtcf_compile.rewriting.functions import Functions
 from rtcf_compile.source import modules
 from rtcf_compile.source.mistake import Mistake
@@ -314,6 +315,19 @@ def test_statements_mean_what_they_mean_in_numpy(tmp_path: Path, compiler: Any) 
     found = Programs(programs, tmp_path, compiler)
     assert not found.rejected
     assert not found.different()
+
+
+def test_programs_with_many_ways_mean_what_is_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(references, "_EFFORT", ((12, 1), (1, 10_000)))
+    found = run(range(20), tmp_path, 1, rewritten)
+    assert not found.different
+    assert found.rejected < 10
+    monkeypatch.setattr(references, "_EFFORT", ((12, 1), (1, 1)))
+    with pytest.raises(Mistake, match="too many names of arrays in loops and calls") as raised:
+        rewritten(modules.components(modules.load(tmp_path / "0" / "names.py"))[0])
+    assert raised.value.line
 
 
 def test_the_interpreter_binds_names_as_numpy_does(tmp_path: Path) -> None:
