@@ -413,7 +413,13 @@ def _time(name: str) -> property:
 def _log(level: str) -> Any:
     def log(self: Any, text: str, *values: Any) -> None:
         plain = [each.value if isinstance(each, enum.Enum) else each for each in values]
-        self.log.append((level, text.format(*plain)))
+        try:
+            said = text.format(*plain)
+        except (LookupError, ValueError):
+            if values:
+                raise
+            said = text  # an f-string whose values have braces
+        self.log.append((level, said))
 
     log.__doc__ = f"Log at level {level}; the text is formatted outside the real-time thread."
     return log

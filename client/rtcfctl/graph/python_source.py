@@ -69,9 +69,9 @@ def compiled(
     Raises NotCompiledError.
     """
     file = Path(source).resolve()
-    if not file.is_file():
-        raise NotCompiledError(f"{source}: no such file")
     try:
+        if not file.is_file():
+            raise NotCompiledError(f"{source}: no such file")
         return _compiled(source, file, build_tree, progress, verify, compiler)
     except OSError as error:
         where = error.filename or compiled_folder()
@@ -94,15 +94,24 @@ def _compiled(
     progress(f"compiling {source} …")
     compiler = compiler or SingleCompiler(_program(build_tree))
     is_compiled = saved.fingerprint == current
-    for _ in range(_MOST_TIMES):
+    for attempt in range(_MOST_TIMES):
         options = [*(["--verify", _VERIFY] if verify else []), *place.depfile()]
         if not is_compiled:
             options += ["-o", str(place.library)]
             # Until this is saved again, the library may be that of another text.
             place.save(_Saved("", False, saved.dependencies))
         begin_ns = time.time_ns()
+        before = place.stamp()
         status, errors = compiler.run([source, *options], progress)
         others = place.dependencies()
+        is_last = attempt + 1 == _MOST_TIMES
+        if status != 0 and not is_last and current != fingerprint(file, saved.dependencies):
+            # Another text may be right.
+            saved = _Saved("", False, others)
+            current, is_compiled = fingerprint(file, others), False
+            continue
+        if status == 0 and not is_compiled and place.stamp() == before:
+            status, errors = 1, [f"{source}: rtcf-compile has ended without a library"]
         if status != 0:
             place.save(_Saved("", False, others))
             said = "\n".join(errors) or f"rtcf-compile ended with status {status}"
@@ -112,7 +121,7 @@ def _compiled(
         # A file that was saved meanwhile may be compiled in part.
         new = set(others) - set(saved.dependencies)
         is_current = current == fingerprint(file, saved.dependencies)
-        saved = _Saved(fingerprint(file, others), verify, others)
+        saved = _Saved(fingerprint(file, others), verify, others, place.stamp()[-1])
         if is_current and not any(map(partial(_is_newer, than_ns=begin_ns), new)):
             break
         current, is_compiled = saved.fingerprint, False
@@ -133,13 +142,16 @@ class _Saved:
     fingerprint: str = ""
     is_verified: bool = False
     dependencies: list[Path] = field(default_factory=list)
+    size: int = -1  # bytes of the library
 
 
 class _Place:
     """The files of a source in the cache."""
 
     def __init__(self, source: Path) -> None:
-        path_hash = hashlib.sha256(os.fsencode(source)).hexdigest()[:8]
+        # An rtcfd that searches another cache folder must not find its own library of this source.
+        path = os.fsencode(source) + b"\0" + os.fsencode(compiled_folder())
+        path_hash = hashlib.sha256(path).hexdigest()[:8]
         self.package = f"{_ros_name(source.stem)}_{path_hash}"
         self.library = compiled_folder() / self.package / f"{source.stem}.so"
         # These files are beside the package's folder, which has only libraries.
@@ -152,10 +164,20 @@ class _Place:
         try:
             found = json.loads(self._saved.read_text())
             others = [Path(each) for each in found["dependencies"]]
-            exists = self.library.is_file()
-            return _Saved(found["fingerprint"] if exists else "", found["is_verified"], others)
+            size = int(found["size"])
+            is_whole = self.stamp()[-1] == size
+            known = found["fingerprint"] if is_whole else ""
+            return _Saved(known, found["is_verified"], others, size)
         except (OSError, ValueError, LookupError, TypeError):
             return _Saved()
+
+    def stamp(self) -> tuple[int, ...]:
+        """Return the number, the time and the size of the library's file; -1 if there is none."""
+        try:
+            found = self.library.stat()
+        except OSError:
+            return (-1,)
+        return found.st_ino, found.st_mtime_ns, found.st_size
 
     def save(self, saved: _Saved) -> None:
         """Save what is known about the library."""
@@ -168,8 +190,15 @@ class _Place:
     def depfile(self) -> list[str]:
         """Return the option for the file of the dependencies."""
         self._rule.parent.mkdir(parents=True, exist_ok=True)
-        self._rule.unlink(missing_ok=True)
+        for file in (self._rule, *self._left()):
+            file.unlink(missing_ok=True)
         return ["--depfile", str(self._rule)]
+
+    def _left(self) -> list[Path]:
+        """Return the files that interrupted compilations have left."""
+        others = [*self._rule.parent.glob(f".{self.package}.*.d")]
+        others += self.library.parent.glob(f".{self.library.name}.*")
+        return [each for each in others if not _runs(each.name.removesuffix(".d"))]
 
     def dependencies(self) -> list[Path]:
         """Return the dependencies of the last compilation, once."""
@@ -179,6 +208,11 @@ class _Place:
             return []
         finally:
             self._rule.unlink(missing_ok=True)
+
+
+def _runs(name: str) -> bool:
+    """Return whether the process runs whose id ends a name."""
+    return Path("/proc", name.rpartition(".")[2]).exists()
 
 
 def _is_newer(file: Path, than_ns: int) -> bool:

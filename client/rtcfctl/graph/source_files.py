@@ -19,17 +19,20 @@ _WORD = re.compile(r"(?:\\.|[^\s\\])+")
 
 
 def fingerprint(source: Path, others: Iterable[Path] = ()) -> str:
-    """Return a hash of everything that the compiled library depends on: the Python files in the
-    source's folder, other files that it reads, the compiler, and the runtime that is linked into
-    each library.
+    """Return a hash of everything that the compiled library depends on: the Python files and
+    packages in the source's folder, other files that it reads, the compiler, and the runtime that
+    is linked into each library.
     """
     digest = hashlib.sha256(compiler_version().encode())
     for file in _files(source, others):
         try:
+            if not file.is_file():
+                continue  # a pipe, for example
             content = file.read_bytes()
         except OSError:
             continue  # it is being saved
-        digest.update(f"{file.name} {len(content)}\n".encode() + content)
+        name = file.name if file.name != "__init__.py" else f"{file.parent.name}/__init__.py"
+        digest.update(f"{name} {len(content)}\n".encode() + content)
     return digest.hexdigest()
 
 
@@ -60,7 +63,8 @@ def dependencies(rule: str) -> list[Path]:
 
 
 def _files(source: Path, others: Iterable[Path]) -> list[Path]:
-    return sorted({*source.parent.glob("*.py"), *others})
+    beside = source.parent
+    return sorted({*beside.glob("*.py"), *beside.glob("*/__init__.py"), *others})
 
 
 def _runtime(compiler: Path) -> str:

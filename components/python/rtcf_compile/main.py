@@ -5,6 +5,7 @@ import gc
 import importlib.util
 import re
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -55,13 +56,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(args: argparse.Namespace) -> int:
+    from rtcf_compile.source import dependencies
     from rtcf_compile.source.report import Report
 
+    begin_ns = time.time_ns()
     report = Report()
     classes = _classes(args.sources, report)
     if args.depfile is not None:
-        from rtcf_compile.source import dependencies
-
         args.depfile.write_text(dependencies.rule(args.output or args.sources[0]))
     if classes and importlib.util.find_spec("numba") is None:
         print("rtcf-compile: needs numba: sudo apt install python3-numba", file=sys.stderr)
@@ -76,6 +77,7 @@ def _run(args: argparse.Namespace) -> int:
 
         with report.collected():
             build.library(compiled, args.output)
+            dependencies.set_time(args.output, begin_ns)
     return _reported(report)
 
 

@@ -51,7 +51,6 @@ def load(file: Path) -> ModuleType:
         raise Mistake(str(file), 0, "its path is not UTF-8", "rename the file") from None
     progress.note(str(file), 0)
     name = f"rtcf_source_{hashlib.sha256(path).hexdigest()[:8]}_{file.stem}"
-    linecache.checkcache(str(file))
     spec = importlib.util.spec_from_file_location(name, file)
     if spec is None or spec.loader is None or not file.is_file():
         raise Mistake(str(file), 0, "no such Python file", "give the path of a .py file")
@@ -61,6 +60,12 @@ def load(file: Path) -> ModuleType:
     try:
         with dependencies.recorded():
             spec.loader.exec_module(module)
+    except Mistake:
+        raise
+    except SystemExit as error:
+        line = _line_in(file, error)
+        remedy = 'remove it, or write it below if __name__ == "__main__":'
+        raise Mistake(str(file), line, "the module ends Python", remedy) from None
     except SyntaxError as error:
         raise Mistake(
             str(error.filename or file), error.lineno or 0, str(error.msg), "correct the syntax"

@@ -271,3 +271,12 @@ def test_the_docs_example_runs_unchanged(tmp_path: Path) -> None:
         check=False,
     )
     assert done.returncode == 0, done.stderr
+
+
+def test_texts_with_braces_are_logged_as_written() -> None:
+    component = made("Integrator")
+    component.warn(f"{'a{}'} {1.5:.1f}")
+    component.warn("{:.2f} {{}}", 2.0)
+    assert component.log == [("warn", "a{} 1.5"), ("warn", "2.00 {}")]
+    with pytest.raises(IndexError):
+        component.warn("{} {}", 1.0)

@@ -17,6 +17,7 @@ class Copying:
     def __init__(self, source: Path, helper: Path) -> None:
         self._source, self._helper = source, helper
         self.count = 0
+        self.status, self.writes = 0, True
         self.meanwhile: Callable[[], None] = lambda: None
 
     def run(
@@ -26,12 +27,13 @@ class Copying:
         given = dict(pairwise(arguments))
         text = self._source.read_text() + self._helper.read_text()
         Path(given["--depfile"]).write_text(f"x: {self._source} {self._helper}\n")
-        if "-o" in given:
+        if "-o" in given and self.writes:
             library = Path(given["-o"])
             library.parent.mkdir(parents=True, exist_ok=True)
             library.write_text(text)
+        status = self.status
         self.meanwhile()
-        return 0, []
+        return status, []
 
 
 class Sources:
@@ -122,3 +124,74 @@ def test_a_cache_that_cannot_be_written_is_an_error_in_one_line(sources: Sources
         sources.load()
     assert len(caught.value.lines) == 1
     assert "Not a directory" in str(caught.value)
+
+
+def test_an_error_of_a_text_that_was_saved_meanwhile_is_not_the_last_word(sources: Sources) -> None:
+    def saved() -> None:
+        sources.source.write_text("own 2\n")
+        sources.compiler.status = 0
+
+    sources.compiler.status, sources.compiler.meanwhile = 3, saved
+    assert sources.load() == sources.present()
+    assert sources.compiler.count == 2
+
+    def fails() -> None:
+        sources.source.write_text(f"own {sources.compiler.count + 2}\n")
+
+    sources.source.write_text("own 3\n")
+    sources.compiler.status, sources.compiler.meanwhile = 3, fails
+    with pytest.raises(python_source.NotCompiledError, match="status 3"):
+        sources.load()
+
+
+def test_a_compiler_that_writes_no_library_is_an_error(sources: Sources) -> None:
+    sources.load()
+    sources.source.write_text("own 2\n")
+    sources.compiler.writes = False
+    for _ in range(2):
+        with pytest.raises(python_source.NotCompiledError, match="ended without a library"):
+            sources.load()
+    sources.compiler.writes = True
+    assert sources.load() == sources.present()
+
+
+def test_a_damaged_library_is_compiled_again(sources: Sources) -> None:
+    sources.load()
+    (library,) = (sources.folder / "cache").glob("**/own.so")
+    library.write_text("")
+    assert sources.load() == sources.present()
+
+
+def test_an_rtcfd_with_another_cache_folder_does_not_find_the_package(
+    sources: Sources, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = python_source._Place(sources.source).package
+    monkeypatch.setenv("XDG_CACHE_HOME", str(sources.folder / "another"))
+    assert python_source._Place(sources.source).package != before
+
+
+def test_a_package_beside_the_source_that_may_hide_a_module_is_noticed(sources: Sources) -> None:
+    sources.load()
+    (sources.source.parent / "other").mkdir()
+    (sources.source.parent / "other" / "__init__.py").write_text("")
+    sources.load()
+    assert sources.compiler.count == 2
+
+
+def test_pipes_beside_the_source_are_not_read(sources: Sources) -> None:
+    os.mkfifo(sources.source.parent / "pipe.py")
+    assert sources.load() == sources.present()
+
+
+def test_files_of_interrupted_compilations_are_removed(sources: Sources) -> None:
+    sources.load()
+    (library,) = (sources.folder / "cache").glob("**/own.so")
+    package = library.parent.name
+    dead, alive = 2**22 + 1, os.getppid()
+    left = [library.parents[1] / f".{package}.{pid}.d" for pid in (dead, alive)]
+    left += [library.parent / f".own.so.{pid}" for pid in (dead, alive)]
+    for each in left:
+        each.write_text("")
+    sources.source.write_text("own 2\n")
+    sources.load()
+    assert [each.exists() for each in left] == [False, True, False, True]
