@@ -36,7 +36,7 @@ _is_hooked = False
 
 @contextmanager
 def recorded() -> Iterator[None]:
-    """Record the files that Python opens in the context, and the texts of the modules that it runs."""
+    """Record the files that Python opens in the context; keep the texts of modules that it runs."""
     global _is_recording, _is_hooked
     if not _is_hooked:
         sys.addaudithook(_note)  # it stays as long as the process
