@@ -15,7 +15,7 @@ from types import FunctionType, ModuleType
 
 from rtcf.component import Component, DeclarationError
 
-from rtcf_compile.source import dependencies, lifting, numpy_errors, progress
+from rtcf_compile.source import dependencies, lifting, numpy_errors, processor_time, progress
 from rtcf_compile.source.mistake import Mistake, source_line
 from rtcf_compile.source.parsed import is_of_user, parsed
 from rtcf_compile.source.prefix_map import mapped
@@ -58,10 +58,14 @@ def load(file: Path) -> ModuleType:
     sys.modules[name] = module
     sys.path.insert(0, str(file.parent))
     try:
-        with dependencies.recorded():
+        with dependencies.recorded(), processor_time.limited(processor_time.MODULE_S):
             spec.loader.exec_module(module)
     except Mistake:
         raise
+    except processor_time.TimeLimitError as error:
+        line = processor_time.loop_line(error, str(file))
+        what = f"the module takes more than {processor_time.MODULE_S:.0f} s of processor time"
+        raise Mistake(str(file), line, what, "end its loops, or compute less here") from None
     except SystemExit as error:
         line = _line_in(file, error)
         remedy = 'remove it, or write it below if __name__ == "__main__":'

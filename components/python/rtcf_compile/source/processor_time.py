@@ -12,6 +12,7 @@ from pathlib import Path
 from types import FrameType
 
 HOOK_S = 2.0  # limit of one hook, thousands of times a typical period
+MODULE_S = 30.0  # limit of a module, which may compute tables
 
 
 class TimeLimitError(BaseException):

@@ -9,7 +9,7 @@ import pytest
 from rtcf_compile.comparison import verify
 from rtcf_compile.comparison.inside import Inside
 from rtcf_compile.machine_code import object_file
-from rtcf_compile.source import dependencies, modules
+from rtcf_compile.source import dependencies, modules, processor_time
 from rtcf_compile.source.mistake import Mistake
 
 SOURCE = """\
@@ -83,6 +83,18 @@ def test_a_module_that_ends_python_is_rejected(tmp_path: Path, text: str) -> Non
         modules.load(file)
     remedy = 'remove it, or write it below if __name__ == "__main__":'
     assert str(raised.value) == f"{file}:3: `{text}`: the module ends Python: {remedy}"
+
+
+def test_a_module_that_does_not_end_is_rejected(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = tmp_path / "endless.py"
+    file.write_text("x = 0\n\nwhile True:\n    x += 1\n")
+    monkeypatch.setattr(processor_time, "MODULE_S", 0.3)
+    with pytest.raises(Mistake) as raised:
+        modules.load(file)
+    what = "the module takes more than 0 s of processor time: end its loops, or compute less here"
+    assert str(raised.value) == f"{file}:3: `while True:`: {what}"
 
 
 def test_make_compiles_again_what_was_saved_during_a_compilation(tmp_path: Path) -> None:
