@@ -102,7 +102,9 @@ def _compiled(
             place.save(_Saved("", False, saved.dependencies))
         begin_ns = time.time_ns()
         before = place.stamp()
-        status, errors = compiler.run([source, *options], progress)
+        # A name that begins with - is no option.
+        name = f"./{source}" if source.startswith("-") else source
+        status, errors = compiler.run([name, *options], progress)
         others = place.dependencies()
         is_last = attempt + 1 == _MOST_TIMES
         if status != 0 and not is_last and current != fingerprint(file, saved.dependencies):

@@ -69,6 +69,8 @@ def mistake(file: str, said: str) -> Mistake:
     remedy = "this is a bug of rtcf-compile: report it with the source"
     if "rtcf_python_library_" in said:
         remedy = "install the same version of librtcf-dev and rtcf-python"
+    elif "ld returned" in first:
+        remedy = "the linker has ended without a message: free space on the disk, or memory"
     elif "No such file" in first or "cannot find" in said:
         remedy = "sudo apt install librtcf-dev"
     return Mistake(file, 0, f"{compiler()[0]}: {(first or said.strip())[:300]}", remedy)

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from rtcf_compile.comparison import verify
 from rtcf_compile.comparison.inside import Inside
+from rtcf_compile.library import toolchain
 from rtcf_compile.machine_code import object_file
 from rtcf_compile.source import dependencies, modules, processor_time
 from rtcf_compile.source.mistake import Mistake
@@ -108,3 +109,15 @@ def test_make_compiles_again_what_was_saved_during_a_compilation(tmp_path: Path)
         os.utime(library, ns=(begin_ns, begin_ns))
         dependencies.set_time(library, begin_ns)
         assert (library.stat().st_mtime_ns < saved_ns) == is_old
+
+
+@pytest.mark.parametrize(
+    ("said", "remedy"),
+    [
+        ("collect2: error: ld returned 1 exit status\n", "free space on the disk, or memory"),
+        ("/usr/bin/ld: cannot find -lm: No such file or directory\n", "install librtcf-dev"),
+        ("ld: undefined reference to `f'\ncollect2: error: ld returned 1\n", "bug of rtcf-compile"),
+    ],
+)
+def test_an_error_of_the_linker_has_a_remedy(said: str, remedy: str) -> None:
+    assert remedy in str(toolchain.mistake("a.py", said))

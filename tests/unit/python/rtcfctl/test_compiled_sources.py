@@ -18,12 +18,14 @@ class Copying:
         self._source, self._helper = source, helper
         self.count = 0
         self.status, self.writes = 0, True
+        self.arguments: list[str] = []
         self.meanwhile: Callable[[], None] = lambda: None
 
     def run(
         self, arguments: Sequence[str], progress: Callable[[str], None]
     ) -> tuple[int, list[str]]:
         self.count += 1
+        self.arguments = list(arguments)
         given = dict(pairwise(arguments))
         text = self._source.read_text() + self._helper.read_text()
         Path(given["--depfile"]).write_text(f"x: {self._source} {self._helper}\n")
@@ -195,3 +197,12 @@ def test_files_of_interrupted_compilations_are_removed(sources: Sources) -> None
     sources.source.write_text("own 2\n")
     sources.load()
     assert [each.exists() for each in left] == [False, True, False, True]
+
+
+def test_a_name_that_begins_with_a_hyphen_is_no_option(
+    sources: Sources, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(sources.source.parent)
+    Path("-own.py").write_text("own 1\n")
+    python_source.compiled("-own.py", None, lambda line: None, False, sources.compiler)
+    assert sources.compiler.arguments[0] == "./-own.py"
