@@ -336,11 +336,12 @@ def test_a_compilation_is_announced_at_once(
     assert loading.stderr.readline() == f"compiling {source} …\n"
     fifo.write_text("")
     said, errors = loading.communicate(timeout=COMPILE_DEADLINE_S)
-    assert (loading.returncode, errors) == (0, "")
+    # A slow machine tells what the change waits for.
+    assert (loading.returncode, "compiling" in errors) == (0, False), errors
     assert json.loads(said)["component"] == "/Counts"
     client.unload(["Counts"])
     done = daemon.ctl("load", str(source), "Counts")
-    assert (done.returncode, done.stderr) == (0, ""), "the library is in the cache"
+    assert (done.returncode, "compiling" in done.stderr) == (0, False), "it is in the cache"
 
 
 def test_all_errors_of_a_source_are_shown(
