@@ -297,11 +297,11 @@ class _Functions:
             made = type(base.__name__, bases, members)
             self._copies[base] = made
             for name, value in members.items():
-                if (changed := self._attribute(value, made)) is not None:
+                if (changed := self._attribute(name, value, made)) is not None:
                     setattr(made, name, changed)
         return self._copies[self._cls]
 
-    def _attribute(self, value: Any, owner: type) -> Any:
+    def _attribute(self, name: str, value: Any, owner: type) -> Any:
         if isinstance(value, FunctionType) and is_own(value):
             return self._function(value, owner)
         if isinstance(value, staticmethod) and is_own(value.__func__):
@@ -309,7 +309,7 @@ class _Functions:
             return staticmethod(self._function(function, owner))
         if isinstance(value, property) and isinstance(value.fget, FunctionType):
             if isinstance(value.fset, FunctionType):
-                setattr(owner, f"{SETTER}{value.fget.__name__}", self._function(value.fset, owner))
+                setattr(owner, SETTER + name, self._function(value.fset, owner))
             return property(self._function(value.fget, owner), value.fset)
         return None
 

@@ -4,6 +4,7 @@ of a module is kept as Python ran it, since the file may be saved during a compi
 
 import importlib
 import importlib.util
+import io
 import linecache
 import os
 import sys
@@ -71,8 +72,9 @@ def _code_of(loader: Any, data: bytes, path: Any, **options: Any) -> Any:
             line = data[: error.start].count(b"\n") + 1
             what = f"byte {error.object[error.start]:#04x} is not {error.encoding.upper()}"
             raise Mistake(name, line, what, "save the file in this encoding") from None
-        # Without a time: not read again.
-        linecache.cache[name] = (len(text), None, text.splitlines(keepends=True), name)
+        # str.splitlines() would also split at form feeds. Without a time, the file is not read again.
+        lines = io.StringIO(f"{text}\n").readlines()
+        linecache.cache[name] = (len(text), None, lines, name)
     return _to_code(loader, data, path, **options)
 
 

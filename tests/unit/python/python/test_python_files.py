@@ -57,6 +57,17 @@ def test_a_file_that_is_saved_after_it_ran_is_compiled_as_it_ran(tmp_path: Path)
     assert record["y"] == 2.5
 
 
+def test_form_feeds_do_not_end_lines(tmp_path: Path) -> None:
+    file, helper = tmp_path / "feeds.py", tmp_path / "feeds_helper.py"
+    helper.write_text(HELPER)
+    text = SOURCE.format(helper=helper.stem)
+    file.write_text(text.replace("    def f", "    # \x0c \x1c \u2028\n    def f").rstrip("\n"))
+    (cls,) = modules.components(modules.load(file))
+    record = cls()._record
+    assert Inside(object_file.compile_component(cls)).call("update", record) is None
+    assert record["y"] == 1.5
+
+
 @pytest.mark.parametrize("is_helper", [False, True])
 def test_a_byte_that_is_not_utf_8_is_an_error_with_its_line(
     tmp_path: Path, is_helper: bool

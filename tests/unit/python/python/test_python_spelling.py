@@ -78,6 +78,14 @@ class Written(Component):
     def part(self, x):
         self.a[:3] = 2.0 * x
 
+    def _half(self):
+        return 0.5 * self.a[1]
+
+    def _set_half(self, x):
+        self.a[1] = x + 1.0
+
+    half = property(_half, _set_half)
+
     def update(self):
         self.mode = Mode.RUN if self.u.value > 0.0 else Mode.OFF
         {text}
@@ -109,6 +117,7 @@ WAYS = {
     "constant slices": "self.a[FIRST] = self.w.value[REST]; self.m[0, FIRST] = self.a[FIRST]",
     "slice of the class": "self.a[self.ENDS] = self.u.value; self.m[0] = self.a[Written.ENDS]",
     "setter": "self.level = self.u.value",
+    "setter with another name": "self.half = self.u.value + self.half",
     "setter in place": "self.level += self.u.value",
     "setter of a view in place": "self.a += self.w.value; self.part += 1.0; self.part *= 0.25",
     "sum over three dimensions": (
