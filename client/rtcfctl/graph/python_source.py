@@ -106,9 +106,9 @@ def _compiled(
         name = f"./{source}" if source.startswith("-") else source
         status, errors = compiler.run([name, *options], progress)
         others = place.dependencies()
-        is_last = attempt + 1 == _MOST_TIMES
-        if status != 0 and not is_last and current != fingerprint(file, saved.dependencies):
-            # Another text may be right.
+        is_current = current == fingerprint(file, saved.dependencies)
+        if status != 0 and not is_current and attempt + 1 < _MOST_TIMES:
+            # The text that was saved meanwhile may be right.
             saved = _Saved("", False, others)
             current, is_compiled = fingerprint(file, others), False
             continue
@@ -122,7 +122,6 @@ def _compiled(
             raise NotCompiledError(said)
         # A file that was saved meanwhile may be compiled in part.
         new = set(others) - set(saved.dependencies)
-        is_current = current == fingerprint(file, saved.dependencies)
         saved = _Saved(fingerprint(file, others), verify, others, place.stamp()[-1])
         if is_current and not any(map(partial(_is_newer, than_ns=begin_ns), new)):
             break
@@ -197,7 +196,7 @@ class _Place:
         return ["--depfile", str(self._rule)]
 
     def _left(self) -> list[Path]:
-        """Return the files that interrupted compilations have left."""
+        """Return the temporary files of interrupted compilations."""
         others = [*self._rule.parent.glob(f".{self.package}.*.d")]
         others += self.library.parent.glob(f".{self.library.name}.*")
         return [each for each in others if not _runs(each.name.removesuffix(".d"))]
@@ -213,7 +212,7 @@ class _Place:
 
 
 def _runs(name: str) -> bool:
-    """Return whether the process runs whose id ends a name."""
+    """Return whether a process runs; its id is the last part of the name."""
     return Path("/proc", name.rpartition(".")[2]).exists()
 
 

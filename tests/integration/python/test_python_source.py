@@ -336,12 +336,15 @@ def test_a_compilation_is_announced_at_once(
     assert loading.stderr.readline() == f"compiling {source} …\n"
     fifo.write_text("")
     said, errors = loading.communicate(timeout=COMPILE_DEADLINE_S)
-    # A slow machine tells what the change waits for.
-    assert (loading.returncode, "compiling" in errors) == (0, False), errors
+    # On a slow machine, rtcfctl prints the steps of a change.
+    steps = {"loading /Counts", "configuring /Counts", "adopting the change"}
+    assert loading.returncode == 0
+    assert set(errors.splitlines()) <= steps
     assert json.loads(said)["component"] == "/Counts"
     client.unload(["Counts"])
     done = daemon.ctl("load", str(source), "Counts")
-    assert (done.returncode, "compiling" in done.stderr) == (0, False), "it is in the cache"
+    assert done.returncode == 0
+    assert set(done.stderr.splitlines()) <= steps, "the library is in the cache"
 
 
 def test_all_errors_of_a_source_are_shown(

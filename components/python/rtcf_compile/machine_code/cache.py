@@ -18,7 +18,7 @@ LIMIT = 256 * 1024 * 1024  # bytes of all files
 _KEPT = LIMIT * 3 // 4  # bytes that remain when old files are removed
 _DIGEST = hashlib.sha256().digest_size
 _DAY_NS = 86_400 * 10**9
-_BETWEEN_NS = 600 * 10**9  # looks at the size of the folder
+_BETWEEN_NS = 600 * 10**9  # between two checks of the folder's size
 
 
 class Cache:
@@ -72,7 +72,7 @@ class Cache:
     def remove_old(self) -> None:
         """Remove the files that were not used for the longest time, if the folder is too large.
 
-        Looks at the folder, of maybe 10000 files, at most once in ten minutes.
+        Checks the size of the folder, of maybe 10000 files, at most once in ten minutes.
         """
         if not self._written or not self._usable() or not self._is_due():
             return
@@ -93,8 +93,8 @@ class Cache:
                 return
 
     def _is_due(self) -> bool:
-        """Tell whether the folder was not looked at for ten minutes, and note this look."""
-        mark = self._folder.with_name(f"{self._folder.name}-looked")
+        """Tell whether the last check was ten minutes ago, and note the time of this one."""
+        mark = self._folder.with_name(f"{self._folder.name}-checked")
         with suppress(OSError):
             if 0 <= time.time_ns() - mark.stat().st_mtime_ns < _BETWEEN_NS:
                 return False

@@ -53,7 +53,7 @@ _NAMES: dict[type[ast.AST], str] = {
 }
 
 
-# Before the name of a property: the name of its setter.
+# Prefix of the names of setters of properties.
 SETTER = "rtcf_set_"
 
 

@@ -307,8 +307,8 @@ def test_the_files_used_last_remain(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert left == {names[0], *names[3:]}
     cache.write(names[1], bytes(4000))
     cache.remove_old()
-    assert (tmp_path / "kept" / names[3]).exists()  # the folder was looked at a moment ago
-    mark = tmp_path / "kept-looked"
+    assert (tmp_path / "kept" / names[3]).exists()  # the last check was a moment ago
+    mark = tmp_path / "kept-checked"
     for age_s in (601, -3600):
         cache.write(names[1], bytes(4000))
         os.utime(tmp_path / "kept" / names[1], ns=(1, 1))

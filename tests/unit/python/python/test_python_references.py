@@ -146,7 +146,7 @@ class Programs:
 
 @dataclass
 class Found:
-    """What the programs of some seeds show."""
+    """Results of the programs of some seeds."""
 
     features: Counter[str] = field(default_factory=Counter)  # number of programs with each
     rejected: int = 0
