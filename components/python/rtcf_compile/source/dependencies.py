@@ -72,7 +72,7 @@ def _code_of(loader: Any, data: bytes, path: Any, **options: Any) -> Any:
             line = data[: error.start].count(b"\n") + 1
             what = f"byte {error.object[error.start]:#04x} is not {error.encoding.upper()}"
             raise Mistake(name, line, what, "save the file in this encoding") from None
-        # str.splitlines() would also split at form feeds. Without a time, the file is not read again.
+        # str.splitlines() would also split at form feeds. Without a time, no later save is read.
         lines = io.StringIO(f"{text}\n").readlines()
         linecache.cache[name] = (len(text), None, lines, name)
     return _to_code(loader, data, path, **options)
