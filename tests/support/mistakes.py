@@ -563,7 +563,7 @@ UPDATE: dict[str, tuple[str, str]] = {
     ),
     "object of a class": ("a = Filter(3.0)", "Filter"),
     "object of the module": ("self.f = FILTER.step(self.f)", "FILTER"),
-    "dataclass made": ("a = Gains(2.0)", "Gains"),
+    "dataclass changed": ("a = Gains(2.0)\na.kp = 3.0  # here", "a.kp is a field of an object"),
     "dataclass set": ("SHARED.kp = 2.0", "SHARED"),
     "own function with too few arguments": ("self.f = limited(self.f)", "limited"),
     "own function with too many arguments": ("self.f = limited(1.0, 2.0, 3.0, 4.0)", "limited"),

@@ -27,9 +27,37 @@ def first_{n}(p):
     return p
 
 
+class Both_{n}(NamedTuple):
+    one: np.ndarray
+    other: np.ndarray
+
+    def front(self):
+        return same_{n}(self.one)
+
+
+@dataclass
+class Two_{n}:
+    one: np.ndarray
+    other: np.ndarray
+
+    @property
+    def back(self):
+        return self.other[::-1]
+
+
+def both_{n}(p, q) -> Both_{n}:
+    return Both_{n}(other=q, one=p)
+
+
 """
-HEAD = """\
+IMPORTS = """\
+from dataclasses import dataclass
+from typing import NamedTuple
+
 import numpy as np
+"""
+HEAD = f"""\
+{IMPORTS}\
 from rtcf.component import Component, Input, Output, State
 
 
@@ -52,9 +80,6 @@ MEMBERS = """\
     s{n}: State[float]
 """
 PLAIN = """\
-import numpy as np
-
-
 class In:
     def __init__(self):
         self.array = np.zeros(4)
@@ -88,14 +113,15 @@ class Plain:
 
 @dataclass
 class _Scope:
-    """The local names of a function: vectors, matrices, arrays of three dimensions, pairs, and
-    nested functions; `outside`: the vectors of the function around it.
+    """The local names of a function: vectors, matrices, arrays of three dimensions, pairs, objects
+    of two vectors, and nested functions; `outside`: the vectors of the function around it.
     """
 
     vectors: list[str] = field(default_factory=list)
     matrices: list[str] = field(default_factory=list)
     blocks: list[str] = field(default_factory=list)
     pairs: list[str] = field(default_factory=list)
+    objects: list[str] = field(default_factory=list)
     depth: int = 0
     has_methods: bool = True
     functions: list[str] = field(default_factory=list)
@@ -105,7 +131,7 @@ class _Scope:
         """Return the scope of a block that may not run."""
         return _Scope(
             list(self.vectors), list(self.matrices), list(self.blocks), list(self.pairs),
-            self.depth + 1, self.has_methods, list(self.functions), self.outside,
+            list(self.objects), self.depth + 1, self.has_methods, list(self.functions), self.outside,
         )  # fmt: skip
 
     def nested(self) -> "_Scope":
@@ -232,6 +258,12 @@ class _Drawn:
             named["nested call"] = lambda name=name: f"{name}({simple()})"  # type: ignore[misc]
         if scope.pairs:
             named["element of a pair"] = lambda: f"{draw.choice(scope.pairs)}[{index % 2}]"
+        if scope.objects:
+            part = self._one("one", "other", "one", "other", self._one("front()", "back"))
+            of = [each for each in scope.objects if each.endswith(f"_{part[:4]}")]
+            if part in ("one", "other") or of:
+                name = draw.choice(of or scope.objects)
+                named["field of an object"] = lambda: f"{name}.{part}"
         calls: dict[str, Callable[[str], str]] = {
             "vector": lambda name: f"self.{name}()",
             "property": lambda name: f"self.{name}",
@@ -350,7 +382,7 @@ class _Drawn:
             *("name", "name", "name", "matrix name", "member", "member", "member", "matrix member"),
             *("element", "element of a name", "slice", "in place", "in place name", "swap", "swap"),
             *("swap by a name", "pair", "unpacked", "output", "output in place", "scalar", "call"),
-            *("row set", "chain", "matrix in place", "fill", "nested function"),
+            *("object", "row set", "chain", "matrix in place", "fill", "nested function"),
             *("block name", "block member", "block part set", "block in place"),
             *(("member of a member",) if self._likely(0.4) else ()),
             *(("if", "for", "for rows", "while") if scope.depth < 2 else ()),
@@ -431,6 +463,18 @@ class _Drawn:
             name = self._new("t")
             scope.pairs.append(name)
             return [indent + self._feature(kind, f"{name} = {given}")]
+        if kind == "object":
+            given = f"{self._vector_view(scope)}, {self._vector_view(scope)}"
+            of = self._one("Both", "Two", "both")
+            name = self._new("o") + ("_back" if of == "Two" else "_fron")
+            text = f"{name} = {of}_{n}({given})"
+            if scope.objects and self._likely(0.3):
+                of = draw.choice([each for each in scope.objects if each.endswith("_fron")] or [""])
+                name = self._new("o") + "_fron"
+                if of:
+                    text = f"{name} = {of}._replace(one={self._vector_view(scope)})"
+            scope.objects.append(name)
+            return [indent + self._feature(kind, text)]
         if kind == "unpacked" and (scope.pairs or self._calls("pair", scope)):
             calls = [f"self.{each}()" for each in self._calls("pair", scope)]
             given = draw.choice([*scope.pairs, *calls])
@@ -534,4 +578,4 @@ def component(programs: dict[int, Program]) -> str:
 
 def plain(program: Program, number: int) -> str:
     """Return a module with a plain class that has a program."""
-    return FUNCTIONS.format(n=number) + PLAIN.format(n=number) + "\n" + program.text
+    return IMPORTS + FUNCTIONS.format(n=number) + PLAIN.format(n=number) + "\n" + program.text

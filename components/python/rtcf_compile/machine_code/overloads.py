@@ -280,6 +280,13 @@ def _copied(value):  # type: ignore[no-untyped-def]
     return scope["each"]
 
 
+@compiled_as(helpers.rtcf_object)
+def _object(value: Any) -> Any:
+    if isinstance(value, types.BaseTuple):
+        return lambda value: value
+    raise TypingError(f"RTCF:a field of {words(value)}:give it an object")
+
+
 @compiled_as(helpers.rtcf_array_of)
 def _array_of(value: Any, count: Any) -> Any:
     if isinstance(value, types.BaseTuple):

@@ -25,6 +25,7 @@ from rtcf_compile.source.checks import check, resolve
 from rtcf_compile.source.mistake import Mistake, Mistakes, at, written
 from rtcf_compile.source.modules import Source, read
 from rtcf_compile.source.parsed import is_own, opened
+from rtcf_compile.source.records import as_tuple
 from rtcf_compile.source.spelling import defaults_of
 
 # The helpers that rewritten functions call, by name.
@@ -401,9 +402,10 @@ def frozen(value: Any) -> Any:
     """
     if isinstance(value, np.ndarray) and not value.flags.forc:
         return value.copy(order="C")
+    value = as_tuple(value)
     if type(value) is tuple:
         return tuple(
-            frozen(each) if isinstance(each, tuple | np.ndarray) else each for each in value
+            frozen(as_tuple(each)) if isinstance(each, tuple | np.ndarray) else each for each in value
         )
     if not isinstance(value, list):
         return value

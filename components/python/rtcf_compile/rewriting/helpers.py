@@ -311,6 +311,11 @@ def rtcf_copied(value: Any) -> Any:
     return value.copy() if isinstance(value, np.ndarray) else value
 
 
+def rtcf_object(value: Any) -> Any:
+    """Return the tuple of an object; see records.py."""
+    return value
+
+
 def rtcf_array_of(value: Any, count: Any) -> Any:
     """Return a new array for this number of such values, which are numbers or vectors."""
     return np.empty((count, *np.shape(value)), np.asarray(value).dtype)
@@ -501,6 +506,7 @@ BY_NAME = {
             rtcf_copied,
             rtcf_looked_up,
             rtcf_looked_up_or,
+            rtcf_object,
             rtcf_array_of,
             rtcf_store,
             rtcf_maybe,

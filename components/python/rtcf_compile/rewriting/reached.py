@@ -72,5 +72,6 @@ def _called(reached: Reached, methods: Methods) -> Iterator[Method | FunctionTyp
         if found is not None:
             yield found
         elif is_own(value := resolve(node, source)):
-            is_nested = method is not None and own and value in source.lifted.values()
-            yield nested(value, method.owner) if is_nested and method is not None else value
+            is_nested = value in source.lifted.values() and "<locals>" in value.__qualname__
+            is_method = is_nested and method is not None and own
+            yield nested(value, method.owner) if is_method and method is not None else value

@@ -40,6 +40,7 @@ from rtcf_compile.source.checks import check, resolve
 from rtcf_compile.source.mistake import at, written
 from rtcf_compile.source.modules import Source, read
 from rtcf_compile.source.parsed import is_own
+from rtcf_compile.source.records import as_tuple
 from rtcf_compile.source.spelling import defaults_of
 
 # The name of an array, or of a place: its kind and what tells it from others of the kind.
@@ -1008,6 +1009,7 @@ class _Followed:
         )
 
     def _constant(self, value: Any, name: str) -> Value:
+        value = as_tuple(value)
         if isinstance(value, tuple | list):
             parts = enumerate(value)
             return tuple(self._constant(each, f"{name}[{number}]") for number, each in parts)
@@ -1157,7 +1159,8 @@ class _Followed:
             return (tuple(map(_elements, values)),)
         if any(target is each for each in _ITERATORS):
             return (_elements(first),)
-        if any(target is each for each in _TUPLES):
+        is_object = isinstance(called, ast.Name) and called.id == "rtcf_object"
+        if is_object or any(target is each for each in _TUPLES):
             return first
         if isinstance(called, ast.Attribute) and target is None:
             if called.attr in _CHANGING_METHODS:

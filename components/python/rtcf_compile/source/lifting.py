@@ -11,7 +11,7 @@ import ast
 import copy
 import inspect
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from types import FunctionType
 from typing import Any, NamedTuple, TypeVar
 
@@ -138,12 +138,15 @@ def tree_of(function: FunctionType) -> ast.FunctionDef | None:
     return copy.deepcopy(known.tree) if known else None
 
 
-def lift(tree: ast.FunctionDef, function: FunctionType, file: str) -> dict[str, FunctionType]:
+def lift(
+    tree: ast.FunctionDef, function: FunctionType, file: str, called: Mapping[str, FunctionType]
+) -> dict[str, FunctionType]:
     """Replace what is nested in a function by calls; return the functions that it calls, by name.
 
-    Raises Mistake for a nested function that is used in another way.
+    `called`: those that it calls already. Raises Mistake for a nested function that is used in another way.
     """
     lifting = _Lifting(tree, function, file)
+    lifting.functions |= called
     lifting.block(tree.body)
     lifting.drop_tuples()
     return lifting.functions

@@ -15,7 +15,7 @@ from types import FunctionType, ModuleType
 
 from rtcf.component import Component, DeclarationError
 
-from rtcf_compile.source import dependencies, lifting, numpy_errors, processor_time, progress
+from rtcf_compile.source import dependencies, lifting, numpy_errors, processor_time, progress, records
 from rtcf_compile.source.mistake import Mistake, source_line
 from rtcf_compile.source.parsed import is_of_user, parsed
 from rtcf_compile.source.prefix_map import mapped
@@ -147,8 +147,10 @@ def read(function: FunctionType, is_whole: bool = False) -> Source:
     if is_whole:
         return Source(function, lifting.tree_of(function) or parsed(function), file)
     if function not in _read:
-        tree = lifting.tree_of(function) or parsed(function)
-        lifted = lifting.lift(tree, function, file)
+        known = lifting.tree_of(function)
+        tree = known or parsed(function)
+        called = {} if known else records.replace(tree, function, file)
+        lifted = lifting.lift(tree, function, file, called)
         # Pickle copies a tree in a fifth of the time of deepcopy.
         _read[function] = pickle.dumps(tree), lifted
     data, functions = _read[function]
