@@ -572,11 +572,10 @@ class CommonRewriting(ast.NodeTransformer):
             isinstance(node.func, ast.Attribute)
             and resolve(node.func.value, self.source) is np.linalg
         ):
-            raise self.mistake(
-                node,
-                "calls LAPACK, which allocates memory",
-                "use np.linalg.solve, inv, cholesky, det or norm",
-            )
+            remedy = "use np.linalg.solve, inv, cholesky, det or norm"
+            if target is np.linalg.pinv:
+                remedy = "write A.T @ np.linalg.inv(A @ A.T), or compute it at module level"
+            raise self.mistake(node, "calls LAPACK, which allocates memory", remedy)
         if self._is_other(node, target):
             self.others.append(node)
         if self._functions == operators.NARROW and getattr(target, "__module__", "") == "math":

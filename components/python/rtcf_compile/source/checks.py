@@ -146,12 +146,17 @@ _COMPILED = ("builtins", "cmath", "math", "numpy", "operator", "rtcf", "_operato
 _LARGEST, _SMALLEST = 2**63 - 1, -(2**63)
 
 
+# Functions without errors in their syntax trees.
+_passed: set[FunctionType] = set()
+
 # Statements that are rejected, but not what they contain.
 _BLOCKS = (ast.Try, ast.With, ast.While)
 
 
 def check(source: Source, members: Collection[str] = ()) -> None:
     """Raise Mistake for the errors in a function; `members`: the names in self."""
+    if source.function in _passed:
+        return
     mistakes = Mistakes()
     for part in (_decorators, _arguments, _defaults):
         with mistakes.collected():
@@ -180,6 +185,7 @@ def check(source: Source, members: Collection[str] = ()) -> None:
         with mistakes.collected():
             check_assigned(source, rejected)
     mistakes.report()
+    _passed.add(source.function)
 
 
 def _decorators(source: Source) -> None:
