@@ -289,7 +289,7 @@ class _Replacing(ast.NodeTransformer):
                 self._visit_arguments(node)
                 function = self._name(found, of.attr, found.methods[of.attr])
                 own = self._checked(self.visit(of.value))
-                return ast.copy_location(ast.Call(function, [own, *node.args], node.keywords), node)
+                return _located(ast.Call(function, [own, *node.args], node.keywords), node)
         self.generic_visit(node)
         return node
 
@@ -315,7 +315,7 @@ class _Replacing(ast.NodeTransformer):
                 raise self._takes(node, record)
             values[each] = self._default(node, each, record.defaults[each])
         elements = [values[each] for each in record.fields]
-        return ast.copy_location(ast.Tuple(elements, ast.Load()), node)
+        return _located(ast.Tuple(elements, ast.Load()), node)
 
     def _takes(self, node: ast.Call, record: Record) -> Exception:
         name, fields = ast.unparse(node.func), ", ".join(record.fields)
@@ -338,11 +338,11 @@ class _Replacing(ast.NodeTransformer):
         cls = type(value)
         if isinstance(value, enum.Enum) and self._function.__globals__.get(cls.__name__) is cls:
             member = ast.Attribute(ast.Name(cls.__name__, ast.Load()), value.name, ast.Load())
-            return ast.fix_missing_locations(ast.copy_location(member, node))
+            return _located(member, node)
         if cls not in (bool, int, float):
             what = f"the default of {name} is not a number"
             raise at(self._file, node, what, f"write {name}=…")
-        return ast.copy_location(ast.Constant(value), node)
+        return _located(ast.Constant(value), node)
 
     def _changed(self, node: ast.Call, of: ast.expr, record: Record) -> ast.expr:
         """Return the tuple of `sample._replace(v=y)`."""
@@ -357,7 +357,7 @@ class _Replacing(ast.NodeTransformer):
             named.get(each) or self._element(node, of, place)
             for place, each in enumerate(record.fields)
         ]
-        return ast.copy_location(ast.Tuple(elements, ast.Load()), node)
+        return _located(ast.Tuple(elements, ast.Load()), node)
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
         """Rewrite `sample.v`, of a field or a property."""
@@ -374,7 +374,7 @@ class _Replacing(ast.NodeTransformer):
             return self._element(node, of, record.fields.index(node.attr))
         if node.attr in record.properties:
             function = self._name(record, node.attr, record.properties[node.attr])
-            return ast.copy_location(ast.Call(function, [self._checked(of)], []), node)
+            return _located(ast.Call(function, [self._checked(of)], []), node)
         if node.attr in record.methods:
             what = f"{ast.unparse(node)} is a method"
             raise at(self._file, node, what, f"call it: {ast.unparse(node)}(…)")
@@ -384,13 +384,11 @@ class _Replacing(ast.NodeTransformer):
         raise at(self._file, node, f"{record.cls.__name__} has no {node.attr}", remedy)
 
     def _element(self, node: ast.expr, of: ast.expr, place: int) -> ast.expr:
-        element = ast.Subscript(self._checked(of), ast.Constant(place), ast.Load())
-        return ast.fix_missing_locations(ast.copy_location(element, node))
+        return _located(ast.Subscript(self._checked(of), ast.Constant(place), ast.Load()), node)
 
     def _checked(self, node: ast.expr) -> ast.expr:
         """Return an expression that must be a tuple when it is compiled."""
-        name = ast.Name("rtcf_object", ast.Load())
-        return ast.fix_missing_locations(ast.copy_location(ast.Call(name, [node], []), node))
+        return _located(ast.Call(ast.Name("rtcf_object", ast.Load()), [node], []), node)
 
     def _name(self, record: Record, name: str, function: FunctionType) -> ast.expr:
         plain = f"rtcf_of_{record.cls.__name__}_{name}"
@@ -439,3 +437,8 @@ class _Replacing(ast.NodeTransformer):
                 return isinstance(self._resolved(node), property)
             return self._may_be_object(node.value)
         return False
+
+
+def _located(new: ast.expr, node: ast.expr) -> ast.expr:
+    """Return an expression in the place of another."""
+    return ast.fix_missing_locations(ast.copy_location(new, node))
