@@ -27,8 +27,10 @@ export class Tiles {
       if (tile.place !== this.strip.number) { tile.place = this.strip.number; tile.canvas.style.left = this.strip.left(number * WIDE); }
       this.#update(tile, changes, draw);
     }
-    // Keep one spare tile for reuse.
-    for (const tile of others.slice(1)) {
+    // Keep one spare tile for reuse, with an old image, out of sight.
+    const [spare, ...more] = others;
+    if (spare) spare.canvas.style.display = "none";
+    for (const tile of more) {
       tile.canvas.remove();
       this.tiles.splice(this.tiles.indexOf(tile), 1);
     }
@@ -51,6 +53,7 @@ export class Tiles {
       this.tiles.push(tile);
       this.strip.box.prepend(canvas);
     }
+    tile.canvas.style.display = "";
     return Object.assign(tile, { number, place: NaN, ready: 0, stamp: NaN, old: false });
   }
 
