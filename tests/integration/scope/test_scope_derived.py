@@ -105,6 +105,11 @@ def test_derived_signals_of_a_bookmark_are_shown_and_wrong_ones_are_named(visit:
         ("1 + 2", "= 1 + 2: it has no signal, such as /wave.wave"),
         ("d /w0.wave", "= d /w0.wave: the arguments of d stand in parentheses"),
         ("low(/w0.wave)", "= low(/w0.wave): low has 2 arguments, not 1"),
+        ("low(/w0.wave, -3)", "= low(/w0.wave, -3): low needs a frequency above 0 Hz, not -3"),
+        (
+            "high(/w0.wave, 2 - 2)",
+            "= high(/w0.wave, 2 - 2): high needs a frequency above 0 Hz, not 2 - 2",
+        ),
         ("(/w0.wave", '= (/w0.wave: ")" is missing after "(/w0.wave"'),
         ("/w0.wave)", '= /w0.wave): ")" is not expected after "/w0.wave"'),
         ("/w0", '= /w0: "/w0" is no signal: a signal is named as /wave.wave'),

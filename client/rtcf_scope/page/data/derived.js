@@ -15,6 +15,8 @@ const FUNCTIONS = {
   min: [2, pure(Math.min)], max: [2, pure(Math.max)],
 };
 
+const FILTERS = ["low", "high"]; // their second argument is a frequency
+
 // A first-order low-pass filter with the corner frequency `hertz`.
 function lowPass() {
   let y = NaN;
@@ -55,6 +57,7 @@ class Parser {
     this.text = text.trim();
     this.at = 0;
     this.signals = new Set();
+    this.reads = 0; // of signals so far
   }
 
   parse() {
@@ -135,6 +138,7 @@ class Parser {
 
   #signal(name) {
     this.signals.add(name);
+    this.reads++;
     return () => (get) => get(name);
   }
 
@@ -143,8 +147,11 @@ class Parser {
     const [count, make] = FUNCTIONS[word];
     if (!this.#take("(")) this.#fail(`the arguments of ${word} stand in parentheses`);
     const of = [this.#sum()];
-    while (this.#take(",")) of.push(this.#sum());
+    let last = { at: this.at, reads: this.reads }; // before the last argument
+    while (this.#take(",")) { last = { at: this.at, reads: this.reads }; of.push(this.#sum()); }
     if (of.length !== count) this.#fail(`${word} has ${count} argument${count > 1 ? "s" : ""}, not ${of.length}`);
+    if (FILTERS.includes(word) && this.reads === last.reads && !(of[1]()(() => NaN, 0) > 0))
+      this.#fail(`${word} needs a frequency above 0 Hz, not ${this.text.slice(last.at, this.at).trim()}`);
     this.#close();
     return () => {
       const values = of.map((each) => each()), call = make();
