@@ -339,7 +339,7 @@ def test_a_periodic_signal_has_no_settling_time(visit: Opener) -> None:
             once: step(times, times.map((t) => t < 2 ? 0 : 1)) };
         })()"""
     )
-    assert found["square"] == {"rise": None, "overshoot": None, "settling": None}
+    assert found["square"] == {"rise": None, "overshoot": None, "settling": None, "why": ""}
     assert found["once"]["settling"] is not None
     assert found["hunting"]["settling"] is None
 
