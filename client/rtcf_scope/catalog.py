@@ -68,15 +68,19 @@ def component(info: graph_pb2.ComponentInfo) -> dict[str, Any]:
 
 
 def statistics(client: rtcf.Client, name: str) -> dict[str, Any]:
-    """Return the times of cycles and components, in µs; raises RtcfError."""
+    """Return the times of cycles and components, in µs, and in which cycles these run; raises
+    RtcfError.
+    """
     found = client.get_statistics(name)
+    every = {each.full_name: max(each.spec.every, 1) for each in client.list_components(name)}
     return {
         "iterations": found.iterations,
         "overruns": found.overruns,
         "duration": _distribution(found.duration),
         "latency": _distribution(found.latency),
         "components": {
-            each.component: _distribution(each.duration) | {"overruns": each.overruns}
+            each.component: _distribution(each.duration)
+            | {"overruns": each.overruns, "every": every.get(each.component, 1)}
             for each in found.components
         },
     }

@@ -162,3 +162,42 @@ def test_target_and_time_of_a_step_are_set_on_the_page(page: Page) -> None:
     )
     assert told == ["x is no number", "wrong"]
     assert page.errors == []
+
+
+TEXTS = {
+    'figure(-12.5, "N")': "−12.5 N",
+    "figure(-1.25e-5)": "−1.2500e−5",
+    "figure(2.5e13)": "2.5000e13",
+    'figure(101325.2, "Pa")': "101 325 Pa",
+    'figure(101325.2, "Pa", 0.3)': "101 325.2 Pa",
+    'figure(101325.5, "Pa", 0.3)': "101 325.5 Pa",
+    "figure(1.000001, '', 1e-6)": "1.000001",
+    "fixed(-0.04, 1)": "0.0",
+    "fixed(-0.06, 1)": "−0.1",
+    "tickText(-2e16, 1e16)": "−2.000e16",
+}
+
+
+def test_texts_of_numbers_have_the_digits_that_tell_them_apart(page: Page) -> None:
+    found = page.ask(
+        f"""(async () => {{
+          const {{ figure, fixed, tickText }} = await import("/page/drawing/axes.js");
+          return [{", ".join(TEXTS)}];
+        }})()"""
+    )
+    assert found == list(TEXTS.values())
+
+
+def test_the_cycles_at_both_cursors_are_measured(page: Page) -> None:
+    found = page.ask(
+        """(async () => {
+          const { measured } = await import("/page/data/measure.js");
+          const { Store } = await import("/page/data/store.js");
+          const times = Float64Array.from({ length: 40 }, (_, i) => i / 8), zeros = times.map(() => 0);
+          const store = Store.of({ count: 40, lost: 0, times, cycles: times.map((_, i) => i),
+            latencies: zeros, durations: zeros, traces: [times.map((_, i) => i)] }, ["/a.b"]);
+          const { min, max, mean } = measured(store, store.column("/a.b"), times[10], times[20]);
+          return [min, max, mean];
+        })()"""
+    )
+    assert found == [10.0, 20.0, 15.0]

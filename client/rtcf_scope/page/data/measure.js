@@ -3,12 +3,19 @@ import { highest, peak, spectrum, transform } from "./fft.js";
 
 const MOST = 400_000; // values
 
-// The values of a column between two times, without those that are not numbers. The next call reuses
+// The place behind the last cycle that is not after a time.
+function behind(store, time) {
+  let at = Math.min(store.find(time), store.end);
+  while (at < store.end && store.time(at) === time) at++;
+  return at;
+}
+
+// The values of a column between two times, both included, without those that are not numbers. The next call reuses
 // the arrays.
 let times = new Float64Array(0), numbers = new Float64Array(0);
 
 export function values(store, column, begin, end) {
-  const first = store.find(begin), last = Math.min(store.find(end), store.end);
+  const first = store.find(begin), last = behind(store, end);
   const every = Math.max(1, Math.ceil((last - first) / MOST));
   const most = Math.ceil((last - first) / every);
   if (times.length < most) { times = new Float64Array(most + 1000); numbers = new Float64Array(most + 1000); }
@@ -27,7 +34,7 @@ export function measured(store, column, begin, end, given) {
   const { times, values: found } = values(store, column, begin, end);
   if (!found.length) return null;
   // The extremes of all values, even if there are more than MOST.
-  const [min, max] = column.range(store.find(begin), Math.min(store.find(end), store.end));
+  const [min, max] = column.range(store.find(begin), behind(store, end));
   let sum = 0, squares = 0;
   for (let i = 0; i < found.length; i++) { sum += found[i]; squares += found[i] * found[i]; }
   return { min, max, mean: sum / found.length, rms: Math.sqrt(squares / found.length), span: max - min,

@@ -25,8 +25,8 @@ const digitsOf = (step) => Math.max(-Math.floor(Math.log10(step) + 1e-9), 0);
 // The text of a tick, with the digits of its step.
 export function tickText(value, step) {
   if (Math.abs(value) < step * 1e-6) value = 0;
-  if (Math.abs(value) >= 1e15) return value.toExponential(3);
-  return value.toFixed(Math.min(digitsOf(step), 12)).replace("-", "−");
+  if (Math.abs(value) >= 1e15) return exponential(value, 3);
+  return fixed(value, Math.min(digitsOf(step), 12));
 }
 
 // Short, distinct texts of ticks. `note` is their common factor or offset.
@@ -42,11 +42,19 @@ export function tickTexts(at, step) {
   // For long numbers that differ little, show the differences from one of them.
   const coarse = 10 ** Math.ceil(Math.log10(at.at(-1) - at[0] + step) + 1e-9);
   const base = Math.floor(at[0] / coarse + 1e-9) * coarse;
-  if (!base) return { texts: at.map((value) => value.toExponential(3)), note: "" };
+  if (!base) return { texts: at.map((value) => exponential(value, 3)), note: "" };
   const rest = tickTexts(at.map((value) => value - base), step);
-  const many = Math.abs(base) >= 1e15 ? base.toExponential(9) : grouped(tickText(base, Math.min(coarse, 1e15)));
+  const many = Math.abs(base) >= 1e15 ? exponential(base, 9) : grouped(tickText(base, Math.min(coarse, 1e15)));
   return { texts: rest.texts, note: `${rest.note}${base < 0 ? " − " : " + "}${many.replace("−", "")}`.trim() };
 }
+
+// A number with this many digits behind the point, without −0.
+export function fixed(value, digits) {
+  const text = value.toFixed(digits);
+  return (Number(text) === 0 ? text.replace("-", "") : text).replace("-", "−");
+}
+
+const exponential = (value, digits) => value.toExponential(digits).replace("e+", "e").replaceAll("-", "−");
 
 const superscript = (power) => String(power).replace(/./g, (each) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(each)]);
 
@@ -57,14 +65,16 @@ export function grouped(text) {
   return part === undefined ? apart : `${apart}.${part}`;
 }
 
-// A measured value, with five significant digits and all digits before the point.
-export function figure(value, unit = "") {
+// A measured value, with five significant digits and all digits before the point; with more digits if it
+// differs by `apart` from another one.
+export function figure(value, unit = "", apart = NaN) {
   if (value === undefined || value === null || Number.isNaN(value)) return "–";
   if (!isFinite(value)) return value > 0 ? "∞" : "−∞";
   const size = Math.abs(value);
-  const text = size !== 0 && (size >= 1e12 || size < 1e-4) ? value.toExponential(4).replace("e+", "e")
-    : size >= 1e4 ? grouped(String(Math.round(value)).replace("-", "−")) : String(Number(value.toPrecision(5)));
-  return text.replace("-", "−") + (unit ? " " + unit : "");
+  const digits = apart > 0 && size > apart ? Math.min(Math.max(Math.ceil(Math.log10(size / apart)) + 2, 5), 15) : 5;
+  const text = size !== 0 && (size >= 1e12 || size < 1e-4) ? exponential(value, digits - 1)
+    : grouped(String(Number(value.toPrecision(size >= 1e4 ? Math.max(digits, Math.floor(Math.log10(size)) + 1) : digits))).replace("-", "−"));
+  return text + (unit ? " " + unit : "");
 }
 
 // A number of seconds or hertz, with a prefix.
@@ -72,5 +82,5 @@ export function scaled(value, unit) {
   if (value === undefined || value === null || !isFinite(value)) return "–";
   if (value === 0) return `0 ${unit}`;
   const [size, prefix] = PREFIXES.find(([each]) => Math.abs(value) >= each * 0.9999) ?? PREFIXES.at(-1);
-  return `${Number((value / size).toPrecision(4))} ${prefix}${unit}`.replace("-", "−");
+  return `${Number((value / size).toPrecision(4))} ${prefix}${unit}`.replaceAll("-", "−");
 }

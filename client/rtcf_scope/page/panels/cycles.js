@@ -79,18 +79,19 @@ export class Cycles {
     return bars;
   }
 
-  // Draws the mean duration of each component, in schedule order.
+  // Draws the mean duration of each component in a cycle, in schedule order: a component that runs in each
+  // fourth cycle counts with a quarter of its duration.
   #components(g, top, w) {
     if (!this.statistics) return;
     const all = Object.entries(this.statistics.components);
-    const sum = all.reduce((total, [, each]) => total + each.mean, 0);
+    const share = ({ mean, every }) => mean / every, sum = all.reduce((total, [, each]) => total + share(each), 0);
     if (!(sum > 0)) return;
     let left = AREA.left;
     all.forEach(([name, each], i) => {
-      const wide = each.mean / sum * w;
+      const wide = share(each) / sum * w;
       g.fillStyle = colour(i % 8);
       g.fillRect(left, top, Math.max(wide - 1, 0.5), STACK - 10);
-      const text = `${name} ${scaled(each.mean / 1e6, "s")}`;
+      const text = `${name} ${scaled(each.mean / 1e6, "s")}${each.every > 1 ? ` in 1 of ${each.every} cycles` : ""}`;
       g.fillStyle = ink("paper");
       if (g.measureText(text).width < wide - 8) g.fillText(text, left + 4, top + 12);
       left += wide;

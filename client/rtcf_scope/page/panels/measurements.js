@@ -106,7 +106,7 @@ export class Measurements {
     const at = (time) => (column && time !== null && !store.empty ? column.get(store.nearest(time)) : NaN);
     const found = column && !store.empty ? measured(store, column, begin, end, this.steps.get(name)) : null;
     const cells = [scope.mode === "recording" ? `${name} · ${scope.recordings[second].name}` : name,
-      figure(at(a), unit), figure(at(b), unit), figure(at(b) - at(a), unit)];
+      figure(at(a), unit, Math.abs(at(b) - at(a))), figure(at(b), unit, Math.abs(at(b) - at(a))), figure(at(b) - at(a), unit)];
     if (found) cells.push(...[found.min, found.max, found.span, found.mean, found.rms].map((each) => figure(each, unit)),
       scaled(found.frequency, "Hz"), scaled(found.rise, "s"), isFinite(found.overshoot) ? `${figure(found.overshoot)} %` : "–", scaled(found.settling, "s"));
     else cells.push(...Array(9).fill("–"));

@@ -1,6 +1,7 @@
 // The robot of the runner in 3-D. It moves with the signals of its joints; a ghost shows its target;
 // picking a joint shows its signals. three.js draws it, and is loaded when the panel is opened.
 import { meshOf } from "../data/stl.js";
+import { fixed } from "../drawing/axes.js";
 import { ink } from "../drawing/palette.js";
 import { ask, query, request } from "../server.js";
 
@@ -154,7 +155,7 @@ export class Robot {
       row.onclick = () => this.#pick(joint.joint);
       joint.show = (value) => {
         bar.value = Number.isFinite(value) ? value : 0; // the element throws an exception for NaN
-        says.textContent = Number.isFinite(value) ? joint.type === "prismatic" ? `${(value * 1e3).toFixed(1)} mm` : `${(value * 180 / Math.PI).toFixed(1)}°` : "–";
+        says.textContent = Number.isFinite(value) ? joint.type === "prismatic" ? `${fixed(value * 1e3, 1)} mm` : `${fixed(value * 180 / Math.PI, 1)}°` : "–";
       };
       joint.row = row;
       return row;
