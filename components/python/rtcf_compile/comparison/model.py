@@ -9,6 +9,7 @@ import ast
 import enum
 import operator
 from collections.abc import Collection, Iterable, Iterator
+from copy import deepcopy as copy_of
 from types import CodeType, FunctionType
 from typing import Any
 
@@ -41,6 +42,7 @@ from rtcf_compile.rewriting.functions import made as made_of
 from rtcf_compile.source.checks import resolve
 from rtcf_compile.source.modules import Source, read
 from rtcf_compile.source.parsed import is_own, opened
+from rtcf_compile.source.records import method_names
 from rtcf_compile.source.spelling import SETTER, defaults_of
 
 
@@ -374,6 +376,10 @@ def _in_class(
     return made
 
 
+def _is_array(value: Any) -> bool:
+    return isinstance(value, np.ndarray | np.generic)
+
+
 class _Operations(CommonRewriting):
     """Replaces operations on values. Names, assignments and their order stay as they are."""
 
@@ -385,6 +391,7 @@ class _Operations(CommonRewriting):
     ) -> None:
         super().__init__(source, functions)
         self._branches = branches
+        self._own_methods = method_names(source.function)
         self.scope: dict[str, Any] = {}
 
     def visit(self, node: ast.AST) -> Any:
@@ -421,6 +428,23 @@ class _Operations(CommonRewriting):
         ):
             return self.generic_visit(node)
         return super().visit_Call(node)
+
+    def _method(self, node: ast.Call, called: ast.Attribute) -> ast.AST:
+        if called.attr not in self._own_methods:
+            return super()._method(node, called)
+        # A method of an object of the user may have the name of one of arrays.
+        own = like(called, ast.Name("rtcf_own", ast.Load()))
+        plain = copy_of(node)
+        plain.func = like(called, ast.Attribute(own, called.attr, ast.Load()))
+        owner = self.visit(called.value)
+        self.scope["rtcf_is_array"] = _is_array
+        either = ast.IfExp(
+            call_of("rtcf_is_array", own),
+            super()._method(node, like(called, ast.Attribute(own, called.attr, ast.Load()))),
+            self.generic_visit(plain),
+        )
+        arguments = ast.arguments([], [ast.arg("rtcf_own")], None, [], [], None, [])
+        return like(node, ast.Call(ast.Lambda(arguments, either), [owner], []))
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
         if isinstance(resolve(node.value, self.source), type(np.r_) | type(np.c_) | dict):

@@ -93,6 +93,11 @@ def as_tuple(value: Any) -> Any:
     return value if record is None else tuple(getattr(value, each) for each in record.fields)
 
 
+def method_names(function: FunctionType) -> set[str]:
+    """Return the names of all methods of objects that a function can use."""
+    return {name for record in _records(function) for name in record.methods}
+
+
 def replace(tree: ast.FunctionDef, function: FunctionType, file: str) -> dict[str, FunctionType]:
     """Replace the objects in a function; return the functions that it then calls, by name."""
     found = {record.cls: record for record in _records(function)}
@@ -107,13 +112,17 @@ def _records(function: FunctionType) -> Iterator[Record]:
     """Yield the records whose names a function can use, and that of which it is a method."""
     scope = function.__globals__
     spaces = [scope]
-    owner = scope.get(function.__qualname__.rpartition(".")[0].partition(".")[0])
-    spaces += [vars(each) for each in (owner, *scope.values())
+    spaces += [vars(each) for each in (_class_of(function), *scope.values())
                if isinstance(each, type | ModuleType) and _is_of_user(each)]  # fmt: skip
     for space in spaces:
         for value in list(space.values()):
             if isinstance(value, type) and (record := record_of(value)) is not None:
                 yield record
+
+
+def _class_of(function: FunctionType) -> Any:
+    """Return the class of the module around a function, or None."""
+    return function.__globals__.get(function.__qualname__.rpartition(".")[0].partition(".")[0])
 
 
 def _is_of_user(value: type | ModuleType) -> bool:
@@ -133,7 +142,8 @@ class _Replacing(ast.NodeTransformer):
         arguments = [*tree.args.posonlyargs, *tree.args.args]
         self._own = next((each for each in records if function in each.methods.values()
                           or function in each.properties.values()), None)  # fmt: skip
-        is_method = self._own is None and "." in function.__qualname__.rpartition("<locals>.")[2]
+        self._owner_class = _class_of(function)
+        is_method = self._owner_class is not None and self._record(self._owner_class) is None
         self._self = arguments[0].arg if arguments and is_method else ""
         # Variables that are parts of messages.
         self._messages: set[str] = set()
@@ -245,8 +255,7 @@ class _Replacing(ast.NodeTransformer):
         """Return what a dotted name of the module refers to, or None."""
         if isinstance(node, ast.Name):
             if node.id == self._self:
-                owner = self._function.__qualname__.rpartition(".")[0].partition(".")[0]
-                return self._function.__globals__.get(owner)
+                return self._owner_class
             return None if node.id in self._bound else self._function.__globals__.get(node.id)
         if isinstance(node, ast.Attribute):
             owner = self._resolved(node.value)
@@ -281,6 +290,8 @@ class _Replacing(ast.NodeTransformer):
                 given = node.args.pop()
                 self._visit_arguments(node)
                 return self._changed(node, given, found)
+        if isinstance(of, ast.Attribute) and (found := self._record(self._resolved(of.value))):
+            return self._of_class(node, of, found)
         if isinstance(of, ast.Attribute) and (found := self._owner(of, is_called=True)) is not None:
             if of.attr == "_replace" and issubclass(found.cls, tuple):
                 self._visit_arguments(node)
@@ -292,6 +303,19 @@ class _Replacing(ast.NodeTransformer):
                 return _located(ast.Call(function, [own, *node.args], node.keywords), node)
         self.generic_visit(node)
         return node
+
+    def _of_class(self, node: ast.Call, of: ast.Attribute, record: Record) -> ast.expr:
+        """Rewrite `Sample.method(…)`."""
+        value = inspect.getattr_static(record.cls, of.attr, None)
+        called = value.__func__ if isinstance(value, staticmethod) else value
+        if not isinstance(called, FunctionType) or _is_of_python(called):
+            what = f"{ast.unparse(of)} is not compiled"
+            raise at(self._file, node, what, "write a function of the module")
+        self._visit_arguments(node)
+        if called in record.methods.values() and node.args:
+            node.args[0] = self._checked(node.args[0])
+        function = self._name(record, of.attr, called)
+        return _located(ast.Call(function, node.args, node.keywords), node)
 
     def _visit_arguments(self, node: ast.Call) -> None:
         node.args = [self.visit(each) for each in node.args]
@@ -378,6 +402,9 @@ class _Replacing(ast.NodeTransformer):
         if node.attr in record.methods:
             what = f"{ast.unparse(node)} is a method"
             raise at(self._file, node, what, f"call it: {ast.unparse(node)}(…)")
+        value = inspect.getattr_static(record.cls, node.attr, None)
+        if type(value) in (bool, int, float):
+            return _located(ast.Constant(value), node)
         names = (*record.fields, *record.methods, *record.properties)
         near = difflib.get_close_matches(node.attr, names, 1, 0.6)
         remedy = f"correct its name ({near[0]})" if near else f"it has {', '.join(names)}"

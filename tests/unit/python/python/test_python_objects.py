@@ -55,6 +55,24 @@ class Profile:
         return Sample(a=1, s=self.length, v=0)
 
 
+@dataclass(frozen=True)
+class Limits:
+    low: float
+    high: float = 2.0
+    WIDEST = 7.0
+
+    @staticmethod
+    def half(x):
+        return 0.5 * x
+
+    @classmethod
+    def symmetric(cls, x):
+        return cls(-x, x)
+
+    def clip(self, x: float) -> float:
+        return min(max(x, self.low), self.high)
+
+
 class Pair(NamedTuple):
     first: np.ndarray
     second: np.ndarray
@@ -176,6 +194,15 @@ WAYS = {
         p = Point(u, 2.0)
         p = replace(p, y=p.x)
         self.y.write(p.x - 3.0 * p.y)""",
+    "a static method, a method of the class": """
+        p = Limits(-1.0)
+        self.y.write(Limits.half(u) + Limits.clip(p, u))""",
+    "a method named as one of arrays": """
+        p = Limits(-1.0)
+        self.w.write(p.clip(u) + x.clip(-0.5, 0.5))""",
+    "a constant of the class": """
+        p = Limits(u)
+        self.y.write(p.WIDEST + Limits.WIDEST)""",
     "objects in objects": """
         p = Nested(Sample(u, 1.0), end=Sample(2.0 * u, 3.0))
         self.y.write(p.begin.s + p.end.v * p.end.s)""",
@@ -243,6 +270,7 @@ REJECTED = {
     ),
     "an operator": ("p = Summed(u) + Summed(1.0)  # here", "an object of Summed is not compiled"),
     "a list of its own": ("p = Counted()  # here", "an object of Counted is not compiled"),
+    "a class method": ("p = Limits.symmetric(u)  # here", "Limits.symmetric is not compiled: write"),
     "a missing field": ("p = Sample(u)  # here", "Sample has the fields s, v, a: write Sample(s,"),
     "too many fields": ("p = Point(u, 1.0, 2.0)  # here", "Point has the fields x, y"),
     "an unknown field": ("p = Point(u, z=1.0)  # here", "Point has the fields x, y"),
