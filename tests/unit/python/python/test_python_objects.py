@@ -277,8 +277,8 @@ REJECTED = {
     "a field given twice": ("p = Point(u, x=1.0)  # here", "Point has the fields x, y"),
     "any number of fields": ("p = Point(*x[:2])  # here", "Point of any number of values: write"),
     "a field that is not there": (
-        "p = Profile(u, 1.0)\n        self.y.write(p.lenght)  # here",
-        "Profile has no lenght: correct its name (length)",
+        "p = Profile(u, 1.0)\n        self.y.write(p.tops)  # here",
+        "Profile has no tops: correct its name (top)",
     ),
     "a method without ( )": (
         "p = Sample(u, 1.0)\n        self.y.write(p.energy)  # here",
