@@ -61,7 +61,7 @@ def _check(page: Page, folder: Path, seed: int) -> None:
         assert not found, f"seed {seed}, after {', '.join(done)}: {len(found)} pixels, {found[:3]}"
 
 
-def test_a_scale_changed_after_freezing_leaves_no_old_picture(page: Page, tmp_path: Path) -> None:
+def test_a_scale_changed_after_freezing_leaves_no_old_drawing(page: Page, tmp_path: Path) -> None:
     _begin(page, 1, 30.0)
     for low, high in ((-9, 9), (-3, 3), (-40, 40), (-6, 6)):
         page.ask("drawing.made.freeze()")
@@ -71,7 +71,7 @@ def test_a_scale_changed_after_freezing_leaves_no_old_picture(page: Page, tmp_pa
         page.ask("drawing.made.run(); drawing.roll(drawing.made, drawing.source, 2.3)")
 
 
-def test_a_changed_theme_leaves_no_old_picture(page: Page, tmp_path: Path) -> None:
+def test_a_changed_theme_leaves_no_old_drawing(page: Page, tmp_path: Path) -> None:
     _begin(page, 1, 30.0)
     for theme in ("light", "dark", "light", "dark"):
         page.ask(f"document.documentElement.dataset.theme = '{theme}'; drawing.made.changed()")
