@@ -131,7 +131,8 @@ class _Scope:
         """Return the scope of a block that may not run."""
         return _Scope(
             list(self.vectors), list(self.matrices), list(self.blocks), list(self.pairs),
-            list(self.objects), self.depth + 1, self.has_methods, list(self.functions), self.outside,
+            list(self.objects), self.depth + 1, self.has_methods, list(self.functions),
+            self.outside,
         )  # fmt: skip
 
     def nested(self) -> "_Scope":

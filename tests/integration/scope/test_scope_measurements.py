@@ -193,7 +193,8 @@ def test_the_cycles_at_both_cursors_are_measured(page: Page) -> None:
         """(async () => {
           const { measured } = await import("/page/data/measure.js");
           const { Store } = await import("/page/data/store.js");
-          const times = Float64Array.from({ length: 40 }, (_, i) => i / 8), zeros = times.map(() => 0);
+          const times = Float64Array.from({ length: 40 }, (_, i) => i / 8);
+          const zeros = times.map(() => 0);
           const store = Store.of({ count: 40, lost: 0, times, cycles: times.map((_, i) => i),
             latencies: zeros, durations: zeros, traces: [times.map((_, i) => i)] }, ["/a.b"]);
           const { min, max, mean } = measured(store, store.column("/a.b"), times[10], times[20]);

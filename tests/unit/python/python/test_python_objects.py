@@ -270,7 +270,7 @@ REJECTED = {
     ),
     "an operator": ("p = Summed(u) + Summed(1.0)  # here", "an object of Summed is not compiled"),
     "a list of its own": ("p = Counted()  # here", "an object of Counted is not compiled"),
-    "a class method": ("p = Limits.symmetric(u)  # here", "Limits.symmetric is not compiled: write"),
+    "a class method": ("p = Limits.symmetric(u)  # here", "Limits.symmetric is not compiled: "),
     "a missing field": ("p = Sample(u)  # here", "Sample has the fields s, v, a: write Sample(s,"),
     "too many fields": ("p = Point(u, 1.0, 2.0)  # here", "Point has the fields x, y"),
     "an unknown field": ("p = Point(u, z=1.0)  # here", "Point has the fields x, y"),
