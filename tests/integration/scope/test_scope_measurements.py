@@ -50,7 +50,8 @@ def _response(draw: np.random.Generator) -> tuple[np.ndarray, np.ndarray, float,
 
 def _asked(page: Page, expression: str) -> dict[str, float]:
     found: dict[str, float] = page.ask(
-        f"(async () => {{ const m = await import('/page/data/measure.js'); return {expression}; }})()"
+        "(async () => { const m = await import('/page/data/measure.js');"
+        f"return {expression}; }})()"
     )
     return found
 
@@ -168,9 +169,9 @@ TEXTS = {
     'figure(-12.5, "N")': "−12.5 N",
     "figure(-1.25e-5)": "−1.2500e−5",
     "figure(2.5e13)": "2.5000e13",
-    'figure(101325.2, "Pa")': "101 325 Pa",
-    'figure(101325.2, "Pa", 0.3)': "101 325.2 Pa",
-    'figure(101325.5, "Pa", 0.3)': "101 325.5 Pa",
+    'figure(101325.2, "Pa")': "101\u202f325 Pa",
+    'figure(101325.2, "Pa", 0.3)': "101\u202f325.2 Pa",
+    'figure(101325.5, "Pa", 0.3)': "101\u202f325.5 Pa",
     "figure(1.000001, '', 1e-6)": "1.000001",
     "fixed(-0.04, 1)": "0.0",
     "fixed(-0.06, 1)": "−0.1",
