@@ -158,8 +158,7 @@ def test_target_and_time_of_a_step_are_set_on_the_page(page: Page) -> None:
         "?.cells[12].textContent.includes('100')"
     )
     told = page.ask(
-        "(({ title, className }) => [title, className])"
-        "(document.querySelector('[data-key=zero]'))"
+        "(({ title, className }) => [title, className])(document.querySelector('[data-key=zero]'))"
     )
     assert told == ["x is no number", "wrong"]
     assert page.errors == []

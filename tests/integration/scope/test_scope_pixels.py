@@ -80,9 +80,7 @@ def test_a_changed_theme_leaves_no_old_drawing(page: Page, tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("seed", range(1, 9))
-def test_random_actions_leave_the_pixels_of_the_data(
-    page: Page, tmp_path: Path, seed: int
-) -> None:
+def test_random_actions_leave_the_pixels_of_the_data(page: Page, tmp_path: Path, seed: int) -> None:
     _check(page, tmp_path, seed)
 
 

@@ -404,8 +404,9 @@ def frozen(value: Any) -> Any:
         return value.copy(order="C")
     value = as_tuple(value)
     if type(value) is tuple:
+        parts = map(as_tuple, value)
         return tuple(
-            frozen(as_tuple(each)) if isinstance(each, tuple | np.ndarray) else each for each in value
+            frozen(each) if isinstance(each, tuple | np.ndarray) else each for each in parts
         )
     if not isinstance(value, list):
         return value

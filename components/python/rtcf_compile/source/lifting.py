@@ -143,7 +143,8 @@ def lift(
 ) -> dict[str, FunctionType]:
     """Replace what is nested in a function by calls; return the functions that it calls, by name.
 
-    `called`: those that it calls already. Raises Mistake for a nested function that is used in another way.
+    `called`: those that it calls already. Raises Mistake for a nested function that is used in
+    another way.
     """
     lifting = _Lifting(tree, function, file)
     lifting.functions |= called

@@ -15,7 +15,14 @@ from types import FunctionType, ModuleType
 
 from rtcf.component import Component, DeclarationError
 
-from rtcf_compile.source import dependencies, lifting, numpy_errors, processor_time, progress, records
+from rtcf_compile.source import (
+    dependencies,
+    lifting,
+    numpy_errors,
+    processor_time,
+    progress,
+    records,
+)
 from rtcf_compile.source.mistake import Mistake, source_line
 from rtcf_compile.source.parsed import is_of_user, parsed
 from rtcf_compile.source.prefix_map import mapped

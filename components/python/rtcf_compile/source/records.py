@@ -375,7 +375,8 @@ class _Replacing(ast.NodeTransformer):
             fields = ", ".join(record.fields)
             raise at(self._file, node, f"{record.cls.__name__} has the fields {fields}", "name one")
         if not isinstance(of, ast.Name):
-            raise at(self._file, node, "an expression that is replaced in part", "bind it to a variable first")
+            what = "an expression that is replaced in part"
+            raise at(self._file, node, what, "bind it to a variable first")
         self._check_order(node, named, record)
         elements = [
             named.get(each) or self._element(node, of, place)
