@@ -69,7 +69,8 @@ def record_of(cls: Any) -> Record | None:
         defaults = {each.name: each.default for each in known if each.default is not missing}
     else:
         return None
-    methods, properties = {}, {}
+    methods: dict[str, FunctionType] = {}
+    properties: dict[str, FunctionType] = {}
     for base in reversed(cls.__mro__):
         for name, value in vars(base).items() if is_of_user(base) else ():
             of = value.fget if isinstance(value, property) else value
@@ -194,7 +195,10 @@ class _Replacing(ast.NodeTransformer):
         elif isinstance(node, ast.NamedExpr):
             self._set(node.target, node.value)
         elif isinstance(node, ast.For | ast.comprehension):
-            values = node.iter.elts if isinstance(node.iter, ast.Tuple | ast.List) else [None]
+            of = node.iter
+            values: list[ast.expr | None] = [None]
+            if isinstance(of, ast.Tuple | ast.List):
+                values = [*of.elts]
             for each in values:
                 self._set(node.target, each)
             if self._is_of_port(node.iter):
@@ -208,9 +212,10 @@ class _Replacing(ast.NodeTransformer):
                 self._messages.add(target.id)
             return
         parts = target.elts if isinstance(target, ast.Tuple | ast.List) else []
-        values = value.elts if isinstance(value, ast.Tuple | ast.List) else []
-        is_same = len(parts) == len(values)
-        for part, of in zip(parts, values if is_same else [None] * len(parts), strict=True):
+        values: list[ast.expr | None] = [None] * len(parts)
+        if isinstance(value, ast.Tuple | ast.List) and len(value.elts) == len(parts):
+            values = [*value.elts]
+        for part, of in zip(parts, values, strict=True):
             self._set(part, of)
 
     def _of_value(self, node: ast.expr) -> Record | None:
