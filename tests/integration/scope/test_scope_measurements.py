@@ -3,8 +3,10 @@
 import json
 import math
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 import rtcf
 from browser import Page
@@ -32,7 +34,9 @@ def page(visit: Opener, scope: ScopeProcess) -> Page:
     return page
 
 
-def _response(draw: np.random.Generator) -> tuple[np.ndarray, np.ndarray, float, float, float]:
+def _response(
+    draw: np.random.Generator,
+) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], float, float, float]:
     """Return times, a step response of a random system of second order with some noise, the level
     before the step, its target and its time.
     """
@@ -48,8 +52,8 @@ def _response(draw: np.random.Generator) -> tuple[np.ndarray, np.ndarray, float,
     return time, initial + share * (target - initial) + noise, initial, target, zero
 
 
-def _asked(page: Page, expression: str) -> dict[str, float]:
-    found: dict[str, float] = page.ask(
+def _asked(page: Page, expression: str) -> dict[str, Any]:
+    found: dict[str, Any] = page.ask(
         "(async () => { const m = await import('/page/data/measure.js');"
         f"return {expression}; }})()"
     )
