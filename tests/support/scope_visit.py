@@ -38,6 +38,11 @@ class ScopePage:
             if self.texts and self.texts[-1]["kind"] == kind and self._is_new:
                 return self.texts[-1]
 
+    async def told(self, kind: str) -> dict[str, Any]:
+        """Return the last text message of a kind, or the next one if there was none."""
+        found = [each for each in self.texts if each["kind"] == kind]
+        return found[-1] if found else await self.text(kind)
+
     async def binary(
         self, kind: int, traces: int | None = None
     ) -> tuple[tuple[Any, ...], NDArray[np.float64]]:
