@@ -13,6 +13,10 @@ import signal
 from pathlib import Path
 from types import FrameType
 
+from rtcf_compile import instructions
+
+instructions.choose()  # before NumPy is imported
+
 import forking  # noqa: F401, before gRPC is imported elsewhere: tests compile in child processes
 import pytest
 from failures_at_once import FailuresAtOnce

@@ -4,13 +4,14 @@ import mmap
 import os
 import sys
 
-from rtcf_compile import child
+from rtcf_compile import child, instructions
 from rtcf_compile.main import REFUSED
 from rtcf_compile.source import progress
 
 
 def guarded() -> int:
     """Run the command; return its exit code."""
+    instructions.choose()
     if sys.argv[1:] == ["--worker"]:
         from rtcf_compile.worker import serve
 

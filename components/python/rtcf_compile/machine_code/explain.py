@@ -78,6 +78,11 @@ _KNOWN: tuple[tuple[str, str, str], ...] = (
         "write z.conjugate()",
     ),
     (
+        r"Unknown attribute '(\w+)' of type Object<(\w+)>",
+        "the class of the object with this {0} is not known",
+        "annotate the variable with its class: x: {1} = …",
+    ),
+    (
         r"Unknown attribute '(\w+)' of type ([^\n]*)",
         "{kind1} has no compiled attribute {0}",
         "use NumPy functions on numbers and arrays",
@@ -149,6 +154,14 @@ def mistake(error: Any, function: FunctionType) -> Mistake:
 
 def _said(text: str, source: str) -> tuple[str, str]:
     """Return the error in a line and the remedy."""
+    what, remedy = _plainly_said(text, source)
+    is_of_object = "Object<" in text and (_NONE_FOR.search(text) or _INVALID.search(text))
+    if is_of_object and not _MARK.search(text):
+        return what, "write what is done with its fields, such as p.x"
+    return what, remedy
+
+
+def _plainly_said(text: str, source: str) -> tuple[str, str]:
     if found := _MARK.search(text):
         return found[1].strip(), found[2].strip()
     for pattern, what, remedy in _KNOWN[:2]:
@@ -282,6 +295,10 @@ def kind_of(text: str) -> str:
         return f"a {found[1]}"
     if re.match(r"(?:Uni)?Tuple\(", text):
         return "a list or tuple"
+    if found := re.match(r"Object<(\w+)>", text):
+        return f"a {found[1]}"
+    if found := re.match(r"Unknown<(\w+)>", text):
+        return f"a {found[1]} in an object"
     for begin, kind in (
         ("slice", "a slice"),
         ("Function", "a function"),

@@ -25,8 +25,11 @@ from numba.core.typing import signature
 
 from rtcf_compile.machine_code import backend, identity
 from rtcf_compile.machine_code.cache import Cache
+from rtcf_compile.machine_code.object_types import ObjectType, object_type
 from rtcf_compile.rewriting.functions import WRITTEN_CODE
 from rtcf_compile.rewriting.logs import Logs
+from rtcf_compile.source.objects import marker_of
+from rtcf_compile.source.records import NAMED
 
 _compile = Dispatcher.compile
 _compile_part = BaseContext._compile_subroutine_no_cache
@@ -284,6 +287,8 @@ def _encoded(kind: Any) -> list[Any]:
         return ["array", dtype, kind.ndim, kind.layout, not kind.mutable, kind.aligned]
     if cls in (types.Tuple, types.UniTuple):
         return ["tuple", [_encoded(each) for each in kind.types]]
+    if isinstance(kind, ObjectType):
+        return ["object", marker_of(kind.record), [_encoded(each) for each in kind.types]]
     if cls is types.Optional:
         return ["optional", _encoded(kind.type)]
     if cls is types.SliceType:
@@ -300,6 +305,8 @@ def _decoded(form: list[Any]) -> Any:
         return types.Array(_decoded(dtype), dimensions, layout, readonly, aligned=aligned)
     if kind == "tuple":
         return types.Tuple([_decoded(each) for each in parts[0]])
+    if kind == "object":
+        return object_type(NAMED[parts[0]], [_decoded(each) for each in parts[1]])
     if kind == "optional":
         return types.Optional(_decoded(parts[0]))
     return types.slice2_type if parts[0] == 2 else types.slice3_type

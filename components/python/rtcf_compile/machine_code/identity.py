@@ -29,7 +29,9 @@ from numba.core.compiler import Compiler, CompilerBase
 from numba.extending import _Intrinsic
 
 import rtcf_compile
+from rtcf_compile.machine_code.object_types import MarkerType, ObjectType, UnknownType
 from rtcf_compile.rewriting.functions import HELPERS, INT_BOUNDS, WRITTEN_NAME
+from rtcf_compile.source.records import Meaning, Object, Record, Unknown
 
 _PLAIN = (type(None), bool, int, str, bytes, type(...))
 _FOLDERS = tuple(
@@ -130,6 +132,12 @@ class Descriptions:
             return name, self.type(kind.dtype), layout
         if cls is types.NestedArray:
             return name, self.type(kind.dtype), tuple(map(int, kind.shape))
+        if isinstance(kind, ObjectType):
+            return name, kind.record.description(), [self.type(each) for each in kind.types]
+        if cls is MarkerType:
+            return name, self.of(kind.marker)
+        if cls is UnknownType:
+            return name, str(kind)
         if cls in _TUPLES:
             return name, [self.type(each) for each in kind.types]
         if cls is types.Optional:
@@ -173,6 +181,14 @@ class Descriptions:
             return "complex", struct.pack(">dd", value.real, value.imag)
         if isinstance(value, types.Type):
             return self.type(value)
+        if cls is Record:
+            return "class", value.description()
+        if cls is Meaning:
+            return "attribute", value.record.description(), value.attribute
+        if cls is Object:
+            return "object", value.record.description(), [self.of(each) for each in value]
+        if cls is Unknown:
+            return "unknown", value.cls.__qualname__
         if cls in (tuple, list):
             return cls.__name__, [self.of(each) for each in value]
         if cls is frozenset:

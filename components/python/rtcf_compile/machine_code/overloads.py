@@ -18,6 +18,7 @@ from rtcf.component.value_type import number_of
 
 from rtcf_compile.machine_code import backend
 from rtcf_compile.machine_code.explain import NAMES, kind_of
+from rtcf_compile.machine_code.object_types import fields_of, is_object
 from rtcf_compile.machine_code.number_types import Operand, operand, plain_of, together
 from rtcf_compile.machine_code.raised_values import note
 from rtcf_compile.machine_code.sharing import in_one_block, overlaps, shares
@@ -98,7 +99,7 @@ def _some(value: Any) -> Any:
 
 
 @intrinsic
-def _unwrapped(typing, value):  # type: ignore[no-untyped-def]
+def unwrapped(typing, value):  # type: ignore[no-untyped-def]
     """Return the value of an optional that is not None."""
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
@@ -115,7 +116,7 @@ def _value_of(value):  # type: ignore[no-untyped-def]
     def some(value):  # type: ignore[no-untyped-def]
         if value is None:
             raise TypeError("None is not a number")
-        return _unwrapped(value)
+        return unwrapped(value)
 
     return some
 
@@ -216,9 +217,9 @@ def _equal(a, b):  # type: ignore[no-untyped-def]
             return lambda a, b: True
         return lambda a, b: a is b
     if isinstance(a, types.Optional):
-        return lambda a, b: False if a is None else helpers.rtcf_equal(_unwrapped(a), b)
+        return lambda a, b: False if a is None else helpers.rtcf_equal(unwrapped(a), b)
     if isinstance(b, types.Optional):
-        return lambda a, b: False if b is None else helpers.rtcf_equal(a, _unwrapped(b))
+        return lambda a, b: False if b is None else helpers.rtcf_equal(a, unwrapped(b))
     if any(each is not None and each.is_narrow for each in (operand(a), operand(b))):
         equal = operators.OF[operator.eq]
         return lambda a, b: equal(a, b)
@@ -243,7 +244,7 @@ def _or_old(value, old):  # type: ignore[no-untyped-def]
     def either(value, old):  # type: ignore[no-untyped-def]
         if value is None:
             return old
-        return _unwrapped(value)
+        return unwrapped(value)
 
     return either
 
@@ -272,19 +273,15 @@ def _copied(value):  # type: ignore[no-untyped-def]
         return lambda value: value.copy()
     if isinstance(value, types.Optional) and isinstance(value.type, types.Array):
         return lambda value: None if value is None else _some(value).copy()
+    if is_object(value):
+        record = value.record
+        return lambda value: helpers.rtcf_made(helpers.rtcf_copied(fields_of(value)), record)
     if not isinstance(value, types.BaseTuple):
         return lambda value: value
     parts = "".join(f"copied(value[{number}])," for number in range(len(value)))
     scope = {"copied": helpers.rtcf_copied}
     exec(f"def each(value):\n    return ({parts})\n", scope)
     return scope["each"]
-
-
-@compiled_as(helpers.rtcf_object)
-def _object(value: Any) -> Any:
-    if isinstance(value, types.BaseTuple):
-        return lambda value: value
-    raise TypingError(f"RTCF:a field of {words(value)}:give it an object")
 
 
 @compiled_as(helpers.rtcf_array_of)
@@ -309,7 +306,9 @@ def _check_table(values: Any, key: Any) -> None:
     if not isinstance(key, types.Integer | types.Boolean | types.EnumMember):
         raise TypingError(f"RTCF:a key of a dict is {words(key)}:give it an int or an enum")
     numbers = types.Number | types.Boolean | types.IntEnumMember
-    if not isinstance(values, types.UniTuple) or not isinstance(values.dtype, numbers):
+    if not isinstance(values, types.UniTuple) or not (
+        isinstance(values.dtype, numbers) or is_object(values.dtype)
+    ):
         raise TypingError("RTCF:the values of a dict are not numbers of one type:use if and elif")
 
 
@@ -574,7 +573,7 @@ def _assign(target: Any, value: Any) -> Any:
         return lambda target, value: fill(target, convert(value))
     if isinstance(value, types.Number | types.Boolean):
         return _filling(target.ndim)
-    if isinstance(value, types.UniTuple | types.Tuple):
+    if isinstance(value, types.BaseTuple):
         return lambda target, value: helpers.rtcf_assign(
             target, numpy_functions.rtcf_array(value, None)
         )
@@ -777,6 +776,8 @@ def _copying_matrices(of_value: int) -> Any:
 def _get(base: Any, index: Any) -> Any:
     if any(isinstance(each, types.IntEnumMember) for each in index.types):
         return _by_values("base, index", "helpers.rtcf_get(base, ({}))", index)
+    if is_object(base) and isinstance(base, types.BaseTuple):
+        return lambda base, index: helpers.rtcf_get(fields_of(base), index)
     if isinstance(base, types.BaseTuple) and index.count != 1:
         raise TypingError("RTCF:a list or tuple takes one index:use x[i][k] for rows")
     if isinstance(base, types.UniTuple) and isinstance(index[0], types.Integer):
@@ -1797,6 +1798,8 @@ def words(value: Any) -> str:
         return "a float"
     if isinstance(value, types.Integer):
         return "an int"
+    if is_object(value):
+        return f"a {value.record.cls.__name__}"
     if isinstance(value, types.BaseTuple):
         return "a list or tuple"
     if isinstance(value, types.IntEnumMember):

@@ -323,6 +323,32 @@ class CommonRewriting(ast.NodeTransformer):
             pattern, "a pattern that unpacks", "match numbers, enums, or (a, b) with (1, _)"
         )
 
+    def visit_If(self, node: ast.If) -> ast.AST:
+        """Rewrite `if point:`, of a variable that may be None."""
+        return self._tested(node)
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.AST:
+        """Rewrite `x if point else y`, of a variable that may be None."""
+        return self._tested(node)
+
+    def visit_While(self, node: ast.While) -> ast.AST:
+        """Rewrite `while point:`, of a variable that may be None."""
+        return self._tested(node)
+
+    def visit_BoolOp(self, node: ast.BoolOp) -> ast.AST:
+        """Rewrite `point and x`, of a variable that may be None."""
+        node.values = list(map(self._truth, node.values))
+        self.generic_visit(node)
+        return node
+
+    def _tested(self, node: ast.If | ast.IfExp | ast.While) -> ast.AST:
+        node.test = self._truth(node.test)
+        self.generic_visit(node)
+        return node
+
+    def _truth(self, node: ast.expr) -> ast.expr:
+        return like(node, call_of("rtcf_truth", node)) if self._may_be_none(node) else node
+
     def visit_Compare(self, node: ast.Compare) -> ast.AST:
         """Rewrite `x in (1, 2)`, `key in LIMITS` of a dict, and comparisons with lists."""
         contained = node.comparators[0]
@@ -350,6 +376,10 @@ class CommonRewriting(ast.NodeTransformer):
             equal = call_of("rtcf_equal", *(self.visit(each) for each in sides))
             is_equal = isinstance(node.ops[0], ast.Eq)
             return like(node, equal if is_equal else ast.UnaryOp(ast.Not(), equal))
+        sides = (node.left, *node.comparators)
+        is_none = any(isinstance(each, ast.Constant) for each in sides)
+        if all(isinstance(each, ast.Is | ast.IsNot) for each in node.ops) and not is_none:
+            node.left = like(node.left, call_of("rtcf_identified", node.left))
         if not all(isinstance(each, ast.In | ast.NotIn) for each in node.ops):
             node.left = self._arrays(node.left)
             node.comparators = [self._arrays(each) for each in node.comparators]

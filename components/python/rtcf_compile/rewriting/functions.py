@@ -25,7 +25,7 @@ from rtcf_compile.source.checks import check, resolve
 from rtcf_compile.source.mistake import Mistake, Mistakes, at, written
 from rtcf_compile.source.modules import Source, read
 from rtcf_compile.source.parsed import is_own, opened
-from rtcf_compile.source.records import as_tuple
+from rtcf_compile.source.records import NAMED, Object, Unknown, is_constant, record_of
 from rtcf_compile.source.spelling import defaults_of
 
 # The helpers that rewritten functions call, by name.
@@ -326,6 +326,7 @@ class Functions:
             **source.function.__globals__,
             **source.lifted,
             **HELPERS,
+            **NAMED,
             **{name: frozen(value) for name, value in constants.items()},
         }
         scope["rtcf_fault"] = Fault
@@ -402,11 +403,18 @@ def frozen(value: Any) -> Any:
     """
     if isinstance(value, np.ndarray) and not value.flags.forc:
         return value.copy(order="C")
-    value = as_tuple(value)
+    if isinstance(value, Object):
+        return value
+    if (record := record_of(type(value))) is not None:
+        fields = [getattr(value, each) for each in record.fields]
+        return Object.of(
+            record, [frozen(each) if is_constant(each) else Unknown(type(each)) for each in fields]
+        )
     if type(value) is tuple:
-        parts = map(as_tuple, value)
+        kept = tuple | np.ndarray
         return tuple(
-            frozen(each) if isinstance(each, tuple | np.ndarray) else each for each in parts
+            frozen(each) if isinstance(each, kept) or record_of(type(each)) else each
+            for each in value
         )
     if not isinstance(value, list):
         return value

@@ -311,8 +311,24 @@ def rtcf_copied(value: Any) -> Any:
     return value.copy() if isinstance(value, np.ndarray) else value
 
 
-def rtcf_object(value: Any) -> Any:
-    """Return the tuple of an object; see records.py."""
+def rtcf_made(fields: Any, record: Any) -> Any:
+    """Return a new object; see objects.py."""
+    return record.cls(*fields)
+
+
+def rtcf_object(value: Any, meaning: Any) -> Any:
+    """Return an object, or the tuple of its fields; see objects.py."""
+    fields = meaning.record.fields
+    return tuple(getattr(value, each) for each in fields) if meaning.gives_fields else value
+
+
+def rtcf_truth(value: Any) -> Any:
+    """Return a value that is a condition."""
+    return value
+
+
+def rtcf_identified(value: Any) -> Any:
+    """Return a value whose identity is compared."""
     return value
 
 
@@ -507,6 +523,9 @@ BY_NAME = {
             rtcf_looked_up,
             rtcf_looked_up_or,
             rtcf_object,
+            rtcf_made,
+            rtcf_identified,
+            rtcf_truth,
             rtcf_array_of,
             rtcf_store,
             rtcf_maybe,

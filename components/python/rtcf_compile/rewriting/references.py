@@ -1159,7 +1159,7 @@ class _Followed:
             return (tuple(map(_elements, values)),)
         if any(target is each for each in _ITERATORS):
             return (_elements(first),)
-        is_object = isinstance(called, ast.Name) and called.id == "rtcf_object"
+        is_object = isinstance(called, ast.Name) and called.id in ("rtcf_object", "rtcf_made")
         if is_object or any(target is each for each in _TUPLES):
             return first
         if isinstance(called, ast.Attribute) and target is None:

@@ -22,6 +22,7 @@ from rtcf_compile.source.assigned import check_assigned
 from rtcf_compile.source.mistake import Mistake, Mistakes, at, once
 from rtcf_compile.source.modules import Source
 from rtcf_compile.source.parsed import is_own, opened
+from rtcf_compile.source.records import is_plain, why_not
 
 _REFUSED: dict[type[ast.AST], tuple[str, str]] = {
     ast.ListComp: ("a list allocates memory", "write np.array([… for …])"),
@@ -408,6 +409,8 @@ def _called(node: ast.Call, target: Any, source: Source) -> None:
         known = issubclass(target, np.generic | BaseException | enum.Enum)
         if not known and root not in ("builtins", "numpy"):
             what = f"an object of {target.__name__} is not compiled"
+            if is_plain(target) and (reason := why_not(target)):
+                raise at(file, node, f"{what}, because {reason.partition(': ')[0]}", reason.partition(": ")[2])
             raise at(file, node, what, "keep its values in State members, define its methods here")
     elif isinstance(target, FunctionType | BuiltinFunctionType) and root not in _COMPILED:
         raise at(

@@ -19,9 +19,9 @@ from rtcf_compile.source import (
     dependencies,
     lifting,
     numpy_errors,
+    objects,
     processor_time,
     progress,
-    records,
 )
 from rtcf_compile.source.mistake import Mistake, source_line
 from rtcf_compile.source.parsed import is_of_user, parsed
@@ -156,7 +156,7 @@ def read(function: FunctionType, is_whole: bool = False) -> Source:
     if function not in _read:
         known = lifting.tree_of(function)
         tree = known or parsed(function)
-        called = {} if known else records.replace(tree, function, file)
+        called = {} if known else objects.replace(tree, function, file)
         lifted = lifting.lift(tree, function, file, called)
         # Pickle copies a tree in a fifth of the time of deepcopy.
         _read[function] = pickle.dumps(tree), lifted
