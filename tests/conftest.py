@@ -13,10 +13,7 @@ import signal
 from pathlib import Path
 from types import FrameType
 
-from rtcf_compile import instructions
-
-instructions.choose()  # before NumPy is imported
-
+import any_processor  # noqa: F401, before NumPy is imported
 import forking  # noqa: F401, before gRPC is imported elsewhere: tests compile in child processes
 import pytest
 from failures_at_once import FailuresAtOnce

@@ -41,8 +41,8 @@ from rtcf_compile.rewriting.functions import HELPERS, drop_types, operator_funct
 from rtcf_compile.rewriting.functions import made as made_of
 from rtcf_compile.source.checks import resolve
 from rtcf_compile.source.modules import Source, read
-from rtcf_compile.source.parsed import is_own, opened
 from rtcf_compile.source.objects import method_names
+from rtcf_compile.source.parsed import is_own, opened
 from rtcf_compile.source.spelling import SETTER, defaults_of
 
 

@@ -25,7 +25,7 @@ from numba.core.typing import signature
 
 from rtcf_compile.machine_code import backend, identity
 from rtcf_compile.machine_code.cache import Cache
-from rtcf_compile.machine_code.object_types import ObjectType, object_type
+from rtcf_compile.machine_code.object_types import is_object, object_type
 from rtcf_compile.rewriting.functions import WRITTEN_CODE
 from rtcf_compile.rewriting.logs import Logs
 from rtcf_compile.source.objects import marker_of
@@ -287,7 +287,7 @@ def _encoded(kind: Any) -> list[Any]:
         return ["array", dtype, kind.ndim, kind.layout, not kind.mutable, kind.aligned]
     if cls in (types.Tuple, types.UniTuple):
         return ["tuple", [_encoded(each) for each in kind.types]]
-    if isinstance(kind, ObjectType):
+    if is_object(kind):
         return ["object", marker_of(kind.record), [_encoded(each) for each in kind.types]]
     if cls is types.Optional:
         return ["optional", _encoded(kind.type)]

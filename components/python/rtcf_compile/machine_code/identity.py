@@ -29,7 +29,7 @@ from numba.core.compiler import Compiler, CompilerBase
 from numba.extending import _Intrinsic
 
 import rtcf_compile
-from rtcf_compile.machine_code.object_types import MarkerType, ObjectType, UnknownType
+from rtcf_compile.machine_code.object_types import MarkerType, UnknownType, is_object
 from rtcf_compile.rewriting.functions import HELPERS, INT_BOUNDS, WRITTEN_NAME
 from rtcf_compile.source.records import Meaning, Object, Record, Unknown
 
@@ -132,7 +132,7 @@ class Descriptions:
             return name, self.type(kind.dtype), layout
         if cls is types.NestedArray:
             return name, self.type(kind.dtype), tuple(map(int, kind.shape))
-        if isinstance(kind, ObjectType):
+        if is_object(kind):
             return name, kind.record.description(), [self.type(each) for each in kind.types]
         if cls is MarkerType:
             return name, self.of(kind.marker)

@@ -21,8 +21,8 @@ import rtcf_compile.machine_code.einsum
 import rtcf_compile.machine_code.int_ufuncs
 import rtcf_compile.machine_code.math_functions
 import rtcf_compile.machine_code.numpy_functions
-import rtcf_compile.machine_code.operators
 import rtcf_compile.machine_code.objects
+import rtcf_compile.machine_code.operators
 import rtcf_compile.machine_code.overloads
 import rtcf_compile.machine_code.signal_functions  # noqa: F401, registers the overloads
 from rtcf_compile.machine_code import (

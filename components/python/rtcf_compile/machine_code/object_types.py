@@ -101,23 +101,18 @@ class UnknownType(types.Dummy):  # type: ignore[misc]
         super().__init__(f"Unknown<{cls.__name__}>")
 
 
-ObjectType = NamedTupleType | DataclassType
-
-
 def is_object(kind: Any) -> bool:
     """Tell whether a type is that of objects."""
-    return isinstance(kind, ObjectType)
+    return isinstance(kind, NamedTupleType | DataclassType)
 
 
-def object_type(record: Record, fields: Iterable[types.Type]) -> ObjectType:
+def object_type(record: Record, fields: Iterable[types.Type]) -> NamedTupleType | DataclassType:
     """Return the type of the objects of a class with these types of fields."""
-    cls = NamedTupleType if record.is_tuple else DataclassType
-    return cls(record, map(types.unliteral, fields))
+    plain = map(types.unliteral, fields)
+    return NamedTupleType(record, plain) if record.is_tuple else DataclassType(record, plain)
 
 
-def converted(
-    context: Any, builder: Any, given: Any, wanted: Any, value: Any
-) -> Any:
+def converted(context: Any, builder: Any, given: Any, wanted: Any, value: Any) -> Any:
     """Return the code that makes an object of a tuple, a tuple of an object, or another object."""
     parts = [builder.extract_value(value, place) for place in range(len(wanted.types))]
     cast = [
@@ -162,23 +157,23 @@ register_model(UnknownType)(models.OpaqueModel)
 @lower_cast(NamedTupleType, NamedTupleType)
 @lower_cast(NamedTupleType, types.BaseTuple)
 @lower_cast(DataclassType, DataclassType)
-def _cast(context: Any, builder: Any, given: Any, wanted: Any, value: Any) -> Any:
+def _cast(context, builder, given, wanted, value):  # type: ignore[no-untyped-def]
     return converted(context, builder, given, wanted, value)
 
 
 @typeof_impl.register(Record)
 @typeof_impl.register(Meaning)
-def _type_of_marker(value: Any, context: Any) -> Any:
+def _type_of_marker(value, context):  # type: ignore[no-untyped-def]
     return MarkerType(value)
 
 
 @typeof_impl.register(Unknown)
-def _type_of_unknown(value: Any, context: Any) -> Any:
+def _type_of_unknown(value, context):  # type: ignore[no-untyped-def]
     return UnknownType(value.cls)
 
 
 @typeof_impl.register(Object)
-def _type_of_object(value: Any, context: Any) -> Any:
+def _type_of_object(value, context):  # type: ignore[no-untyped-def]
     fields = [typeof_impl(each, context) for each in value]
     constant = [each.copy(readonly=True) if isinstance(each, types.Array) else each
                 for each in fields]  # fmt: skip
@@ -187,7 +182,7 @@ def _type_of_object(value: Any, context: Any) -> Any:
 
 @imputils.lower_constant(NamedTupleType)
 @imputils.lower_constant(DataclassType)
-def _constant(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+def _constant(context, builder, kind, value):  # type: ignore[no-untyped-def]
     parts = [
         context.get_constant_generic(builder, of, each)
         for of, each in zip(kind.types, value, strict=True)
@@ -198,7 +193,7 @@ def _constant(context: Any, builder: Any, kind: Any, value: Any) -> Any:
 
 @imputils.lower_constant(MarkerType)
 @imputils.lower_constant(UnknownType)
-def _nothing(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+def _nothing(context, builder, kind, value):  # type: ignore[no-untyped-def]
     return context.get_dummy_value()
 
 

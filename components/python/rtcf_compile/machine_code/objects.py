@@ -71,7 +71,7 @@ class _Iteration(AbstractTemplate):  # type: ignore[misc]
 
 
 @lower_builtin("getiter", NamedTupleType)
-def _iterated(context: Any, builder: Any, typed: Any, arguments: Any) -> Any:
+def _iterated(context, builder, typed, arguments):  # type: ignore[no-untyped-def]
     fields = typed.return_type.container
     iterate = context.get_function("getiter", signature(typed.return_type, fields))
     return iterate(builder, [converted(context, builder, typed.args[0], fields, arguments[0])])
@@ -85,8 +85,9 @@ def _compared(operation: Any, name: str) -> None:
         one, other = getattr(a, "record", None), getattr(b, "record", None)
         if (one is None or one.is_tuple) and (other is None or other.is_tuple):
             return None  # tuples
-        is_known = one is other and one is not None and one.is_compared
-        if not is_known or not (one.is_ordered or operation in (operator.eq, operator.ne)):
+        is_known = one is not None and one is other and one.is_compared
+        is_equality = operation in (operator.eq, operator.ne)
+        if not is_known or not (is_equality or one.is_ordered):  # type: ignore[union-attr]
             remedy = "compare their fields"
             raise TypingError(f"RTCF:{words(a)} is compared with {words(b)} by {name}:{remedy}")
         return lambda a, b: operation(fields_of(a), fields_of(b))

@@ -18,8 +18,8 @@ from rtcf.component.value_type import number_of
 
 from rtcf_compile.machine_code import backend
 from rtcf_compile.machine_code.explain import NAMES, kind_of
-from rtcf_compile.machine_code.object_types import fields_of, is_object
 from rtcf_compile.machine_code.number_types import Operand, operand, plain_of, together
+from rtcf_compile.machine_code.object_types import fields_of, is_object
 from rtcf_compile.machine_code.raised_values import note
 from rtcf_compile.machine_code.sharing import in_one_block, overlaps, shares
 from rtcf_compile.machine_code.tile import ROWS
@@ -286,6 +286,9 @@ def _copied(value):  # type: ignore[no-untyped-def]
 
 @compiled_as(helpers.rtcf_array_of)
 def _array_of(value: Any, count: Any) -> Any:
+    if is_object(value):
+        remedy = "make an array of each field"
+        raise TypingError(f"RTCF:a list of objects of {value.record.cls.__name__}:{remedy}")
     if isinstance(value, types.BaseTuple):
         raise TypingError("RTCF:an array of tuples:write np.array([a, b]) for each row")
     if not isinstance(value, types.Array):
@@ -307,9 +310,9 @@ def _check_table(values: Any, key: Any) -> None:
         raise TypingError(f"RTCF:a key of a dict is {words(key)}:give it an int or an enum")
     numbers = types.Number | types.Boolean | types.IntEnumMember
     if not isinstance(values, types.UniTuple) or not (
-        isinstance(values.dtype, numbers) or is_object(values.dtype)
+        isinstance(values.dtype, numbers | types.BaseTuple) or is_object(values.dtype)
     ):
-        raise TypingError("RTCF:the values of a dict are not numbers of one type:use if and elif")
+        raise TypingError("RTCF:the values of a dict are not of one type:use if and elif")
 
 
 @compiled_as(helpers.rtcf_looked_up_or)

@@ -24,6 +24,7 @@ from rtcf_compile.source.checks import resolve
 from rtcf_compile.source.mistake import Mistake, Mistakes, at
 from rtcf_compile.source.modules import Source
 from rtcf_compile.source.parsed import is_of_user, is_own
+from rtcf_compile.source.records import record_of
 
 _Node = TypeVar("_Node", bound=ast.AST)
 _BY_NODE: tuple[Any, ...] = (operators.BINARY, operators.SHIFTS, operators.COMPARISONS)
@@ -71,6 +72,10 @@ class CommonRewriting(ast.NodeTransformer):
     def mistake(self, node: ast.AST, what: str, remedy: str) -> Exception:
         """Return an error at a node."""
         return at(self.source.file, node, what, remedy)
+
+    def constant(self, node: ast.AST) -> Any:
+        """Return the constant to which a dotted name refers, or None."""
+        return resolve(node, self.source)
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
         """Rewrite `GAINS.kp` of a dataclass of constants, `Mode.RUN` of an enum."""
@@ -352,7 +357,7 @@ class CommonRewriting(ast.NodeTransformer):
     def visit_Compare(self, node: ast.Compare) -> ast.AST:
         """Rewrite `x in (1, 2)`, `key in LIMITS` of a dict, and comparisons with lists."""
         contained = node.comparators[0]
-        table = resolve(contained, self.source)
+        table = self.constant(contained)
         if isinstance(table, dict) and table and _has_number_keys(table):
             keys = [self._number_key(each) for each in table]
             contained = like(contained, ast.Tuple(keys, ast.Load()))
@@ -376,8 +381,7 @@ class CommonRewriting(ast.NodeTransformer):
             equal = call_of("rtcf_equal", *(self.visit(each) for each in sides))
             is_equal = isinstance(node.ops[0], ast.Eq)
             return like(node, equal if is_equal else ast.UnaryOp(ast.Not(), equal))
-        sides = (node.left, *node.comparators)
-        is_none = any(isinstance(each, ast.Constant) for each in sides)
+        is_none = any(isinstance(each, ast.Constant) for each in (node.left, *node.comparators))
         if all(isinstance(each, ast.Is | ast.IsNot) for each in node.ops) and not is_none:
             node.left = like(node.left, call_of("rtcf_identified", node.left))
         if not all(isinstance(each, ast.In | ast.NotIn) for each in node.ops):
@@ -575,7 +579,7 @@ class CommonRewriting(ast.NodeTransformer):
             remedy = f"use np.{target.__name__}, np.argmax or a loop"
             raise self.mistake(node, f"{target.__name__} takes no {node.keywords[0].arg}", remedy)
         if isinstance(node.func, ast.Attribute) and node.func.attr == "get":
-            table = resolve(node.func.value, self.source)
+            table = self.constant(node.func.value)
             if isinstance(table, dict) and table and len(node.args) == 2 and not node.keywords:
                 return self._looked_up_or(node, node.func.value, table)
         if target is enumerate and [each.arg for each in node.keywords] == ["start"]:
@@ -749,7 +753,7 @@ class CommonRewriting(ast.NodeTransformer):
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
         """Rewrite `x[i]`, where i may be an array, and `GAINS["kp"]` of a dict of constants."""
-        table = resolve(node.value, self.source)
+        table = self.constant(node.value)
         if isinstance(table, dict) and table and isinstance(node.ctx, ast.Load):
             return self._looked_up(node, table)
         node.slice = self._arrays(node.slice)
@@ -792,15 +796,18 @@ class CommonRewriting(ast.NodeTransformer):
         return call_of("rtcf_stored_enum", key, self._enum(cls)) if is_enum(cls) else key
 
     def _table(self, node: ast.expr, name: str, table: dict[Any, Any]) -> list[ast.expr]:
-        """Return the keys and values of a dict of numbers as constants."""
+        """Return the keys and values of a dict of numbers, tuples or objects as constants."""
+        kinds = {type(each) for each in table.values()}
         numbers = all(isinstance(each, int | float) for each in table.values())
-        if not numbers or not _has_number_keys(table):
-            remedy = "use ints or enums as keys, and numbers as values"
+        alike = len(kinds) == 1 and (tuple in kinds or record_of(next(iter(kinds))) is not None)
+        if not (numbers or alike) or not _has_number_keys(table):
+            remedy = "use ints or enums as keys, and numbers, tuples or objects as values"
             raise self.mistake(node, f"{name} is a dict with other keys or values", remedy)
         keys, values = (self._name_for(table, f"{name} {each}") for each in ("keys", "values"))
         self.constants[keys] = tuple(map(helpers.rtcf_number, table))
-        kind = int if all(isinstance(each, int) for each in table.values()) else float
-        self.constants[values] = tuple(map(kind, table.values()))
+        kind: Any = int if all(isinstance(each, int) for each in table.values()) else float
+        elements = map(kind, table.values()) if numbers else table.values()
+        self.constants[values] = tuple(elements)
         return [ast.Name(each, ast.Load()) for each in (keys, values)]
 
     def _is_tuple(self, node: ast.Subscript) -> bool:

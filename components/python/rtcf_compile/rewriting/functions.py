@@ -411,7 +411,7 @@ def frozen(value: Any) -> Any:
             record, [frozen(each) if is_constant(each) else Unknown(type(each)) for each in fields]
         )
     if type(value) is tuple:
-        kept = tuple | np.ndarray
+        kept = (tuple, np.ndarray)
         return tuple(
             frozen(each) if isinstance(each, kept) or record_of(type(each)) else each
             for each in value

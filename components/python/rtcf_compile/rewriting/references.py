@@ -1094,7 +1094,10 @@ class _Followed:
         base = state.pop(held)
         if isinstance(base, tuple):
             return _element(base, node.slice)
-        table = resolve(node.value, self._frame.source)
+        of = node.value
+        table = resolve(of, self._frame.source)
+        if isinstance(of, ast.Attribute) and self._is_self(of.value):
+            table = self._constants.get(of.attr)
         if isinstance(table, dict) and isinstance(node.slice, ast.Constant):
             return self._constant(table.get(node.slice.value), ast.unparse(node))
         parts = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]

@@ -125,6 +125,12 @@ class Hook(Ports):
         member = self._description.members.get(node.attr) if self._is_self(node.value) else None
         return member is not None and member.type.optional
 
+    def constant(self, node: ast.AST) -> Any:
+        """Return the constant to which a dotted name refers, such as `self.SPEEDS`, or None."""
+        if isinstance(node, ast.Attribute) and self._is_self(node.value):
+            return self._description.constants.get(node.attr)
+        return super().constant(node)
+
     def visit_Name(self, node: ast.Name) -> ast.AST:
         """Reject `self` used as a value."""
         if node.id == self._self:
@@ -316,7 +322,7 @@ class Hook(Ports):
 
         if isinstance(given, ast.Constant) and isinstance(given.value, str):
             return logged(given.value)
-        table = resolve(given.value, self.source) if isinstance(given, ast.Subscript) else None
+        table = self.constant(given.value) if isinstance(given, ast.Subscript) else None
         if not isinstance(table, dict | tuple | list) or not 0 < len(table) <= _MOST_TEXTS:
             return None
         texts = list(table.values() if isinstance(table, dict) else table)

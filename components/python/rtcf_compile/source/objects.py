@@ -152,19 +152,15 @@ class _Replacing(ast.NodeTransformer):
             self._set(node.target, node.value)
         elif isinstance(node, ast.FunctionDef | ast.Lambda):
             # A variable of this name may be another one inside.
-            for each in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs):
-                self._set(ast.Name(each.arg), self._annotated(each.annotation))
+            for given in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs):
+                self._set(ast.Name(given.arg), self._annotated(given.annotation))
         elif isinstance(node, ast.MatchAs | ast.MatchStar) and node.name:
             self._set(ast.Name(node.name), None)
         elif isinstance(node, ast.For | ast.comprehension):
             of = node.iter
-            values: list[ast.expr | None] = [None]
-            if isinstance(of, ast.Tuple | ast.List):
-                values = [*of.elts]
-            else:
-                values = [_element_of(of)]
-            for each in values:
-                self._set(node.target, each)
+            of_list = of.elts if isinstance(of, ast.Tuple | ast.List) else None
+            for value in of_list or [_element_of(of)]:
+                self._set(node.target, value)
             if self._is_of_port(node.iter):
                 names = (each for each in ast.walk(node.target) if isinstance(each, ast.Name))
                 self._messages |= {each.id for each in names}
@@ -207,6 +203,8 @@ class _Replacing(ast.NodeTransformer):
                 return self._returned(value.fget)
             return self._record(type(value))
         of = node.func
+        if isinstance(of, ast.Attribute) and of.attr == "get" and len(node.args) == 2:
+            return self._of_elements(of.value)
         if isinstance(of, ast.Attribute) and of.attr == "_replace":
             return self._of_value(of.value)
         if self._resolved(of) is dataclasses.replace and node.args:
@@ -502,21 +500,22 @@ def _behind(first: ast.expr, value: ast.expr, node: ast.expr) -> ast.expr:
 
 def _marker(node: ast.expr) -> Any:
     """Return the class or attribute to which a call refers that stands for an object."""
-    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-        if node.func.id in ("rtcf_made", "rtcf_object") and isinstance(node.args[1], ast.Name):
-            return NAMED[node.args[1].id]
+    called = getattr(node.func, "id", "") if isinstance(node, ast.Call) else ""
+    if called in ("rtcf_made", "rtcf_object"):
+        return NAMED[node.args[1].id]  # type: ignore[attr-defined]
     return None
 
 
 def _element_of(values: ast.expr) -> ast.expr:
     """Return an expression of the type of the elements of a loop."""
-    called = values.func.id if isinstance(values, ast.Call) and isinstance(values.func, ast.Name) else ""
-    if called == "enumerate" and values.args:
-        return ast.Tuple([ast.Constant(0), _element_of(values.args[0])], ast.Load())
-    if called == "zip":
-        return ast.Tuple(list(map(_element_of, values.args)), ast.Load())
-    if called == "reversed" and values.args:
-        return _element_of(values.args[0])
+    if isinstance(values, ast.Call) and isinstance(values.func, ast.Name) and values.args:
+        elements = list(map(_element_of, values.args))
+        if values.func.id == "enumerate":
+            return ast.Tuple([ast.Constant(0), elements[0]], ast.Load())
+        if values.func.id == "zip":
+            return ast.Tuple(elements, ast.Load())
+        if values.func.id == "reversed":
+            return elements[0]
     return ast.Subscript(values, ast.Constant(0), ast.Load())
 
 

@@ -9,7 +9,7 @@ import dataclasses
 import enum
 import inspect
 import keyword
-from collections.abc import Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from types import FunctionType, MemberDescriptorType
@@ -30,7 +30,7 @@ _REASONS = {
     "__new__": "it has a __new__ of its own: write a function that makes the object",
     "__eq__": "it has an __eq__ of its own: write a method, such as is_near",
 }
-_FIELD_OF_TUPLE = type(vars(collections.namedtuple("_One", "x"))["x"])  # noqa: PYI024
+_FIELD_OF_TUPLE = type(vars(collections.namedtuple("_One", "x"))["x"])
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +114,7 @@ class Meaning:
         return not self.attribute or self.attribute in self.record.fields
 
 
-class Object(tuple):
+class Object(tuple[Any, ...]):
     """A constant object, as the tuple of its fields."""
 
     record: Record
@@ -135,15 +135,15 @@ class Unknown:
 
 
 @cache
-def record_of(cls: Any) -> Record | None:
+def record_of(cls: Hashable) -> Record | None:
     """Return the record of a NamedTuple or dataclass of the user; None for another class.
 
     A class with operators, or with code of its own to make objects, is another class.
     """
-    if not is_plain(cls) or why_not(cls):
+    if not isinstance(cls, type) or not is_plain(cls) or why_not(cls):
         return None
     if issubclass(cls, tuple):
-        names, defaults = cls._fields, cls._field_defaults  # type: ignore[attr-defined]
+        names, defaults = cls._fields, cls._field_defaults
         is_compared = is_ordered = True
     else:
         known = dataclasses.fields(cls)
@@ -161,7 +161,9 @@ def record_of(cls: Any) -> Record | None:
         kinds = (bool, int, float) if of is value else ()
         if (isinstance(of, FunctionType) and not _is_of_python(of)) or type(of) in kinds:
             found.setdefault(type(value), {})[name] = of
-    constants = {name: each for kind in (bool, int, float) for name, each in found.get(kind, {}).items()}
+    constants = {
+        name: each for kind in (bool, int, float) for name, each in found.get(kind, {}).items()
+    }
     name = unique("".join(each if each.isalnum() else "_" for each in cls.__qualname__), cls)
     return Record(
         cls, name, tuple(names), defaults, found.get(FunctionType, {}),

@@ -9,9 +9,9 @@ from rtcf_compile.source import modules
 from rtcf_compile.source.mistake import Mistake
 
 HEAD = """\
-from dataclasses import dataclass, field, replace
+from dataclasses import InitVar, dataclass, field, replace
 from enum import IntEnum
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from geometry_msgs.msg import Vector3
@@ -121,6 +121,105 @@ class Base(Profile):
     pass
 
 
+class Shadowed(NamedTuple):
+    T: np.ndarray
+    size: float
+
+    def scaled(self) -> np.ndarray:
+        return self.size * self.T
+
+
+class A_b(NamedTuple):
+    x: float
+
+    def c(self):
+        return self.x + 1.0
+
+
+class A(NamedTuple):
+    x: float
+
+    def b_c(self):
+        return self.x + 2.0
+
+
+class Louder(Sample):
+    def energy(self, mass: float = 2.0) -> float:
+        return 7.0 * self.s
+
+
+@dataclass(order=True)
+class Ordered:
+    x: float
+    y: int = 0
+
+
+@dataclass(eq=False)
+class Unequal:
+    x: float
+
+
+@dataclass
+class Tagged:
+    x: float
+    tag: int = field(default=0, compare=False)
+
+
+@dataclass
+class Computed:
+    x: float
+
+    def __post_init__(self):
+        self.x = 2.0 * self.x
+
+
+@dataclass(kw_only=True)
+class Named_only:
+    x: float
+
+
+@dataclass
+class Started:
+    x: InitVar[float]
+    y: float = 0.0
+
+
+@dataclass
+class Config:
+    gain: float
+    table: dict
+    rows: list
+
+    def __str__(self):
+        return "a configuration"
+
+
+class Walker(NamedTuple):
+    x: float
+    n: int | None = None
+
+    def step(self, dx) -> Self:
+        return self._replace(x=self.x + dx)
+
+    @staticmethod
+    def at(x) -> "Walker":
+        return Walker(x, 2)
+
+
+def rtcf_of_Sample_energy(p):
+    return 5.0
+
+
+def of_maybe(p: Sample | None, u):
+    return u if p is None else p.s
+
+
+def twice(x) -> Sample:
+    return Sample(2.0 * x, x)
+
+
+SAMPLES = [Sample(0.5, 1.0), Sample(2.0, 3.0)]
+BY_PHASE = {Phase.REST: Sample(0.0, 1.0), Phase.MOVE: Sample(2.0, 3.0)}
 FIXED = Profile(0.5, 3.0)
 NEAR = Pair(np.ones(3), np.zeros(3))
 
@@ -147,6 +246,23 @@ class Objects(Component):
     b: State[np.float64, 3]
     n: State[int]
     phase: State[Phase]
+
+    HOME = Sample(1.0, 2.0)
+    TABLE = (Sample(0.1, 0.2), Sample(0.3, 0.4, 0.5))
+    SPEEDS = {Phase.REST: 1.0, Phase.MOVE: 2.0}
+    CONFIG = Config(2.0, {"a": 1}, [1.0, 2.0])
+
+    @staticmethod
+    def scaled(p: Sample, k):
+        return p.s * k
+
+    def maybe(self, u) -> "Sample | None":
+        return Sample(u, 1.0) if u > 0 else None
+
+    @property
+    def count(self):
+        self.n += 1
+        return self.n
 
     @property
     def now(self) -> Sample:
@@ -231,19 +347,92 @@ WAYS = {
         p = Sample(u, 2.0)
         f = lambda k: k * p.s + p.energy()
         self.w.write([f(z) + p.v for z in x])""",
+    "objects that are counted": """
+        for k, p in enumerate([Sample(u, 1.0), Sample(2.0, u)]):
+            self.y.write(k * p.v)""",
     "objects in a loop": """
         y = 0.0
         for p in (Sample(u, 1.0), Sample(2.0, u)):
             y += p.s - 2.0 * p.v
         self.y.write(y)""",
     "a constant object": """
-        p = planned(u, FIXED.top) if u > 0.0 else FIXED
+        p = Profile(u, FIXED.top) if u > 0.0 else FIXED
         self.a = self.a + NEAR.first
         self.y.write(FIXED.at(u).s + p.t + self.a[0])""",
     "one field for several classes": """
         p: Other = Other(u, 2.0)
         q = Sample(3.0, u)
         self.y.write(p.s - 2.0 * q.s + p.v * q.v)""",
+    "a dataclass compared by ==": """
+        p = Point(u, 1.0)
+        self.y.write(1.0 if p == Point(u, 1.0) else 0.0)""",
+    "a dataclass that is ordered": """
+        p = Ordered(u, 1)
+        self.y.write(1.0 if p < Ordered(0.5) else 0.0)""",
+    "a NamedTuple that is compared": """
+        p = Sample(u, 1.0)
+        self.y.write(1.0 if p != Sample(1.0, u) and p < (2.0, 1.0, 0.0) else 0.0)""",
+    "a NamedTuple as a tuple": """
+        p = Sample(u, 1.0, 2.0)
+        y = 0.0
+        for z in p:
+            y += z
+        for k in range(3):
+            y += k * p[k]
+        q = p + (4.0,)
+        self.w.write(p)
+        self.a = np.array(p)
+        self.b[:] = p
+        self.y.write(y + sum(p) + max(*p) + len(p) + q[3])""",
+    "an object or None": """
+        p = self.maybe(u)
+        q = twice(u) if u < 0.0 else None
+        if p:
+            self.n += 1
+        self.y.write((p.s if p is not None else -1.0) + of_maybe(q, u) + of_maybe(None, u))""",
+    "a static method of an object": """
+        p = Limits(u)
+        self.y.write(p.half(u) + self.scaled(Sample(u, 1.0), 2.0))""",
+    "a constant object with a dict": """
+        self.y.write(self.CONFIG.gain * u + self.CONFIG.rows[1])""",
+    "constants of the class": """
+        y = 0.0
+        for p in self.TABLE:
+            y += p.s * p.energy()
+        for k, q in enumerate(SAMPLES):
+            y += k * q.v
+        self.n += 1
+        self.y.write(y + self.HOME.energy(u) + self.TABLE[self.n % 2].s + SAMPLES[self.n % 2].v)""",
+    "objects in a dict": """
+        phase = Phase.MOVE if u > 0.0 else Phase.REST
+        p = BY_PHASE[phase]
+        q = BY_PHASE.get(phase, Sample(u, 1.0))
+        self.y.write(p.energy() + q.v + self.SPEEDS[phase])""",
+    "a method that returns its class": """
+        p = Walker.at(u).step(2.0).step(u)
+        self.y.write(p.x + p.n + (0.0 if Walker(u).n is None else 1.0))""",
+    "fields named as attributes of arrays": """
+        for p in (Shadowed(x, u), Shadowed(2.0 * x, 3.0)):
+            self.w.write(p.T * p.size + p.scaled())""",
+    "similar names": """
+        self.y.write(A_b(u).c() + A(u).b_c() + Sample(u, u).energy() + rtcf_of_Sample_energy(u))""",
+    "a class by its value": """
+        p = Louder(u, 2.0)
+        q: Profile = planned(u, 2.0)
+        self.y.write(p.energy() + p.s + q.weight + Long(u, 1.0).weight)""",
+    "a field of a base": """
+        p: Sample = Louder(u, 2.0)
+        self.y.write(p.s + 2.0 * p.v)""",
+    "all fields replaced": """
+        p = Point(u, 1.0)
+        p = replace(p, x=p.y, y=p.x)
+        self.y.write(p.x - 2.0 * p.y)""",
+    "two arrays as one object, swapped": """
+        self.a, self.b = Pair(self.b, self.a)
+        self.w.write(self.a - self.b)
+        self.a += x""",
+    "objects of a comprehension": """
+        self.y.write(sum(p.v * p.s for p in SAMPLES) * u)""",
     "a message with the same field": """
         force = self.force.value
         p = Point(u, 2.0)
@@ -268,8 +457,14 @@ REJECTED = {
         "p = Point(u, 1.0)\n        p.x += 2.0  # here",
         "p.x is a field of an object",
     ),
-    "an operator": ("p = Summed(u) + Summed(1.0)  # here", "an object of Summed is not compiled"),
-    "a list of its own": ("p = Counted()  # here", "an object of Counted is not compiled"),
+    "an operator": (
+        "p = Summed(u) + Summed(1.0)  # here",
+        "an object of Summed is not compiled, because it has __add__: write a method, such as plus",
+    ),
+    "a list of its own": (
+        "p = Counted()  # here",
+        "an object of Counted is not compiled, because values has a default_factory: give it a",
+    ),
     "a class method": ("p = Limits.symmetric(u)  # here", "Limits.symmetric is not compiled: "),
     "a missing field": ("p = Sample(u)  # here", "Sample has the fields s, v, a: write Sample(s,"),
     "too many fields": ("p = Point(u, 1.0, 2.0)  # here", "Point has the fields x, y"),
@@ -292,21 +487,137 @@ REJECTED = {
         "p = Named(u)  # here",
         "the default of name is not a number: write name=…",
     ),
-    "a field of two classes": (
-        "for k, p in enumerate([Sample(u, 1.0)]):\n            self.y.write(p.v)  # here",
-        "Other and Sample have v: annotate the variable: x: ",
-    ),
     "a field of a number": (
         "p = 2.0 * u\n        self.y.write(p.first)  # here",
-        "a field of a float: give it an object",
+        "a field of a float, not of an object: give it an object of Pair",
     ),
     "an unknown object that is changed": (
         "for p in (Point(u, 1.0),):\n            self.y.write(p._replace(z=1.0)[0])  # here",
         "Point has no _replace: it has x, y",
     ),
-    "a method of two classes": (
-        "p: Profile = planned(u, 1.0)\n        self.y.write(p.weight)  # here",
-        "Long has a weight of its own, and the type is not known: write a function for each class",
+    "a method of another class": (
+        "p: Profile = Long(u, 1.0)\n        self.y.write(p.weight)  # here",
+        "an object of Long, whose weight is not that of Profile: annotate the variable with its",
+    ),
+    "a method of another NamedTuple": (
+        "p: Sample = Louder(u, 1.0)\n        self.y.write(p.energy())  # here",
+        "an object of Louder, whose energy is not that of Sample",
+    ),
+    "another class than annotated": (
+        "p: Sample = Other(u, 1.0)\n        self.y.write(p.s)  # here",
+        "an object of Other, whose s is not that of Sample",
+    ),
+    "one of two classes": (
+        "p = Sample(u, 1.0) if u > 0.0 else Other(u, 2.0)\n        self.y.write(p.s)  # here",
+        "Other and Sample have s: annotate the variable: x: ",
+    ),
+    "two classes in a variable": (
+        "p = planned(u, 2.0) if u > 0.0 else FIXED  # here\n        self.y.write(p.t)",
+        "is a Base in one place and a Profile in another: give it one type",
+    ),
+    "another variable of the same name": (
+        "p = Sample(u, 1.0)\n        f = lambda p: p.s  # here\n        self.n = f(Other(u, p.s)) > 0",
+        "Other and Sample have s",
+    ),
+    "a field of a tuple": (
+        "p = (u, 1.0)\n        self.y.write(p.x)  # here",
+        "a field of a list or tuple, not of an object: give it an object of Point",
+    ),
+    "the length of a dataclass": (
+        "p = Point(u, 1.0)\n        self.y.write(len(p))  # here",
+        "len of a Point: write what is done with its fields, such as p.x",
+    ),
+    "an element of a dataclass": (
+        "p = Point(u, 1.0)\n        self.y.write(p[0])  # here",
+        "a Point cannot be indexed by an int: write what is done with its fields, such as p.x",
+    ),
+    "a dataclass that is unpacked": (
+        "p = Point(u, 1.0)\n        a, b = p  # here\n        self.y.write(a)",
+        "a Point is unpacked into 2 names",
+    ),
+    "a loop over a dataclass": (
+        "p = Point(u, 1.0)\n        for a in p:  # here\n            self.n += 1",
+        "a loop over a Point: write what is done with its fields, such as p.x",
+    ),
+    "an order that dataclasses do not have": (
+        "p = Point(u, 1.0)\n        self.n = p < Point(1.0, u)  # here",
+        "a Point is compared with a Point by <: compare their fields",
+    ),
+    "a sum of dataclasses": (
+        "p = Point(u, 1.0)\n        p = p + p  # here",
+        "a Point + a Point: write what is done with its fields, such as p.x",
+    ),
+    "a dataclass as arguments": (
+        "p = Point(u, 1.0)\n        self.y.write(max(*p))  # here",
+        "max of a Point: write what is done with its fields, such as p.x",
+    ),
+    "a number in a dataclass": (
+        "p = Point(u, 1.0)\n        self.n = u in p  # here",
+        "a Point in a float: write what is done with its fields, such as p.x",
+    ),
+    "an array of a dataclass": (
+        "p = Point(u, 1.0)\n        self.y.write(np.array(p)[0])  # here",
+        "an array of a Point: use numbers",
+    ),
+    "a State set to a dataclass": (
+        "self.a[:2] = Point(u, 1.0)  # here",
+        "a vector of float64 is set to a Point",
+    ),
+    "an Output set to a dataclass": (
+        "self.w.write(Profile(u, 1.0))  # here",
+        "a vector of float64 is set to a Profile",
+    ),
+    "a dataclass compared with a tuple": (
+        "self.n = Point(u, 1.0) == (u, 1.0)  # here",
+        "a Point is compared with a list or tuple by ==: compare their fields",
+    ),
+    "a dataclass without ==": (
+        "self.n = Unequal(u) == Unequal(u)  # here",
+        "a Unequal is compared with a Unequal by ==: compare their fields",
+    ),
+    "a field that == leaves out": (
+        "self.n = Tagged(u, 1) == Tagged(u, 2)  # here",
+        "a Tagged is compared with a Tagged by ==",
+    ),
+    "the identity of objects": (
+        "p = Sample(u, 1.0)\n        q = p\n        self.n = p is q  # here",
+        "the identity of a Sample is not known: compare it by ==",
+    ),
+    "the identity of tuples": (
+        "p = (u, 1.0)\n        q = (u, 1.0)\n        self.n = p is not q  # here",
+        "the identity of a list or tuple is not known: compare it by ==",
+    ),
+    "properties in another order": (
+        "p = Point(y=self.count, x=self.count)  # here",
+        "calls are not in the order of the fields",
+    ),
+    "fields computed by the class": (
+        "p = Computed(u)  # here",
+        "its fields are computed by __post_init__: compute them in a function",
+    ),
+    "fields with names only": (
+        "p = Named_only(x=u)  # here",
+        "its fields are keyword-only: remove kw_only=True",
+    ),
+    "an InitVar": (
+        "p = Started(u)  # here",
+        "x is an InitVar: make the object in a function",
+    ),
+    "a dict of an object": (
+        'self.y.write(self.CONFIG.table["a"])  # here',
+        "a dict in an object cannot be indexed",
+    ),
+    "the names of the fields": (
+        "p = Sample(u, 1.0)\n        self.n = len(p._fields)  # here",
+        "Sample._fields is a tuple, which is not compiled: write a method",
+    ),
+    "an object in a log": (
+        'self.info("%s", Sample(u, 1.0))  # here',
+        "stores numbers and bools, not objects: log each",
+    ),
+    "a list of objects": (
+        "ps = [Sample(z, u) for z in x]  # here",
+        "a list of objects of Sample: make an array of each field",
     ),
 }
 
