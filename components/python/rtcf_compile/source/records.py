@@ -9,9 +9,8 @@ import dataclasses
 import enum
 import inspect
 import keyword
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from functools import cache
 from types import FunctionType, MemberDescriptorType
 from typing import Any
 
@@ -134,14 +133,17 @@ class Unknown:
     cls: type
 
 
-@cache
-def record_of(cls: Hashable) -> Record | None:
+def record_of(cls: Any) -> Record | None:
     """Return the record of a NamedTuple or dataclass of the user; None for another class.
 
     A class with operators, or with code of its own to make objects, is another class.
     """
-    if not isinstance(cls, type) or not is_plain(cls) or why_not(cls):
-        return None
+    if isinstance(cls, type) and cls not in _records:
+        _records[cls] = _record(cls) if is_plain(cls) and not why_not(cls) else None
+    return _records.get(cls) if isinstance(cls, type) else None
+
+
+def _record(cls: Any) -> Record:
     if issubclass(cls, tuple):
         names, defaults = cls._fields, cls._field_defaults
         is_compared = is_ordered = True
@@ -153,6 +155,7 @@ def record_of(cls: Hashable) -> Record | None:
         options = cls.__dataclass_params__
         is_compared = options.eq and all(each.compare for each in known)
         is_ordered = is_compared and options.order
+    empty: dict[str, Any] = {}
     found: dict[type, dict[str, Any]] = {}
     for name in _own_names(cls) - set(names):
         value = inspect.getattr_static(cls, name)
@@ -166,8 +169,8 @@ def record_of(cls: Hashable) -> Record | None:
     }
     name = unique("".join(each if each.isalnum() else "_" for each in cls.__qualname__), cls)
     return Record(
-        cls, name, tuple(names), defaults, found.get(FunctionType, {}),
-        found.get(staticmethod, {}), found.get(property, {}), constants,
+        cls, name, tuple(names), defaults, found.get(FunctionType, empty),
+        found.get(staticmethod, empty), found.get(property, empty), constants,
         issubclass(cls, tuple), is_compared, is_ordered,
     )  # fmt: skip
 
@@ -234,6 +237,7 @@ def unique(plain: str, of: Any) -> str:
 
 
 _names: dict[str, Any] = {}
+_records: dict[type, Record | None] = {}
 
 
 def named(meaning: str, value: Any) -> str:

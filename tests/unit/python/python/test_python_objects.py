@@ -516,7 +516,7 @@ REJECTED = {
         "is a Base in one place and a Profile in another: give it one type",
     ),
     "another variable of the same name": (
-        "p = Sample(u, 1.0)\n        f = lambda p: p.s  # here\n        self.n = f(Other(u, p.s)) > 0",
+        "p = Sample(u, 1.0)\n        f = lambda p: p.s  # here\n        self.n = f(Other(u, 1))",
         "Other and Sample have s",
     ),
     "a field of a tuple": (
