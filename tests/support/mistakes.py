@@ -649,7 +649,7 @@ UPDATE: dict[str, tuple[str, str]] = {
     "port in zip": ("self.f = sum(k * e for k, e in zip(self.gains, self.w))", "self.w.value"),
     "function from a dict by an enum": (
         "LAWS = {Mode.OFF: abs, Mode.RUN: math.sqrt}\n---\nself.f = LAWS[self.mode](self.f)",
-        "numbers as values",
+        "numbers, tuples or objects as values",
     ),
     "nested function that a function keeps": (
         "def applied(rule, x):\n    kept = rule  # here\n    return kept(x)\n---\n"
@@ -801,7 +801,7 @@ CLASS: dict[str, tuple[str, str]] = {
     "element name taken": ("gains_0: Parameter[float] = Parameter(1.0)", "gains_0"),
     "size by a variable of another member": ("v: State[np.float64, n]", "n"),
     "dict as a constant": (
-        "LIMITS = {'a': 1.0}\n\ndef safe(self):\n    self.f = self.LIMITS['a']  # here",
+        "LIMITS = {'a': 1.0}\n\ndef safe(self):\n    self.f = len(self.LIMITS)  # here",
         "dict",
     ),
     "update with an argument": ("def safe(self, dt):  # here\n    self.f = dt", "self"),

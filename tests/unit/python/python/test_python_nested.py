@@ -366,7 +366,7 @@ REJECTED = {
     ),
     "a dict of arrays": (
         "d = {1: v, 2: self.a}\n        self.w.write(d[self.n])  # here",
-        "the values of a dict are not numbers of one type: use if and elif",
+        "the values of a dict are not of one type: use if and elif",
     ),
     "a text that is no key": (
         "d = {'a': u, 'b': 1.0}\n        self.y.write(d['c'])  # here",
