@@ -8,7 +8,6 @@ from numba import types
 from numba.core.errors import TypingError
 from numba.extending import intrinsic
 
-from rtcf_compile.machine_code.object_types import is_object
 from rtcf_compile.rewriting.logs import Logs
 
 _SCALARS = {types.boolean: "bool", types.int64: "int64", types.float64: "float64"}
@@ -36,7 +35,7 @@ def _kind(given: Any) -> str:
     """Describe an argument that is not a number, in the plural."""
     kinds = {types.Array: "arrays", types.UnicodeType: "text", types.StringLiteral: "text"}
     kinds |= {types.Optional: "values that may be None", types.BaseTuple: "lists"}
-    if is_object(given):
+    if hasattr(given, "record"):
         return "objects"
     return next((words for kind, words in kinds.items() if isinstance(given, kind)), "other values")
 
