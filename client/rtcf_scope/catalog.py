@@ -8,7 +8,7 @@ import time
 from typing import Any
 
 import rtcf
-from rtcf.v1 import control_pb2, graph_pb2, runner_pb2
+from rtcf.v1 import control_pb2, graph_pb2, incidents_pb2, runner_pb2
 from rtcf_shared.enums import word
 
 from rtcf_scope.chunk import traces
@@ -34,6 +34,7 @@ def runner(status: runner_pb2.RunnerStatus) -> dict[str, Any]:
         "degraded": list(status.degraded),
         "status": status.status,
         "simulated": status.simulated,
+        "incident": status.incident,
     }
 
 
@@ -83,6 +84,16 @@ def statistics(client: rtcf.Client, name: str) -> dict[str, Any]:
             | {"overruns": each.overruns, "every": every.get(each.component, 1)}
             for each in found.components
         },
+    }
+
+
+def incident(found: incidents_pb2.Incident) -> dict[str, Any]:
+    """Return an incident without its content."""
+    return {
+        "name": found.name,
+        "runner": found.runner,
+        "time_ns": str(found.time_ns),
+        "reason": found.reason,
     }
 
 

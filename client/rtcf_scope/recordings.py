@@ -1,33 +1,60 @@
-"""Recordings that pages may open: files named on the command line and the files of one folder."""
+"""Recordings that pages may open: files named on the command line, those of one folder, and the
+incidents of rtcfd.
+"""
 
+import json
 import math
+import tempfile
+import threading
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import rtcf
+from google.protobuf import json_format
 from numpy.typing import NDArray
+from rtcf.reasons import IncidentNotFoundError
 from rtcf.recording.reader import RecordedColumn, Recording, RecordingError
+from rtcf.v1 import control_pb2
 
-from rtcf_scope import wire
+from rtcf_scope import catalog, wire
 from rtcf_scope.chunk import ELEMENTS, kind_of, split_element
 
+_KEPT = 4  # copies of incidents
 MOST_VALUES = 16_000_000  # 128 MB; above it, windows are reduced to minima and maxima
 
 
 class Recordings:
     """Recordings by file name; pages cannot request paths."""
 
-    def __init__(self, files: Iterable[Path], folder: Path | None) -> None:
+    def __init__(self, files: Iterable[Path], folder: Path | None, client: rtcf.Client) -> None:
         self._files = {file.name: file for file in files}
         self._folder = folder
+        self._client = client
+        self._copies = tempfile.TemporaryDirectory(prefix="rtcf-scope-")
+        self._incidents: dict[str, Path] = {}  # their copies, oldest first
+        self._received = 0
+        self._receiving = threading.Lock()
+
+    def close(self) -> None:
+        """Remove the copies of incidents."""
+        self._copies.cleanup()
+
+    def incidents(self) -> list[dict[str, Any]]:
+        """Return the incidents of rtcfd, newest first; raises RtcfError."""
+        found = [catalog.incident(each) for each in self._client.list_incidents()]
+        return sorted(found, key=lambda each: int(each["time_ns"]), reverse=True)
 
     def names(self) -> list[str]:
         """Return the names of all recordings, sorted."""
         return sorted(self._known())
 
     def describe(self, name: str) -> dict[str, Any]:
-        """Return signals, number of cycles and length of a recording; raises RecordingError."""
+        """Return signals, number of cycles, length and events of a recording.
+
+        Of an incident, also its reason, component and time. Raises RtcfError.
+        """
         with self._open(name) as recording:
             signals = []
             for signal in recording.signals.values():
@@ -39,7 +66,8 @@ class Recordings:
                 signals += [{"name": each, "unit": signal.unit, "kind": kind} for each in names]
             return {"name": name, "whole": recording.whole, "signals": signals,
                     "cycles": len(recording.cycles), "begin_ns": str(recording.begin_ns),
-                    "seconds": (recording.end_ns - recording.begin_ns) / 1e9}  # fmt: skip
+                    "seconds": (recording.end_ns - recording.begin_ns) / 1e9,
+                    "events": _events(recording), "incident": _incident(recording)}  # fmt: skip
 
     def columns(
         self, name: str, traces: list[str], begin_s: float = -math.inf, end_s: float = math.inf
@@ -74,9 +102,53 @@ class Recordings:
 
     def _open(self, name: str) -> Recording:
         file = self._known().get(name)
-        if file is None:
-            raise RecordingError(f"no recording {name}: start the scope with this file")
-        return Recording(file)
+        return Recording(file or self._copy(name))
+
+    def _copy(self, name: str) -> Path:
+        """Return the copy of an incident."""
+        with self._receiving:
+            if name not in self._incidents:
+                self._received += 1
+                to = Path(self._copies.name, f"{self._received}.mcap")
+                try:
+                    with to.open("xb") as file:
+                        self._client.get_incident(file, name)
+                except IncidentNotFoundError:
+                    what = f"no recording {name}: start the scope with this file"
+                    raise RecordingError(what) from None
+                except OSError as error:
+                    why = error.strerror or error
+                    raise RecordingError(f"cannot copy the incident to {to}: {why}") from None
+                self._incidents[name] = to
+                while len(self._incidents) > _KEPT:
+                    self._incidents.pop(next(iter(self._incidents))).unlink(missing_ok=True)
+            return self._incidents[name]
+
+
+def _events(recording: Recording) -> list[dict[str, Any]]:
+    """Return the events in a recording, as those of a loop; none if they are damaged."""
+    try:
+        listed = json.loads(recording.metadata.get("events", {}).get("json", "[]"))
+        found = [
+            json_format.ParseDict(each, control_pb2.Event(), ignore_unknown_fields=True)
+            for each in listed
+        ]
+    except (ValueError, TypeError, json_format.ParseError):
+        return []
+    return [catalog.event(each) for each in found]
+
+
+def _incident(recording: Recording) -> dict[str, Any] | None:
+    """Return the reason of an incident; None for another recording."""
+    about = recording.metadata.get("incident")
+    if about is None:
+        return None
+    time_ns = about.get("time_ns", "")
+    return {
+        "reason": about.get("reason", ""),
+        "component": about.get("component", ""),
+        "time_ns": time_ns if time_ns.isdecimal() else str(recording.end_ns),
+    }
 
 
 def _placed(signals: Mapping[str, RecordedColumn], trace: str, stamps: Any) -> Any:

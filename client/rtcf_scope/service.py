@@ -39,8 +39,8 @@ async def serve(given: Options, ready: Callable[[str, Authentication], None]) ->
         loop.add_signal_handler(number, ended.set)
     loop.set_exception_handler(_log)
     authentication = Authentication(given.token, given.names, MOST_CONNECTIONS, given.token_file)
-    recordings = Recordings(given.files, given.recordings)
     with rtcf.Client(given.socket) as client:
+        recordings = Recordings(given.files, given.recordings, client)
         layouts, robots = Layouts(given.layouts), Robots(given.robot)
         site = Site(client, authentication, given.right, layouts, recordings, robots)
         running = web.AppRunner(site.app)
@@ -65,6 +65,7 @@ async def serve(given: Options, ready: Callable[[str, Authentication], None]) ->
                 server.close()
         finally:
             site.close()
+            recordings.close()
             await running.server.shutdown(_END_S)
             await running.cleanup()
 

@@ -79,6 +79,7 @@ class Site:
         route.add_get("/api/layouts/{name}", self._json(self._read_layout))
         route.add_put("/api/layouts/{name}", self._json(self._write_layout))
         route.add_delete("/api/layouts/{name}", self._json(self._remove_layout))
+        route.add_get("/api/incidents", self._json(self._list_incidents))
         route.add_get("/api/recordings", self._json(self._list_recordings))
         route.add_get("/api/recordings/{name}", self._json(self._describe_recording))
         route.add_get("/api/recordings/{name}/columns", self._recorded)
@@ -170,6 +171,9 @@ class Site:
 
     async def _remove_layout(self, request: web.Request) -> Any:
         self._layouts.remove(request.match_info["name"])
+
+    async def _list_incidents(self, request: web.Request) -> Any:
+        return await self._call(self._recordings.incidents)
 
     async def _list_recordings(self, request: web.Request) -> Any:
         return await self._call(self._recordings.names)

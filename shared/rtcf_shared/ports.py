@@ -232,15 +232,15 @@ def _signals(number: int, name: str, column: ports_pb2.PortColumn) -> Iterator[S
         for leaf in ros_layout.leaves(column.ros_definition, column.sample):
             full = f"{name}.{leaf.path}" if leaf.path else name
             shape = () if leaf.count is None else (leaf.count,)
-            yield Signal(
-                full, column.unit, number, leaf.format, shape, leaf.offset, number=leaf.number
-            )
+            unit = column.unit if leaf.has_unit else ""
+            yield Signal(full, unit, number, leaf.format, shape, leaf.offset, number=leaf.number)
         return
     if column.type in ("quaternion", "transform"):
         numbers = 4 if column.type == "quaternion" else 16
         form = "<f8" if column.size == 8 * numbers else "<f4"
         shape = (4,) if numbers == 4 else (4, 4)
-        yield Signal(name, column.unit, number, form, shape, 0, transposed=numbers == 16)
+        unit = "" if numbers == 4 else column.unit
+        yield Signal(name, unit, number, form, shape, 0, transposed=numbers == 16)
         return
     match = _STATE.match(column.type)
     if match is None:

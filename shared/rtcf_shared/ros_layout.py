@@ -17,6 +17,8 @@ _NUMBERS = {
 }  # fmt: skip
 _TIMES = {"time": "<u4", "duration": "<i4"}
 _LENGTH = struct.Struct("<I")
+# Messages whose numbers have no unit.
+_PLAIN = {"Header", "std_msgs/Header", "Quaternion", "geometry_msgs/Quaternion"}
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,7 @@ class Leaf:
     count: int | None  # length of the array; None: a single number
     offset: int  # bytes
     number: int = 0  # index of the first number among all numbers of the message
+    has_unit: bool = True  # whether the unit of a port applies: not to times and quaternions
 
 
 def size_of(form: str) -> int:
@@ -69,7 +72,7 @@ class _Walk:
             if kind in _TIMES:
                 form, each = _TIMES[kind], 2  # seconds and nanoseconds
                 count = each * (1 if count is None else count)
-            yield Leaf(path, form, count, self._at, self._number)
+            yield Leaf(path, form, count, self._at, self._number, kind not in _TIMES)
             numbers = 1 if count is None else count
             self._at += size_of(form) * numbers
             self._number += numbers
@@ -80,7 +83,8 @@ class _Walk:
                 length = self._length()
                 self._at += length
             else:
-                yield from self.message(kind, each_path)
+                for leaf in self.message(kind, each_path):
+                    yield replace(leaf, has_unit=leaf.has_unit and kind not in _PLAIN)
 
     def _length(self) -> int:
         (length,) = _LENGTH.unpack_from(self._sample, self._at)

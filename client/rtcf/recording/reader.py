@@ -534,7 +534,7 @@ class Recording(Closing):
                 name = signal_name(component, own, is_state and (component, own) in outputs)
             for leaf in ros_layout.leaves(channel.definition, sample):
                 full = f"{name}.{leaf.path}" if leaf.path else name
-                unit = channel.metadata.get("unit", "")
+                unit = channel.metadata.get("unit", "") if leaf.has_unit else ""
                 self.signals[full] = RecordedSignal(full, unit, number, leaf)
 
     def _sample(self, channel: int) -> bytes | None:

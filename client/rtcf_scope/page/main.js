@@ -6,6 +6,7 @@ import * as layout from "./layout.js";
 import { Cycles } from "./panels/cycles.js";
 import { Derive } from "./panels/derive.js";
 import { Events } from "./panels/events.js";
+import { FaultBanner } from "./panels/fault.js";
 import { Graph } from "./panels/graph.js";
 import { Measurements } from "./panels/measurements.js";
 import { Parameters } from "./panels/parameters.js";
@@ -42,6 +43,8 @@ const robot = new Robot(scope, $("robot"), page, {
   onPick: (signals) => { for (const name of signals) if (scope.units.has(name)) scope.active.add(name); scope.onTraces(); scope.changed(); },
   onSignals: () => watch(),
 });
+recordings.alsoNeeded = () => robot.signals;
+const banner = new FaultBanner($("fault"), (name) => recordings.openIncident(name));
 const counters = { frames: 0, perSecond: 0, since: performance.now(), state: {} };
 new Derive(scope, $("derive"));
 let stream = null, drawer = "measurements", generation = -1, liveCatalog = [];
@@ -144,6 +147,7 @@ function state(message) {
   scope.rate = message.frequency_hz;
   $("state").textContent = message.frequency_hz ? `${message.state}, ${scaled(message.frequency_hz, "Hz")}` : message.state;
   $("state").className = message.state;
+  banner.show(message);
   $("state").title = [message.status, ...(message.degraded ?? [])].filter(Boolean).join("\n");
   if (message.generation === undefined) { if (generation !== -1) runners().catch(() => {}); generation = -1; } // the runner was removed
   else if (message.generation !== generation) { generation = message.generation; renew(true); }

@@ -229,8 +229,23 @@ export class Scope {
     if (!recordings.length) { this.setMode("roll"); return; }
     const fresh = this.mode !== "recording";
     this.setMode("recording");
-    if (fresh) this.view.show(Math.min(...recordings.map((each) => each.store.firstTime)), Math.max(...recordings.map((each) => each.store.lastTime)));
+    const begin = Math.min(...recordings.map((each) => each.store.firstTime));
+    const end = Math.max(...recordings.map((each) => each.store.lastTime));
+    const [{ incident, beginNs }] = recordings;
+    if (fresh && incident) {
+      const at = Number(BigInt(incident.time_ns) - beginNs) / 1e9; // the last second before a fault
+      this.view.show(Math.max(at - 1, begin), Math.min(at + 0.05, Math.max(end, at)));
+    } else if (fresh) this.view.show(begin, end);
     this.changed();
+  }
+
+  // The events of the loop, or those in the first recording; newest last.
+  get heard() { return this.mode === "recording" ? this.recordings[0]?.events ?? [] : this.events; }
+
+  // The time of an event on the axis of the stream or of the recording, s.
+  timeOf(event) {
+    const base = this.mode === "recording" ? this.recordings[0].beginNs : this.baseNs;
+    return Number(BigInt(event.time_ns) - base) / 1e9;
   }
 
   // Events, warnings, errors and the hit of a trigger, with their times on the shown axis.
@@ -244,10 +259,9 @@ export class Scope {
   }
 
   #marks() {
-    if (this.mode === "recording") return [];
     const shift = this.mode === "trigger" ? this.shot?.hitTime ?? 0 : 0;
-    const found = this.events.filter((event) => !isForInformation(event)).map((event) => ({
-      time: Number(BigInt(event.time_ns) - this.baseNs) / 1e9 - shift,
+    const found = this.heard.filter((event) => !isForInformation(event)).map((event) => ({
+      time: this.timeOf(event) - shift,
       ink: isBad(event) ? "bad" : "change", label: labelOf(event), title: titleOf(event), event,
     }));
     if (this.mode === "trigger" && this.shot) found.push({ time: 0, ink: "hit", label: "trigger" });
@@ -273,6 +287,10 @@ export class Scope {
 
 export function isBad(event) {
   return /fault|overruns|degraded|error|fatal/.test(event.what);
+}
+
+export function isOverrun(event) {
+  return event.what.includes("overruns");
 }
 
 export function isForInformation(event) {

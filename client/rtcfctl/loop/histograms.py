@@ -133,7 +133,9 @@ def _draw(
     # Leave room for the legend above the bars.
     most = max(each.count for each in found)
     axis.set_ylim(_LOWEST, _LOWEST * (most / _LOWEST) ** (1 / _SHARE_OF_BARS))
-    plain = ticker.FuncFormatter(lambda value, _: f"{value:g}")
+    plain = ticker.FuncFormatter(
+        lambda value, _: f"{value:g}" if value < 1e4 else _grouped(round(value))
+    )
     few = math.log10(high * room / (low / room)) < 2
     axis.xaxis.set_major_locator(ticker.LogLocator(subs=(1, 2, 5) if few else (1,), numticks=12))
     axis.xaxis.set_major_formatter(plain)

@@ -117,8 +117,10 @@ def _print_extremes(batch: PortBatch, index: int, output: Output) -> None:
     for name, (least, least_at, most, most_at) in found.items():
         unit = batch.schema.signals[name].unit
         where = f" (cycle {least_at}, {most_at})" if not isinstance(least, list) else ""
-        line = f"  {name}: {_text(least)} to {_text(most)}{f' {unit}' if unit else ''}{where}"
-        output.line(line)
+        extremes = f"{_text(least)} to {_text(most)}"
+        if isinstance(most, float) and math.isnan(most):  # counts as the largest value
+            extremes = "nan" if math.isnan(least) else f"{_text(least)} or more, and nan"
+        output.line(f"  {name}: {extremes}{f' {unit}' if unit else ''}{where}")
 
 
 def _text(value: Any) -> str:

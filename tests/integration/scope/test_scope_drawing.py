@@ -193,37 +193,50 @@ def test_nan_values_are_marked(visit: Opener) -> None:
     page.wait("document.querySelector('.chip b').textContent === 'NaN'")
 
 
-def test_missing_cycles_are_shaded_between_their_neighbours(visit: Opener) -> None:
+# The cycles before and after; how many the page lost; whether the shade is red, not grey.
+@pytest.mark.parametrize(
+    ("first", "lost", "is_red"),
+    [(1200, 200, True), (0, 0, False)],
+    ids=["missing cycles", "a pause of the loop"],
+)
+def test_times_without_cycles_are_shaded(
+    visit: Opener, first: int, lost: int, is_red: bool
+) -> None:
     page = visit()
     found = page.ask(
-        """(async () => {
-          const { ink, pixel } = await import("/page/drawing/palette.js");
+        f"""(async () => {{
+          const {{ ink, pixel }} = await import("/page/drawing/palette.js");
           const made = await drawing.scopeOf([["/made.x"]]);
-          const batch = (first, count, lost) => {
-            const times = Float64Array.from({ length: count }, (_, i) => (first + i) / 1000);
+          const batch = (time, first, count, lost) => {{
+            const times = Float64Array.from({{ length: count }}, (_, i) => time + i / 1000);
+            const cycles = Float64Array.from({{ length: count }}, (_, i) => first + i);
             const zeros = new Float64Array(count);
-            return { count, lost, times, cycles: times.map((time) => Math.round(time * 1000)),
-              latencies: zeros,
-              durations: zeros, traces: [zeros] };
-          };
+            return {{ count, lost, times, cycles, latencies: zeros, durations: zeros,
+              traces: [zeros] }};
+          }};
           made.view.span = 2;
-          made.live.push(batch(0, 1000, 0), ["/made.x"]);
-          made.live.push(batch(1200, 800, 200), ["/made.x"]);
+          made.live.push(batch(0, 0, 1000, 0), ["/made.x"]);
+          made.live.push(batch(1.2, {first}, 800, {lost}), ["/made.x"]);
           made.frame(0);
           made.freeze();
           made.view.end = 2;
           made.changed();
           made.frame(1);
-          const { sight } = made.panes[0], [columns] = drawing.pixels(made),
-            paper = pixel(ink("paper"));
+          const {{ sight }} = made.panes[0], [columns] = drawing.pixels(made);
+          const paper = pixel(ink("paper"));
           const ground = (time) => columns.get(Math.floor(sight.column(time)))[3];
-          return { before: ground(0.9) === paper,
-            within: [1.01, 1.1, 1.19].every((time) => ground(time) !== paper),
-            after: ground(1.3) === paper, gaps: made.live.gaps };
-        })()"""
+          const parts = (colour) => [0, 8, 16].map((by) => (colour >> by) & 255);
+          return {{ before: ground(0.9) === paper, after: ground(1.3) === paper,
+            within: [1.01, 1.1, 1.19].map((time) => parts(ground(time))),
+            paper: parts(paper), gaps: made.live.gaps, lost: made.live.lost }};
+        }})()"""
     )
-    assert found["before"] and found["within"] and found["after"]
-    assert [gap["cycles"] for gap in found["gaps"]] == [200]
+    assert found["before"] and found["after"]
+    for red, green, blue in found["within"]:
+        assert [red, green, blue] != found["paper"]
+        assert (red > green + 20 and red > blue + 20) == is_red
+    assert [gap["cycles"] for gap in found["gaps"]] == [lost]
+    assert found["lost"] == lost
 
 
 @pytest.mark.parametrize(

@@ -262,7 +262,7 @@ def test_events_are_filtered_and_have_milliseconds(
     whole = page.ask(f"{listed}.map((each) => each.textContent)")
     assert all(re.match(r"\d\d?:\d\d:\d\d[.,]\d{3}", each) for each in whole), whole
     assert any("warn" in each for each in whole) and any("parameters" in each for each in whole)
-    others = ("faults", "changes", "information")
+    others = ("faults", "overruns", "changes", "information")
     for kind in others:
         _press(page, f"[data-kind={kind}]")
     page.wait(f"{listed}.length && {listed}.every((each) => each.textContent.includes('warn'))")

@@ -149,6 +149,21 @@ def test_text_output_shows_the_extremes(daemon: Daemon, client: rtcf.Client) -> 
     assert lines[1].startswith("  /glitch.out: 0 to 1000 (cycle ")
 
 
+def test_nan_is_named_beside_the_minimum(daemon: Daemon, client: rtcf.Client) -> None:
+    client.load(rtcf.component("rtcf_test", "Noise", name="noise"))
+    client.start()
+    done = daemon.ctl("echo", "noise.gaps", "--min-max", "--rate", "3Hz", "-n", "6")
+    assert done.returncode == 0, done.stderr
+    found = re.findall(r"cycles (\d+) to (\d+)\n  /noise.gaps: (.*) \(cycle ", done.stdout)
+    assert len(found) == 6
+    for first, last, said in found:
+        values = noise(np.arange(int(first), int(last) + 1))["/noise.gaps"]
+        if np.isnan(values).any():
+            assert said == f"{np.nanmin(values):.6g} or more, and nan"
+        else:
+            assert said == f"{values.min():.6g} to {values.max():.6g}"
+
+
 def test_json_lines_name_the_cycles_of_the_extremes(daemon: Daemon, client: rtcf.Client) -> None:
     client.load(rtcf.component("rtcf_test", "Noise", name="noise"))
     client.start()

@@ -32,7 +32,9 @@ export class Store {
     this.shift = 0; // seconds added to all times
     this.end = 0; // number of places so far
     this.lost = 0;
-    this.gaps = []; // {from, to, cycles}: times, without `shift`, between which cycles are missing, oldest first
+    // {from, to, cycles}: times, without `shift`, between which this number of cycles is missing, or for 0 the
+    // loop was stopped; oldest first
+    this.gaps = [];
     this.serial = ++serial; // unique for each content
   }
 

@@ -1,9 +1,9 @@
-// Draws columns of a plot: ground, grid, missing cycles, then the traces over each other.
+// Draws columns of a plot: ground, grid, missing cycles and pauses of the loop, then the traces over each other.
 import { colour, ink, pixel, symbol } from "./palette.js";
 import { Slices } from "./slices.js";
 import { drawTrace, reach } from "./trace.js";
 
-const GAP = 0.28; // opacity of missing cycles over the background
+const GAP = 0.28, PAUSE = 0.6; // opacity of missing cycles, and of a pause of the loop, over the background
 const SHIFT = 53; // pixels between the symbols of one trace and the next
 
 // Draws the columns [from, to) of a raster whose first column is column `base` of the sight.
@@ -23,7 +23,8 @@ export function drawColumns(raster, sight, base, from, to, sources, traces) {
     for (const gap of store.gaps) {
       const begin = Math.floor(sight.column(gap.from + store.shift)) - base;
       const end = Math.max(Math.ceil(sight.column(gap.to + store.shift)) - base, begin + 1);
-      for (let x = Math.max(begin, from); x < Math.min(end, to); x++) raster.bar(x, 0, raster.height, bad, GAP);
+      const [shade, opacity] = gap.cycles ? [bad, GAP] : [grid, PAUSE];
+      for (let x = Math.max(begin, from); x < Math.min(end, to); x++) raster.bar(x, 0, raster.height, shade, opacity);
     }
     const slices = new Slices(store, sight.seconds, base, from, to, reachOf(sight, traces));
     traces.forEach((trace, order) => {

@@ -1,10 +1,11 @@
 // The list of events (faults, changes and overruns) and log records of components. Events, warnings
 // and errors are also marks in the panes.
-import { isBad, isForInformation } from "../scope.js";
+import { isBad, isForInformation, isOverrun } from "../scope.js";
 
 const MOST = 200; // in the list
 const KINDS = [
-  ["faults", "faults, overruns, errors", isBad],
+  ["faults", "faults and errors", (event) => isBad(event) && !isOverrun(event)],
+  ["overruns", "late cycles", isOverrun],
   ["warnings", "warnings that are logged", (event) => event.what === "warn"],
   ["changes", "changes of the graph, of parameters, of the loop", () => true],
   ["information", "what is logged for information", isForInformation],
@@ -41,7 +42,7 @@ export class Events {
   }
 
   show() {
-    const { events } = this.scope;
+    const { heard: events } = this.scope;
     const words = this.search.value.toLowerCase().split(/\s+/).filter(Boolean);
     // Rebuilt only after a change: the user may be about to click in it.
     const made = JSON.stringify([events.length, events.at(-1), events[0], words, [...this.hidden]]);
@@ -59,8 +60,9 @@ export class Events {
     const shown = new Set([...found.filter((each) => !isForInformation(each)).slice(-MOST * 3 / 4), ...found.filter(isForInformation).slice(-MOST / 4)]);
     this.list.replaceChildren(...found.filter((each) => shown.has(each)).reverse().map((event) => this.#item(event)));
     const left = found.length - shown.size;
-    this.none.textContent = !events.length ? "Nothing has happened since this page was opened."
-      : !found.length ? "Nothing of that kind has happened since this page was opened."
+    const since = this.scope.mode === "recording" ? "in this recording" : "since this page was opened";
+    this.none.textContent = !events.length ? `Nothing has happened ${since}.`
+      : !found.length ? `Nothing of that kind has happened ${since}.`
         : left ? `${left} older ones are not listed: filter` : "";
     this.none.hidden = !this.none.textContent;
   }
@@ -84,8 +86,8 @@ export class Events {
 
   #go(event) {
     const { scope } = this;
-    if (scope.mode !== "roll") scope.setMode("roll");
-    const time = Number(BigInt(event.time_ns) - scope.baseNs) / 1e9;
+    if (scope.mode === "trigger") scope.setMode("roll");
+    const time = scope.timeOf(event);
     scope.view.show(time - scope.view.span / 2, time + scope.view.span / 2);
     scope.changed();
   }

@@ -3,6 +3,8 @@ import { ask, recorded } from "../server.js";
 import { sources } from "../data/derived.js";
 import { Store } from "../data/store.js";
 
+const CHOSEN = 4; // signals
+
 export class Recordings {
   constructor(scope, box, setError) {
     this.scope = scope;
@@ -10,6 +12,7 @@ export class Recordings {
     this.setError = setError;
     this.open = []; // {name, signals, beginNs, shift}
     this.shift = null; // the field for the shift; null unless there are two recordings
+    this.alsoNeeded = () => []; // signals that are read besides those of the panes
     scope.onShift = (seconds) => {
       const [, second] = this.open;
       if (second) second.shift = seconds;
@@ -18,19 +21,24 @@ export class Recordings {
   }
 
   async show() {
-    const names = await ask("/api/recordings");
+    // An older rtcfd, or one that does not run, has no list of incidents.
+    const [names, incidents] = await Promise.all([ask("/api/recordings"), ask("/api/incidents").catch(() => [])]);
     const list = document.createElement("div");
-    for (const name of names) {
+    const add = (name, title) => {
       const button = document.createElement("button");
       button.className = "leaf";
+      button.title = title;
       button.setAttribute("aria-pressed", String(this.open.some((each) => each.name === name)));
       button.append(Object.assign(document.createElement("span"), { textContent: name }));
       button.onclick = () => this.toggle(name);
       list.append(button);
-    }
+    };
+    for (const name of names) add(name, "");
+    if (incidents.length) list.append(Object.assign(element("p", "hint"), { textContent: "Incidents" }));
+    for (const { name, reason } of incidents) add(name, reason);
     const hint = document.createElement("p");
     hint.className = "hint";
-    hint.textContent = names.length ? "Choose one; a second one is drawn dashed over it, from the same beginning."
+    hint.textContent = names.length || incidents.length ? "Choose one; a second one is drawn dashed over it, from the same beginning."
       : "None: rtcfctl scope FILE… opens recordings, made by rtcfctl record -o FILE.";
     this.shift = null;
     this.box.replaceChildren(list, hint, ...(this.open.length === 2 ? this.#shifting() : []));
@@ -67,6 +75,13 @@ export class Recordings {
     if (this.shift && this.shift !== document.activeElement) this.shift.value = Number((this.open[1]?.shift ?? 0).toFixed(9));
   }
 
+  // Opens an incident alone, at its end; empty panes show the component that failed.
+  async openIncident(name) {
+    this.open = [];
+    this.scope.recordings = [];
+    await this.toggle(name);
+  }
+
   async toggle(name) {
     try {
       const there = this.open.findIndex((each) => each.name === name);
@@ -74,6 +89,7 @@ export class Recordings {
       else {
         const found = await ask(`/api/recordings/${encodeURIComponent(name)}`);
         this.open = [...this.open.slice(-1), { ...found, beginNs: BigInt(found.begin_ns) }];
+        this.#choose(found);
       }
       for (const each of this.open) each.shift = 0;
       await this.load();
@@ -81,10 +97,20 @@ export class Recordings {
     } catch (error) { this.setError(error.message); }
   }
 
+  // Shows signals of the component that failed in a page without traces.
+  #choose({ signals, incident }) {
+    const { scope } = this;
+    if (!incident || scope.traces().length) return;
+    const own = signals.filter(({ name }) => name.startsWith(`${incident.component}.`));
+    scope.know(signals);
+    for (const { name } of (own.length ? own : signals).slice(0, CHOSEN)) scope.active.add(name);
+  }
+
   // Reads the traces of the panes.
   async load() {
     const { scope } = this;
-    const wanted = sources(scope.traces().map((each) => each.name)).filter((name) => !name.startsWith("~"));
+    const named = [...scope.traces().map((each) => each.name), ...this.alsoNeeded()];
+    const wanted = sources([...new Set(named)]).filter((name) => !name.startsWith("~"));
     for (const { signals } of this.open) scope.know(signals);
     scope.showRecordings(await Promise.all(this.open.map((each) => Opened.of(each, wanted, scope.view))));
   }
@@ -107,8 +133,8 @@ export class Recordings {
 // An open recording: an overview, and the visible part in detail.
 class Opened {
   static async of(description, wanted, view) {
-    const { name, beginNs } = description, opened = new Opened();
-    Object.assign(opened, { name, beginNs, wanted, view, all: await part(name, wanted), close: null, asks: false });
+    const { name, beginNs, events = [], incident = null } = description, opened = new Opened();
+    Object.assign(opened, { name, beginNs, events, incident, wanted, view, all: await part(name, wanted), close: null, asks: false });
     // The user may have shifted it meanwhile.
     opened.shift = description.shift;
     return opened;

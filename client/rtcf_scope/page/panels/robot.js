@@ -5,7 +5,8 @@ import { fixed } from "../drawing/axes.js";
 import { ink } from "../drawing/palette.js";
 import { ask, query, request } from "../server.js";
 
-const GHOST = 0.2; // opacity
+const GHOST = 0.2, UNKNOWN = 0.15; // opacity: of the target, and of a robot whose position is not known
+const NO_POSITION = "position unknown: its joints have no values";
 const NEAR = 1e-4; // rad or m; a target closer to the position is not drawn
 const CLICK = 4; // CSS pixels; a longer movement is a drag
 const SIDES = 48; // of a round shape
@@ -184,6 +185,7 @@ export class Robot {
       : new MeshPhongMaterial({ color: new Color(r, g, b), shininess: 28, specular: 0x222222, transparent: a < 1, opacity: a });
     const solid = new Mesh(geometry, material);
     solid.userData.colour = material.color.clone();
+    solid.userData.opacity = material.opacity;
     this.#place(solid, visual);
     group.add(solid);
     return solid;
@@ -227,6 +229,16 @@ export class Robot {
       if (link.type === "prismatic") object.translateOnAxis(axis, moved);
       else object.quaternion.multiply(new Quaternion().setFromAxisAngle(axis, moved));
     }
+  }
+
+  // Draws the robot faintly while its position is not known.
+  #fade(is) {
+    if (is !== (this.says.textContent === NO_POSITION)) this.says.textContent = is ? NO_POSITION : "";
+    for (const { solids } of this.links.values())
+      for (const { material, userData: { opacity } } of solids) {
+        material.opacity = is ? UNKNOWN * opacity : opacity;
+        material.transparent = is || opacity < 1;
+      }
   }
 
   // Applies the colours of the theme.
@@ -338,6 +350,7 @@ export class Robot {
     this.camera.position.set(centre.x + distance * Math.cos(tilt) * Math.cos(turn), centre.y + distance * Math.cos(tilt) * Math.sin(turn), centre.z + distance * Math.sin(tilt));
     this.camera.lookAt(centre);
     this.#pose(values, "group");
+    this.#fade(this.joints.length > 0 && !values.some(Number.isFinite));
     const isApart = this.ghost.checked && values.some((each, i) => Math.abs(each - targets[i]) > NEAR);
     for (const link of this.links.values()) if (!link.parent) link.ghost.visible = isApart;
     if (isApart) this.#pose(targets.map((each, i) => (Number.isFinite(each) ? each : values[i])), "ghost");

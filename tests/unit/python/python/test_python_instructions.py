@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import rtcf_compile
+
 PROGRAM = """
 import math
 from rtcf_compile import instructions
@@ -22,7 +24,7 @@ _PLAIN = {
     name: value
     for name, value in os.environ.items()
     if name not in ("NPY_DISABLE_CPU_FEATURES", "OPENBLAS_CORETYPE")
-}
+} | {"PYTHONPATH": str(Path(rtcf_compile.__path__[0]).parent)}
 
 
 def _said(program: str, **environment: str) -> list[str]:
@@ -52,6 +54,8 @@ print(os.environ['OPENBLAS_CORETYPE'], os.environ['NPY_DISABLE_CPU_FEATURES'])
 def test_another_processor_needs_nothing(tmp_path: Path) -> None:
     program = f"""
 from pathlib import Path
+
+import rtcf_compile
 from rtcf_compile import instructions
 instructions._CPUINFO = Path({str(tmp_path / "cpuinfo")!r})
 environment = {{}}

@@ -5,7 +5,7 @@ import struct
 from typing import Any
 
 import pytest
-from geometry_msgs.msg import PoseWithCovariance, TwistStamped
+from geometry_msgs.msg import PoseStamped, PoseWithCovariance, TwistStamped
 from rtcf_shared.ros_layout import Leaf, leaves, size_of
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, Float64MultiArray, Header, MultiArrayDimension, UInt8
@@ -50,6 +50,14 @@ def test_fields_of_fields_are_found() -> None:
     assert values["twist.linear.x"] == 1.25
     assert values["twist.angular.z"] == -2.5
     assert not any("frame_id" in path for path in values)
+
+
+def test_the_unit_of_a_port_applies_to_numbers_only_that_can_have_it() -> None:
+    message = PoseStamped(header=Header(seq=7, frame_id="base"))
+    found = {each.path: each.has_unit for each in leaves(message._full_text, serialised(message))}
+    wanted = {f"pose.position.{axis}": True for axis in "xyz"}
+    wanted |= {f"pose.orientation.{axis}": False for axis in "xyzw"}
+    assert found == wanted | {"header.seq": False, "header.stamp": False}
 
 
 def test_arrays_of_a_fixed_length_are_found() -> None:

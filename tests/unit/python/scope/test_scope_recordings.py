@@ -7,6 +7,7 @@ from unittest import mock
 
 import numpy as np
 import pytest
+import rtcf
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from rtcf_shared.recorder import Recorder
 
 _HEAD = 40
 _BEGIN_NS = 10**18
+NO_RTCFD = rtcf.Client("/nonexistent")
 
 
 def _record(file: Path, values: NDArray[Any], lost: int) -> None:
@@ -49,7 +51,7 @@ def _record(file: Path, values: NDArray[Any], lost: int) -> None:
 
 def _told(file: Path, *span: float) -> tuple[NDArray[np.float64], int]:
     """Return the columns sent to a page, and the length of a window."""
-    data = Recordings([file], None).columns(file.name, ["/a.x"], *span)
+    data = Recordings([file], None, NO_RTCFD).columns(file.name, ["/a.x"], *span)
     count, width = struct.unpack_from("<II", data, 4)
     (each,) = struct.unpack_from("<d", data, 24)
     return np.frombuffer(data, "<f8", offset=_HEAD).reshape(width, count), int(each)
@@ -95,4 +97,6 @@ def test_a_part_has_full_resolution_and_one_beyond_the_end_is_rejected(tmp_path:
     assert columns[0][0] == pytest.approx(0.5)
     with pytest.raises(RecordingError, match="run.mcap has no cycles in this range"):
         _told(file, 5.0, 6.0)
-    assert Recordings([file], None).describe("run.mcap")["seconds"] == pytest.approx(1.999)
+    assert Recordings([file], None, NO_RTCFD).describe("run.mcap")["seconds"] == pytest.approx(
+        1.999
+    )
