@@ -6,6 +6,8 @@ loop.
 
 from __future__ import annotations
 
+import json
+import math
 import os
 import stat
 import struct
@@ -28,6 +30,8 @@ _MOVES = ("revolute", "continuous", "prismatic")
 # Ports of the rtcf_control controllers that follow a position.
 _MEASURED, _TARGET = "measured", "setpoint"
 _SHARE = Path("/usr/share")
+_MOST_BODIES = 100
+_NOTHING_MORE: dict[str, Any] = {"layout": None, "bodies": [], "workspace": None, "note": ""}
 
 
 class RobotError(RtcfError):
@@ -49,14 +53,14 @@ class Robots:
         graph = catalog.graph(client, runner)
         file = self._file or urdf_of(graph["components"])
         if file is None:
-            return {"name": "", "file": "", "links": [], "signals": {}}
+            return {"name": "", "file": "", "links": [], "signals": {}, **_NOTHING_MORE}
         robot = read_urdf(file)
         for link in robot["links"]:
             for visual in link["visuals"]:
                 if visual["shape"] == "mesh":
                     visual["mesh"] = self._name(visual.pop("path"))
         joints = [link["joint"] for link in robot["links"] if link["moves"]]
-        return {**robot, "file": str(file), "signals": signals(joints, graph)}
+        return {**robot, "file": str(file), "signals": signals(joints, graph), **beside(file)}
 
     def _name(self, path: Path) -> str:
         """Return the name of a mesh for pages."""
@@ -165,6 +169,66 @@ def _read(file: Path) -> bytes:
     if len(data) > MOST_BYTES:
         raise RobotError(f"{file}: larger than {MOST_BYTES >> 20} MiB")
     return data
+
+
+def beside(file: Path) -> dict[str, Any]:
+    """Return what is in the file ROBOT.scope.json beside ROBOT.urdf: a layout, bodies around the
+    robot, and the space to show. An error is a note: the robot itself can be shown.
+    """
+    path = file.with_suffix(".scope.json")
+    if not path.exists():
+        return _NOTHING_MORE
+    try:
+        found = json.loads(_read(path))
+        if not isinstance(found, dict):
+            raise RobotError(f"{path}: not an object")
+        layout, bodies, space = (found.get(each) for each in ("layout", "bodies", "workspace"))
+        if layout is not None and not isinstance(layout, dict):
+            raise RobotError(f"{path}: layout is not an object")
+        if bodies is not None and (not isinstance(bodies, list) or len(bodies) > _MOST_BODIES):
+            raise RobotError(f"{path}: bodies is not a list of at most {_MOST_BODIES}")
+        made = [_body(each, f"{path}: bodies[{i}]") for i, each in enumerate(bodies or [])]
+        if space is not None:
+            corners = space if isinstance(space, dict) else {}
+            space = {
+                each: _vector(corners.get(each), 3, f"{path}: workspace {each}")
+                for each in ("low", "high")
+            }
+        return {"layout": layout, "bodies": made, "workspace": space, "note": ""}
+    except (ValueError, RecursionError) as error:
+        return {**_NOTHING_MORE, "note": f"{path}: {error}"}
+    except RobotError as error:
+        return {**_NOTHING_MORE, "note": str(error)}
+
+
+def _body(found: Any, where: str) -> dict[str, Any]:
+    """Return a body around the robot: fixed, or at the pose that a message gives."""
+    found = found if isinstance(found, dict) else {}
+    shape = found.get("shape")
+    body: dict[str, Any] = {"name": str(found.get("name", "")), "shape": shape}
+    if shape == "box":
+        body["size"] = _vector(found.get("size"), 3, f"{where}: size")
+    elif shape in ("sphere", "cylinder"):
+        for each in ("radius", "length") if shape == "cylinder" else ("radius",):
+            body[each] = _vector([found.get(each)], 1, f"{where}: {each}")[0]
+    else:
+        raise RobotError(f"{where}: shape is no box, sphere or cylinder")
+    body["rgba"] = _vector(found.get("rgba", _GREY), 4, f"{where}: rgba")
+    for each in ("xyz", "rpy"):
+        body[each] = _vector(found.get(each, [0, 0, 0]), 3, f"{where}: {each}")
+    pose = found.get("pose")
+    if pose is not None and not isinstance(pose, str):
+        raise RobotError(f"{where}: pose is not the name of an output")
+    return {**body, "pose": pose or ""}
+
+
+def _vector(found: Any, count: int, what: str) -> list[float]:
+    """Return finite numbers; raises RobotError."""
+    values = found if isinstance(found, list) else []
+    numbers = [float(each) for each in values if isinstance(each, int | float)]
+    if len(numbers) != count or len(values) != count or not all(map(math.isfinite, numbers)):
+        raise RobotError(f"{what} needs {count} number{'s' if count > 1 else ''}")
+    return numbers
 
 
 def _link(element: ET.Element, colours: Mapping[str, list[float]], file: Path) -> dict[str, Any]:

@@ -12,6 +12,7 @@ upright with all joints at 0. Its joints are joint1 to joint6 and finger_joint.
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -91,7 +92,7 @@ def links() -> list[Link]:
         Link(
             "upper_arm", "shoulder", (0, 0, 0.14), "joint2", (0, 1, 0), -1.9, 1.9, 2.5, 150,
             6.0, (0, 0, 0.17), tube(6.0, 0.06, 0.40), 0.5, 4.0, 2.5,
-            {"shell": beam(0.36, 0.062, 0.052, 0.10),
+            {"shell": beam(0.36, 0.062, 0.049, 0.10),
              "joint": housing(0.052, 0.14).moved(z=0.36),
              "accent": housing(0.03, 0.172)},
             [Solid((0.06, 0.36, 0), (0, 0, 0.18))],
@@ -150,6 +151,9 @@ BASE: dict[str, Mesh] = {
 BASE_SOLID = Solid((0.09, 0.16, 0), (0, 0, 0.08))
 READY = (0.0, 0.3, 1.6, 0.0, 1.24, 0.0)  # rad; the hand points down
 FINGERS_OPEN = 0.04  # m
+# Half sizes and places, m.
+TABLE, TABLE_AT = (0.15, 0.3, 0.1), (0.45, 0.0, 0.1)
+BLOCK, BLOCK_AT = 0.02, (0.45, 0.12, 0.22)
 
 
 def numbers(values: Sequence[float]) -> str:
@@ -222,10 +226,11 @@ def mjcf(all_links: Sequence[Link], *, flexible: bool) -> str:
         '  <option timestep="0.001" integrator="implicit" cone="elliptic"/>',
         "  <worldbody>",
         '    <geom name="floor" type="plane" size="2 2 0.1"/>',
-        '    <geom name="table" type="box" pos="0.45 0 0.1" size="0.15 0.3 0.1"/>',
-        '    <body name="block" pos="0.45 0.12 0.22">',
+        f'    <geom name="table" type="box" pos="{numbers(TABLE_AT)}" size="{numbers(TABLE)}"/>',
+        f'    <body name="block" pos="{numbers(BLOCK_AT)}">',
         '      <freejoint name="block"/>',
-        '      <geom type="box" size="0.02 0.02 0.02" mass="0.1" friction="1.5 0.02 0.001"/>',
+        f'      <geom type="box" size="{numbers([BLOCK] * 3)}" mass="0.1" '
+        'friction="1.5 0.02 0.001"/>',
         "    </body>",
         '    <body name="base">',
         *_solids([BASE_SOLID], 3),
@@ -259,6 +264,28 @@ def mjcf(all_links: Sequence[Link], *, flexible: bool) -> str:
     return "\n".join(lines)
 
 
+def page(all_links: Sequence[Link]) -> str:
+    """Return what the scope's page shows at first: traces, and what is around the arm."""
+    joints = [link.joint for link in all_links if not link.is_slide]
+    panes = [
+        [f"/robot.{each}_position" for each in joints],
+        [f"/{each}/position.error" for each in joints],
+        [f"/robot.{each}_effort" for each in joints],
+    ]
+    x, y, _ = TABLE_AT
+    found = {
+        "layout": {"span": 10, "panes": [{"traces": each} for each in panes]},
+        "bodies": [
+            {"name": "table", "shape": "box", "size": [2 * each for each in TABLE],
+             "xyz": list(TABLE_AT), "rgba": [0.62, 0.55, 0.47, 1]},
+            {"name": "block", "shape": "box", "size": [2 * BLOCK] * 3, "pose": "/robot.block_pose",
+             "rgba": [0.8, 0.3, 0.1, 1]},
+        ],
+        "workspace": {"low": [-0.2, y - TABLE[1], 0], "high": [x + TABLE[0], y + TABLE[1], 1.0]},
+    }  # fmt: skip
+    return json.dumps(found, indent=1) + "\n"
+
+
 def _is_flexible(link: Link, flexible: bool) -> bool:
     return flexible and link.joint in ("joint1", "joint2", "joint3")
 
@@ -268,7 +295,7 @@ def _motor(link: Link, flexible: bool) -> str:
 
 
 def _ready(all_links: Sequence[Link], flexible: bool) -> list[float]:
-    values = [0.45, 0.12, 0.22, 1.0, 0.0, 0.0, 0.0]  # the block
+    values = [*BLOCK_AT, 1.0, 0.0, 0.0, 0.0]
     for link in all_links:
         position = FINGERS_OPEN if link.is_slide else READY[int(link.joint[-1]) - 1]
         values += [position, 0.0] if _is_flexible(link, flexible) else [position]
@@ -484,6 +511,7 @@ def main() -> int:
     (folder / "arm.xml").write_text(mjcf(all_links, flexible=False))
     (folder / "arm_flexible.xml").write_text(mjcf(all_links, flexible=True))
     (folder / "arm.urdf").write_text(urdf(all_links))
+    (folder / "arm.scope.json").write_text(page(all_links))
     (folder / "arm.yaml").write_text(graph(all_links, Path(sys.argv[-1]).absolute()))
     for name, parts in [("base", BASE), *((link.name, link.parts) for link in all_links)]:
         for colour, mesh in parts.items():

@@ -353,6 +353,7 @@ async function begin() {
   else {
     const found = await robot.request().catch(() => null);
     if (found?.links.length) showRobot(true, found);
+    if (found?.layout) setError("layout", layout.given(scope, found.layout));
   }
   // Set last: before, the address has the requested layout.
   scope.onLayout = () => layout.toAddress(() => layout.taken(scope, page.runner(), drawer, xy, robot));

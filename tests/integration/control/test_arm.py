@@ -268,7 +268,7 @@ def test_the_arm_is_shown_until_its_time_is_over() -> None:
         env=clean_environment(), capture_output=True, text=True, timeout=120, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
-    assert re.search(r"the page +http://127\.0\.0\.1:\d+/\?token=", done.stdout)
+    assert re.match(r"http://127\.0\.0\.1:\d+/\?token=\S+\n", done.stdout)
     rows = re.findall(r"^ +\d+ s +(\d+) +\d+ +.* ([\d.]+)°$", done.stdout, re.MULTILINE)
     assert len(rows) >= 2
     assert int(rows[-1][0]) > int(rows[0][0])

@@ -1,5 +1,6 @@
 """The robot in 3-D on the scope's page, moved by a real loop."""
 
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -29,9 +30,9 @@ def arm(daemon: Daemon, client: rtcf.Client) -> Daemon:
     return daemon
 
 
-def opened(visit: Opener, scope: ScopeProcess) -> Page:
+def opened(visit: Opener, scope: ScopeProcess, layout: str = "") -> Page:
     """Return a page that shows the robot."""
-    page = visit(scope)
+    page = visit(scope, layout)
     page.wait("document.getElementById('state').textContent")
     # The page opens the robot itself where it finds one; a click would close it again.
     page.ask("robot.isOpen || document.getElementById('robots').click()")
@@ -93,9 +94,67 @@ def test_a_robot_without_values_is_drawn_and_moves_once_they_come(
         assert page.errors == []
 
 
+def test_a_page_opens_with_the_traces_and_the_space_that_the_robots_package_names(
+    visit: Opener, arm: Daemon, client: rtcf.Client
+) -> None:
+    client.start()
+    client.set_parameters("operator", [rtcf.parse_parameter("mode:=tour")])
+    with ScopeProcess(arm) as scope:
+        page = visit(scope)
+        page.wait("scope.panes.length === 3 && robot.frames > 20")
+        names = page.ask("scope.panes.map((pane) => pane.traces.map(({ name }) => name))")
+        joints = [f"joint{i}" for i in range(1, 7)]
+        assert names == [
+            [f"/robot.{each}_position" for each in joints],
+            [f"/{each}/position.error" for each in joints],
+            [f"/robot.{each}_effort" for each in joints],
+        ]
+        # Of the list, only the cycles are unfolded.
+        page.wait("document.querySelectorAll('#tree details').length > 20")
+        unfolded = (
+            "[...document.querySelectorAll('#tree details[open]')].map((e) => e.dataset.name)"
+        )
+        assert page.ask(unfolded) == ["cycles"]
+        # The camera sees the robot, the table and the block during a whole tour.
+        outside = """(() => {
+          const { Box3, Vector3 } = robot.three, box = new Box3(), found = [];
+          robot.scene.updateMatrixWorld(true);
+          for (const { solids } of robot.links.values())
+            for (const solid of solids) box.expandByObject(solid);
+          for (const { group } of robot.bodies) box.expandByObject(group);
+          const { min, max } = box;
+          for (const x of [min.x, max.x]) for (const y of [min.y, max.y])
+            for (const z of [min.z, max.z]) {
+              const at = new Vector3(x, y, z).project(robot.camera);
+              if (Math.abs(at.x) > 1 || Math.abs(at.y) > 1) found.push([x, y, z]);
+            }
+          return found;
+        })()"""
+        assert page.ask("robot.bodies.map(({ group }) => group.visible)") == [True, True]
+        for _ in range(40):
+            assert page.ask(outside) == []
+            time.sleep(0.25)
+        assert page.errors == []
+
+
+def test_the_block_is_where_the_simulation_has_it(
+    visit: Opener, arm: Daemon, client: rtcf.Client
+) -> None:
+    client.start()
+    with ScopeProcess(arm) as scope:
+        page = visit(scope)
+        page.wait("robot.frames > 5 && robot.bodies[1].group.visible")
+        found = page.ask("robot.bodies[1].group.position.toArray()")
+        assert found == pytest.approx([0.45, 0.12, 0.22], abs=0.002)
+        # A target within a degree of the position is not drawn: it would only flicker.
+        page.wait("robot.joints.every((each) => !each.target) ||"
+                  " [...robot.links.values()].every(({ ghost }) => !ghost.parent || !ghost.visible"
+                  " || ghost.parent !== robot.scene)")  # fmt: skip
+
+
 def test_a_picked_joint_shows_its_signals(visit: Opener, arm: Daemon, client: rtcf.Client) -> None:
     with ScopeProcess(arm) as scope:
-        page = opened(visit, scope)
+        page = opened(visit, scope, "{}")
         client.start()
         page.wait("robot.joints.length === 8 && robot.frames > 0")
         # On the canvas: a place at which the upper arm is drawn.

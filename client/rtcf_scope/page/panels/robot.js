@@ -7,7 +7,8 @@ import { ask, query, request } from "../server.js";
 
 const GHOST = 0.2, UNKNOWN = 0.15; // opacity: of the target, and of a robot whose position is not known
 const NO_POSITION = "position unknown: its joints have no values";
-const NEAR = 1e-4; // rad or m; a target closer to the position is not drawn
+const NEAR = Math.PI / 180, NEAR_SLIDE = 1e-3; // rad, m; a target closer to all positions is not drawn
+const POSE = ["position.x", "position.y", "position.z", "orientation.x", "orientation.y", "orientation.z", "orientation.w"];
 const CLICK = 4; // CSS pixels; a longer movement is a drag
 const SIDES = 48; // of a round shape
 
@@ -33,6 +34,8 @@ export class Robot {
     this.isOpen = false;
     this.links = new Map(); // by name: {group, ghost, moves}
     this.joints = [];
+    this.bodies = []; // around the robot: {group, pose}, where `pose` has its signals, or is null
+    this.space = null; // the space to show: {low, high}, m
     this.signals = [];
     this.picked = "";
     this.drawn = ""; // the values that are drawn
@@ -70,7 +73,7 @@ export class Robot {
     if (!this.isOpen) return;
     try {
       const found = known ?? await this.request();
-      this.says.textContent = found.links.length ? "" : "no robot: give a component the path of a URDF, or start the scope with --robot FILE";
+      this.says.textContent = found.links.length ? found.note ?? "" : "no robot: give a component the path of a URDF, or start the scope with --robot FILE";
       await this.#engine();
       await this.#build(found);
     } catch (error) {
@@ -108,7 +111,7 @@ export class Robot {
 
   // Makes the links and signals of a description; keeps unchanged ones.
   async #build(found) {
-    const description = JSON.stringify(found), form = JSON.stringify(found.links);
+    const description = JSON.stringify(found), form = JSON.stringify([found.links, found.bodies, found.workspace]);
     if (description === this.description) return;
     this.#follow(found);
     this.description = description;
@@ -136,6 +139,14 @@ export class Robot {
       (parent?.group ?? this.scene).add(link.group);
       (parent?.ghost ?? this.scene).add(link.ghost);
     }
+    for (const { group } of this.bodies) this.scene.remove(group);
+    this.bodies = (found.bodies ?? []).map((body) => {
+      const group = new Group();
+      this.#solid(group, this.#geometry(body), body, false);
+      this.scene.add(group);
+      return { group, pose: body.pose ? POSE.map((each) => `${body.pose}.${each}`) : null };
+    });
+    this.space = found.workspace ?? null;
     this.form = form;
     this.#pose(this.#values("position"), "group");
     this.#look();
@@ -145,7 +156,8 @@ export class Robot {
   // Stores the signals of the joints, and lists them.
   #follow(found) {
     this.joints = found.links.filter((link) => link.moves && found.signals[link.joint]).map((link) => ({ ...link, ...found.signals[link.joint] }));
-    this.signals = this.joints.flatMap(({ position, target }) => (target ? [position, target] : [position]));
+    this.signals = this.joints.flatMap(({ position, target }) => (target ? [position, target] : [position]))
+      .concat((found.bodies ?? []).flatMap(({ pose }) => (pose ? POSE.map((each) => `${pose}.${each}`) : [])));
     this.list.replaceChildren(...this.joints.map((joint) => {
       const row = document.createElement("button"), bar = document.createElement("meter"), says = document.createElement("span");
       row.type = "button";
@@ -206,6 +218,19 @@ export class Robot {
     });
   }
 
+  // Moves the bodies by their signals; one without values is hidden. Returns the values as text.
+  #placeBodies() {
+    const { store } = this.scope, at = store.empty ? NaN : this.#at(store), found = [];
+    for (const { group, pose } of this.bodies) {
+      if (!pose) continue;
+      const values = pose.map((name) => { const column = store.column(name); return column && !store.empty ? column.get(at) : NaN; });
+      group.visible = values.every(Number.isFinite);
+      if (group.visible) { group.position.set(...values.slice(0, 3)); group.quaternion.set(...values.slice(3)).normalize(); }
+      found.push(...values.map((each) => each.toFixed(4)));
+    }
+    return found.join(" ");
+  }
+
   // Returns the place of the newest cycle, or of the last visible one in a view that does not follow.
   #at(store) {
     const { scope } = this;
@@ -253,11 +278,13 @@ export class Robot {
     this.drawn = "";
   }
 
-  // Looks at the whole robot, from the front and above.
+  // Looks at the whole robot and its workspace, from the front and above.
   #look() {
     const { Box3, Vector3 } = this.three, box = new Box3();
     this.scene.updateMatrixWorld(true);
     for (const { solids } of this.links.values()) for (const solid of solids) box.expandByObject(solid);
+    for (const { group, pose } of this.bodies) if (!pose) box.expandByObject(group);
+    if (this.space) box.expandByPoint(new Vector3(...this.space.low)).expandByPoint(new Vector3(...this.space.high));
     if (box.isEmpty()) box.set(new Vector3(-0.5, -0.5, 0), new Vector3(0.5, 0.5, 1));
     this.size = Math.max(box.getSize(new Vector3()).length(), 0.05);
     this.floor = Math.min(box.min.z, 0);
@@ -334,7 +361,7 @@ export class Robot {
   frame() {
     if (!this.isOpen || !this.renderer || !this.links.size) return false;
     const values = this.#values("position"), targets = this.#values("target");
-    const drawn = `${values.map((each) => each.toFixed(5))} ${this.ghost.checked && targets.map((each) => each.toFixed(5))}`;
+    const drawn = `${this.#placeBodies()} ${values.map((each) => each.toFixed(5))} ${this.ghost.checked && targets.map((each) => each.toFixed(5))}`;
     if (drawn === this.drawn) return false;
     this.drawn = drawn;
     const { clientWidth: width, clientHeight: height } = this.canvas.parentElement;
@@ -351,7 +378,8 @@ export class Robot {
     this.camera.lookAt(centre);
     this.#pose(values, "group");
     this.#fade(this.joints.length > 0 && !values.some(Number.isFinite));
-    const isApart = this.ghost.checked && values.some((each, i) => Math.abs(each - targets[i]) > NEAR);
+    const isApart = this.ghost.checked && values.some((each, i) =>
+      Math.abs(each - targets[i]) > (this.joints[i].type === "prismatic" ? NEAR_SLIDE : NEAR));
     for (const link of this.links.values()) if (!link.parent) link.ghost.visible = isApart;
     if (isApart) this.#pose(targets.map((each, i) => (Number.isFinite(each) ? each : values[i])), "ghost");
     this.joints.forEach((joint, i) => joint.show(values[i]));

@@ -13,6 +13,7 @@ export class Tree {
     this.box = box;
     this.search = search;
     this.derived = new Set(); // derived signals that have been shown in this page
+    this.seen = new Set(); // components that have been listed
     search.oninput = () => this.show();
     search.addEventListener("keydown", ({ key }) => { if (key === "Escape") { search.value = ""; this.show(); } });
   }
@@ -29,12 +30,12 @@ export class Tree {
       components.get(component).push(signal);
     }
     const closed = new Set([...this.box.querySelectorAll("details:not([open])")].map((each) => each.dataset.name));
-    const isOpen = (name, count) => (first ? count < MANY || TITLES.has(name) : !closed.has(name));
-    const first = !this.box.querySelector("details");
+    const isOpen = (name, count) => (this.seen.has(name) ? !closed.has(name) : count < MANY || TITLES.has(name));
     this.box.replaceChildren(...[...components].filter(([, all]) => all.length).map(([component, all]) => {
       const details = document.createElement("details");
       details.dataset.name = component;
       details.open = words.length > 0 || isOpen(component, signals.length);
+      if (!words.length) this.seen.add(component);
       const summary = document.createElement("summary");
       summary.textContent = TITLES.get(component) ?? component;
       details.append(summary, ...all.map((signal) => this.#leaf(signal, component)));

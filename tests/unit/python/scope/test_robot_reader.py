@@ -1,5 +1,6 @@
 """The robot for the scope's page: URDFs, meshes, and the signals of joints."""
 
+import json
 import os
 import struct
 from pathlib import Path
@@ -183,3 +184,51 @@ def test_the_urdf_is_named_by_a_parameter_or_lies_beside_the_model(tmp_path: Pat
     assert robot.urdf_of([component(str(model))]) is None
     (tmp_path / "arm.urdf").touch()
     assert robot.urdf_of([component(str(model))]) == tmp_path / "arm.urdf"
+
+
+WHERE = "arm.scope.json"
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("{", f"{WHERE}: Expecting property name"),
+        ("[]", f"{WHERE}: not an object"),
+        ('{"layout": 3}', f"{WHERE}: layout is not an object"),
+        ('{"bodies": 3}', f"{WHERE}: bodies is not a list of at most 100"),
+        ('{"bodies": [{}]}', f"{WHERE}: bodies[0]: shape is no box, sphere or cylinder"),
+        ('{"bodies": [{"shape": "box"}]}', f"{WHERE}: bodies[0]: size needs 3 numbers"),
+        (
+            '{"bodies": [{"shape": "sphere", "radius": "1"}]}',
+            f"{WHERE}: bodies[0]: radius needs 1 number",
+        ),
+        (
+            '{"bodies": [{"shape": "box", "size": [1, 1, NaN]}]}',
+            f"{WHERE}: bodies[0]: size needs 3 numbers",
+        ),
+        (
+            '{"bodies": [{"shape": "box", "size": [1, 1, 1], "pose": 3}]}',
+            f"{WHERE}: bodies[0]: pose is not the name of an output",
+        ),
+        ('{"workspace": {"low": [0, 0, 0]}}', f"{WHERE}: workspace high needs 3 numbers"),
+        ("[" * 100_000, f"{WHERE}: maximum recursion depth"),
+    ],
+)
+def test_an_error_beside_the_robot_is_a_note(tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / WHERE).write_text(text)
+    found = robot.beside(tmp_path / "arm.urdf")
+    assert said in found["note"]
+    assert found["bodies"] == [] and found["layout"] is None and found["workspace"] is None
+
+
+def test_what_is_beside_the_robot_is_read(tmp_path: Path) -> None:
+    assert robot.beside(tmp_path / "arm.urdf")["bodies"] == []
+    body = {"name": "pole", "shape": "cylinder", "radius": 1, "length": 2, "pose": "/world.pole"}
+    space = {"low": [0, 0, 0], "high": [1, 1, 1]}
+    wanted = {"layout": {"span": 3}, "bodies": [body], "workspace": space}
+    (tmp_path / WHERE).write_text(json.dumps(wanted))
+    found = robot.beside(tmp_path / "arm.urdf")
+    assert found["note"] == "" and found["layout"] == {"span": 3}
+    assert found["workspace"] == {"low": [0.0] * 3, "high": [1.0] * 3}
+    grey = {"rgba": [0.7, 0.7, 0.7, 1.0], "xyz": [0.0] * 3, "rpy": [0.0] * 3}
+    assert found["bodies"] == [body | grey]
