@@ -10,6 +10,17 @@ function download(blob, name) {
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }
 
+// Prints the panes and the measurements below a line that says what they show.
+export function toReport(scope, runner) {
+  const { origin, view, mode } = scope, box = document.getElementById("report");
+  const what = mode === "recording" ? scope.recordings.map((each) => each.name).join(" and ") : runner;
+  const begin = origin === null ? "" : new Date(Number(origin / 1_000_000n) + view.begin * 1e3).toLocaleString();
+  const title = Object.assign(document.createElement("b"), { textContent: `rtcf scope: ${what}` });
+  box.replaceChildren(title, document.createElement("br"), `${begin}, ${Number(view.span.toPrecision(4))} s`);
+  scope.freeze();
+  requestAnimationFrame(() => requestAnimationFrame(() => window.print()));
+}
+
 export function toPng(scope) {
   const ratio = 2, head = 22;
   const sizes = scope.panes.map((pane) => [pane.face.clientWidth, pane.face.clientHeight]);

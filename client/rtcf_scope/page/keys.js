@@ -4,7 +4,7 @@ export const KEYS = [
   ["End", "the newest again"], ["A", "fit the scales to the values"], ["C", "take the cursors away"],
   ["N", "a new pane"], ["O", "the robot in 3-D, or not"], ["Delete", "take the active pane away"], ["1 … 9", "make a pane the active one"],
   ["X", "seconds, time of day or cycle numbers below the panes"], ["V", "values under the pointer, or not"],
-  ["/", "search the signals"], ["T", "roll or triggered"], ["D", "dark or light"], ["?", "this list"],
+  ["/", "search the signals; Enter: the first one"], ["Drag a signal", "into a pane"], ["T", "roll or triggered"], ["D", "dark or light"], ["?", "this list"],
   ["Wheel", "zoom time; with Shift, or at a scale, values"], ["Drag", "pan; a cursor: move it; with Alt: shift the second recording"],
   ["Drag a bar", "resize panes, list and drawer; double click: as before"],
   ["Click", "cursor A; with Shift B"], ["Double click", "fit the scale, no cursors"],

@@ -314,7 +314,7 @@ function buttons() {
   $("export").onchange = ({ target }) => {
     const choice = target.value;
     target.value = "";
-    trying(() => ({ png: exporting.toPng, csv: exporting.toCsv, mcap: exporting.toMcap })[choice](scope, page.runner()));
+    trying(() => ({ png: exporting.toPng, csv: exporting.toCsv, mcap: exporting.toMcap, report: exporting.toReport })[choice](scope, page.runner()));
   };
   for (const each of document.querySelectorAll("footer [role=tab]")) each.onclick = () => open(each.dataset.drawer);
   for (const each of document.querySelectorAll("aside [role=tab]")) each.onclick = () => {

@@ -159,7 +159,7 @@ def test_target_and_time_of_a_step_are_set_on_the_page(page: Page) -> None:
     page.wait(
         "[...document.querySelectorAll('.drawer[data-drawer=measurements] tbody tr')]"
         ".find((row) => row.cells[1].textContent === '/ragged.holes')"
-        "?.cells[12].textContent.includes('100')"
+        "?.cells[13].textContent.includes('100')"
     )
     told = page.ask(
         "(({ title, className }) => [title, className])(document.querySelector('[data-key=zero]'))"

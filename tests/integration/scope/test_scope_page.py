@@ -222,6 +222,80 @@ def test_an_invalid_bookmark_opens(visit: Opener, scope: ScopeProcess) -> None:
         assert page.errors == []
 
 
+def test_enter_in_the_search_shows_the_first_signal_that_is_found(
+    visit: Opener, scope: ScopeProcess
+) -> None:
+    page = visit(scope)
+    page.wait("scope.catalog.length > 10")
+    page.ask(
+        """(() => {
+          const search = document.getElementById("search");
+          search.value = "w5 phase";
+          search.oninput();
+          search.dispatchEvent(new KeyboardEvent("keydown", { key: "Enter", bubbles: true }));
+        })()"""
+    )
+    page.wait("scope.traces().map(({ name }) => name).join() === '/w5.phase'")
+    assert page.errors == []
+
+
+def test_a_signal_can_be_dragged_into_a_pane(visit: Opener, scope: ScopeProcess) -> None:
+    page = visit(scope, '{"panes":[{"traces":["/w0.wave"]},{"traces":["/w1.wave"]}]}')
+    page.wait("scope.panes.length === 2 && scope.catalog.length > 10")
+    page.ask(
+        """(() => {
+          const dataTransfer = new DataTransfer();
+          const to = scope.panes[1].face, leaf = document.querySelector('[title="/w2.wave"]');
+          const send = (target, kind) => target.dispatchEvent(
+            new DragEvent(kind, { dataTransfer, bubbles: true, cancelable: true }));
+          send(leaf, "dragstart");
+          window.accepted = !send(to, "dragover"); // a pane prevents the default: no drop
+          window.marked = scope.panes[1].box.classList.contains("target");
+          send(to, "drop");
+        })()"""
+    )
+    assert page.ask("[accepted, marked]") == [True, True]
+    names = "scope.panes.map((pane) => pane.traces.map(({ name }) => name))"
+    assert page.ask(names) == [["/w0.wave"], ["/w1.wave", "/w2.wave"]]
+    assert page.ask("document.querySelectorAll('.pane.target').length") == 0
+    # Other things that are dragged, such as a file, are not accepted.
+    refused = page.ask(
+        """scope.panes[1].face.dispatchEvent(new DragEvent("dragover",
+          { dataTransfer: new DataTransfer(), bubbles: true, cancelable: true }))"""
+    )
+    assert refused is True
+
+
+def test_the_time_axis_is_below_the_last_pane_only(visit: Opener, scope: ScopeProcess) -> None:
+    page = visit(scope, '{"panes":[{"traces":["/w0.wave"]},{"traces":["/w1.wave"]}]}')
+    page.wait("scope.panes.length === 2")
+    heights = "scope.panes.map((pane) => pane.face.querySelector('.times').offsetHeight)"
+    assert page.ask(heights) == [0, 22]
+    page.ask("scope.removePane(scope.panes[1])")
+    assert page.ask(heights) == [22]
+
+
+def test_a_report_shows_the_panes_and_the_measurements(visit: Opener, scope: ScopeProcess) -> None:
+    page = visit(scope, '{"panes":[{"traces":["/w0.wave"]}]}')
+    page.wait("scope.live.end > 500")
+    page.ask(
+        "window.print = () => { window.printed = document.getElementById('report').textContent }"
+    )
+    page.ask(
+        "(({ value }) => 0)(Object.assign(document.getElementById('export'), { value: 'report' }));"
+        "document.getElementById('export').dispatchEvent(new Event('change'))"
+    )
+    said = page.wait("window.printed")
+    assert said.startswith("rtcf scope: rt_runner") and said.endswith(", 10 s")
+    page.call("Emulation.setEmulatedMedia", media="print")
+    shown = """((name) => [...document.querySelectorAll(name)].some((e) => e.offsetHeight > 0))"""
+    for name, is_there in (
+        ("#report", True), (".pane canvas", True), (".drawer[data-drawer=measurements] table", True),
+        ("header", False), ("aside", False), ("footer nav", False), (".chip button", False),
+    ):  # fmt: skip
+        assert page.ask(f"{shown}({name!r})") == is_there, name
+
+
 def test_escape_ends_the_search(visit: Opener, scope: ScopeProcess) -> None:
     page = visit(scope)
     page.wait("document.querySelectorAll('#tree .leaf').length > 10")

@@ -12,11 +12,12 @@ import { labelled, Times } from "./times.js";
 import { drawValues, FONT, LEFT, TOP, Values } from "./values.js";
 import { isDerived } from "../data/derived.js";
 
-const RIGHT = 12, BOTTOM = 22; // CSS pixels; the right one without an axis
+const RIGHT = 12, BOTTOM = 22, MARGIN = 6; // CSS pixels; the right one without an axis, the last one without times
 const TRACK = 34, TRACK_ALONE = 72; // maximum height of a track, CSS pixels: below lines, and in a plot without lines
 const NAMED = 14; // minimum height of a track with a name, CSS pixels
 const TRACKS = 0.5; // maximum share of the tracks in the height of a plot with lines
 const AXES = [["left", "left axis"], ["right", "right axis"], ["own", "own scale"], ["track", "track"]];
+export const SIGNAL = "application/x-rtcf-signal"; // a name that is dragged
 export const isAxis = (name) => AXES.some(([each]) => each === name);
 
 export class Pane {
@@ -48,6 +49,7 @@ export class Pane {
     this.face.append(this.values.canvas, this.plot, this.rightValues.canvas, below);
     this.readout = new Readout(this, scope);
     this.legend = element("div", "legend");
+    this.#receive();
     this.bar = element("div", "bar y"); // resizes this pane and the one above
     this.box.append(this.bar, this.face, this.legend);
     new ResizeObserver(([{ contentRect: { width, height } }]) => {
@@ -60,6 +62,27 @@ export class Pane {
   get scale() { return this.left.set; }
   set scale(range) { this.left.set = range; }
   get shown() { return this.left.shown; }
+
+  // Shows a signal that is dragged here from the list.
+  #receive() {
+    const isSignal = ({ dataTransfer }) => dataTransfer.types.includes(SIGNAL);
+    this.box.addEventListener("dragover", (event) => {
+      if (!isSignal(event)) return;
+      event.preventDefault();
+      this.box.classList.add("target");
+    });
+    this.box.addEventListener("dragleave", ({ relatedTarget }) => {
+      if (!this.box.contains(relatedTarget)) this.box.classList.remove("target");
+    });
+    this.box.addEventListener("drop", (event) => {
+      this.box.classList.remove("target");
+      if (!isSignal(event)) return;
+      event.preventDefault();
+      this.scope.activate(this);
+      const name = event.dataTransfer.getData(SIGNAL);
+      if (!this.has(name)) this.scope.toggle(name, this);
+    });
+  }
 
   // Sets this pane's share of the height, relative to other panes.
   weigh(weight) {
@@ -312,7 +335,8 @@ export class Pane {
   // Draws the pane on the canvas of an export, with `ratio` pixels per CSS pixel.
   paint(g, width, height, ratio) {
     const { scope } = this, besides = scope.hasRight ? LEFT : RIGHT;
-    const area = { left: LEFT, top: TOP, width: width - LEFT - besides, height: height - TOP - BOTTOM };
+    const isLast = scope.panes.at(-1) === this; // the time axis is below the last pane
+    const area = { left: LEFT, top: TOP, width: width - LEFT - besides, height: height - TOP - (isLast ? BOTTOM : MARGIN) };
     const { sight, right, left, drawn } = this.#arrange(area.width, area.height, ratio);
     const raster = new Raster(sight.width, sight.height), canvas = element("canvas", "");
     canvas.width = sight.width;
@@ -335,9 +359,9 @@ export class Pane {
     g.font = FONT;
     g.fillStyle = ink("soft");
     g.textAlign = "center";
-    for (const tick of labelled(sight)) g.fillText(sight.ruler.text(tick), area.left + sight.x(tick.time), area.top + area.height + 15);
+    for (const tick of isLast ? labelled(sight) : []) g.fillText(sight.ruler.text(tick), area.left + sight.x(tick.time), area.top + area.height + 15);
     g.textAlign = "right";
-    g.fillText(sight.ruler.unit, area.left + area.width, area.top + area.height + 15);
+    if (isLast) g.fillText(sight.ruler.unit, area.left + area.width, area.top + area.height + 15);
     g.textAlign = "left";
     for (const { text, y, number } of this.#tracks(drawn, ratio)) {
       g.fillStyle = colour(number);

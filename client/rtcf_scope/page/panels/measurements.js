@@ -3,7 +3,7 @@ import { figure, scaled } from "../drawing/axes.js";
 import { measured } from "../data/measure.js";
 import { colour } from "../drawing/palette.js";
 
-const HEADS = ["", "trace", "A", "B", "B − A", "min", "max", "peak-peak", "mean", "RMS", "frequency", "rise 10–90 %", "overshoot", "settling 2 %"];
+const HEADS = ["", "trace", "last", "A", "B", "B − A", "min", "max", "peak-peak", "mean", "RMS", "frequency", "rise 10–90 %", "overshoot", "settling 2 %"];
 const STEP = [["initial", "from", "level before the step"], ["target", "to", "target of the step"], ["zero", "at", "time of the step, s"]];
 const MOST_MS = 12; // longest time of one call; the next call continues with the other traces
 
@@ -106,6 +106,7 @@ export class Measurements {
     const at = (time) => (column && time !== null && !store.empty ? column.get(store.nearest(time)) : NaN);
     const found = column && !store.empty ? measured(store, column, begin, end, this.steps.get(name)) : null;
     const cells = [scope.mode === "recording" ? `${name} · ${scope.recordings[second].name}` : name,
+      figure(column && !store.empty ? column.get(scope.mode === "trigger" ? scope.readAt : store.end - 1) : NaN, unit),
       figure(at(a), unit, Math.abs(at(b) - at(a))), figure(at(b), unit, Math.abs(at(b) - at(a))), figure(at(b) - at(a), unit)];
     if (found) cells.push(...[found.min, found.max, found.span, found.mean, found.rms].map((each) => figure(each, unit)),
       scaled(found.frequency, "Hz"), scaled(found.rise, "s"), isFinite(found.overshoot) ? `${figure(found.overshoot)} %` : "–", scaled(found.settling, "s"));

@@ -2,6 +2,7 @@
 import { isDerived } from "../data/derived.js";
 import { DURATION, LATENCY } from "../data/store.js";
 import { colour } from "../drawing/palette.js";
+import { SIGNAL } from "../drawing/pane.js";
 
 const MANY = 60; // minimum number of signals for components to be closed at first
 const TITLES = new Map([["cycles", "cycles of the loop"], ["derived", "derived signals"]]);
@@ -15,7 +16,11 @@ export class Tree {
     this.derived = new Set(); // derived signals that have been shown in this page
     this.seen = new Set(); // components that have been listed
     search.oninput = () => this.show();
-    search.addEventListener("keydown", ({ key }) => { if (key === "Escape") { search.value = ""; this.show(); } });
+    search.addEventListener("keydown", ({ key }) => {
+      if (key === "Escape") { search.value = ""; this.show(); }
+      // The first signal that is found.
+      if (key === "Enter" && search.value.trim()) this.box.querySelector(".leaf")?.click();
+    });
   }
 
   show() {
@@ -65,6 +70,8 @@ export class Tree {
     button.title = name;
     button.append(dot, text, right);
     button.onclick = () => this.scope.toggle(name);
+    button.draggable = true;
+    button.ondragstart = ({ dataTransfer }) => { dataTransfer.setData(SIGNAL, name); dataTransfer.effectAllowed = "copy"; };
     return button;
   }
 }
