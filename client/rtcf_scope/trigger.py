@@ -35,6 +35,7 @@ class Trigger:
     holdoff: int  # cycles after a shot without hits
     single: bool  # disarm after one shot
     condition: Condition | None = None  # replaces `signal`
+    hysteresis: float = 0.0  # how far an edge must have been from the level, on its other side
 
     @property
     def signals(self) -> list[str]:
@@ -56,7 +57,7 @@ def parse(request: Any) -> Trigger:
             str(request["signal"]) if condition is None else "", kind, slope,
             float(request.get("low", 0.0)), float(request.get("high", 0.0)),
             int(request["before"]), int(request["after"]), int(request.get("holdoff", 0)),
-            bool(request.get("single", False)), condition,
+            bool(request.get("single", False)), condition, float(request.get("hysteresis", 0.0)),
         )  # fmt: skip
     except ConditionError as error:
         raise TriggerError(str(error)) from None
@@ -69,8 +70,10 @@ def parse(request: Any) -> Trigger:
     for signal in trigger.signals:
         if signal not in CYCLE and not column_of(signal):
             raise TriggerError(f"{signal[:80]!r} is not a signal: name one as in /wave.phase")
-    if not np.isfinite([trigger.low, trigger.high]).all():
+    if not np.isfinite([trigger.low, trigger.high, trigger.hysteresis]).all():
         raise TriggerError("the levels of a trigger must be finite")
+    if trigger.hysteresis < 0:
+        raise TriggerError("the hysteresis of a trigger must be at least 0")
     if kind == "window" and not trigger.low < trigger.high:
         raise TriggerError(
             f"window from {trigger.low:g} to {trigger.high:g}: low must be below high"
@@ -88,6 +91,7 @@ class Search:
     def __init__(self, trigger: Trigger) -> None:
         self._trigger = trigger
         self._last = np.nan
+        self._sides = {1.0: 0, -1.0: 0}  # of the level, by slope: see _edges
         self._was_true = True  # a condition hits only after it was false
 
     def hits(self, *columns: NDArray[np.float64]) -> NDArray[np.int64]:
@@ -115,12 +119,25 @@ class Search:
             else:
                 found = inside & ~inside_before & ~np.isnan(before)
         else:
-            rising = (before < low) & (values >= low)
-            falling = (before > low) & (values <= low)
-            found = {"rising": rising, "falling": falling, "either": rising | falling}[
-                trigger.slope
-            ]
+            found = np.zeros(len(values), bool)
+            for sign, slope in ((1.0, "rising"), (-1.0, "falling")):
+                if trigger.slope in (slope, "either"):
+                    found |= self._edges(values, sign)
         return np.flatnonzero(found)
+
+    def _edges(self, values: NDArray[np.float64], sign: float) -> NDArray[np.bool_]:
+        """Return where values rise (sign 1) or fall (-1) to the level, after they were beyond the
+        hysteresis on its other side: a Schmitt trigger. NaN is on no side.
+        """
+        away = sign * (values - self._trigger.low)
+        sides = np.where(away >= 0.0, 1, np.where(away < -self._trigger.hysteresis, -1, 0))
+        sides = np.append(self._sides[sign], np.where(np.isnan(values), 2, sides))
+        # Between level and hysteresis, the side is that of the value before.
+        places = np.maximum.accumulate(np.where(sides != 0, np.arange(len(sides)), 0))
+        held = sides[places]
+        self._sides[sign] = int(held[-1])
+        edges: NDArray[np.bool_] = (held[1:] == 1) & (held[:-1] == -1)
+        return edges
 
     def _becomes_true(
         self, condition: Condition, columns: Sequence[NDArray[np.float64]]

@@ -22,7 +22,7 @@ function paneTaken(pane) {
 
 // The trigger settings of a layout, and their types.
 const TRIGGER = { signal: "string", kind: "string", slope: "string", condition: "string", low: "number", high: "number",
-  window: "number", position: "number", holdoff: "number", single: "boolean" };
+  hysteresis: "number", window: "number", position: "number", holdoff: "number", single: "boolean", auto: "boolean" };
 
 // The panes of a layout, without invalid derived signals; `wrong` gets their errors.
 function panesOf(layout, wrong) {

@@ -235,6 +235,7 @@ async function slow() {
     }
   }
   if (scope.mode === "recording") recordings.loadVisible();
+  triggering.preview();
   for (const pane of scope.panes) pane.update();
   ({ measurements, spectrum, xy, cycles, events }[drawer] ?? { show() {} }).show();
   $("span").textContent = scaled(scope.view.span, "s");

@@ -36,6 +36,8 @@ export class Scope {
     this.onActive = () => {}; // another pane became active
     this.onShift = () => {}; // the second recording has moved
     this.onLayout = () => {}; // a part of the layout has changed
+    this.onLevel = () => {}; // a level of the trigger was dragged: ("low" or "high", value)
+    this.hitAt = 0; // time of the newest shot, ms
     this.dirty = true;
     this.drawn = { end: NaN, time: NaN }; // the live cycles in the previous frame
     this.found = null; // the marks, until something changes
@@ -43,7 +45,8 @@ export class Scope {
     this.addPane();
   }
 
-  get shot() { return this.shots[this.shotNumber]; }
+  // The shown shot, or the newest cycles in its place.
+  get shot() { return this.newest ?? this.shots[this.shotNumber]; }
   get store() { return this.sources()[0]; }
 
   // The stores that are drawn over each other, the main one first.
@@ -205,17 +208,31 @@ export class Scope {
     const hitTime = message.times[message.hit], cycle = message.cycles[message.hit];
     const times = Float64Array.from(message.times, (time) => time - hitTime);
     const store = Store.of({ ...message, times, lost: 0 }, names);
+    this.newest = null;
+    this.hitAt = performance.now();
     this.shots.push({ store, cycle, hitTime, baseNs: String(this.baseNs) });
     if (this.shots.length > SHOTS) this.shots.shift();
     if (this.mode === "trigger") this.showShot(this.shots.length - 1);
   }
 
-  clearShots() { this.shots = []; this.shotNumber = -1; this.changed(); }
+  clearShots() { this.shots = []; this.shotNumber = -1; this.newest = null; this.changed(); }
+
+  // Shows the newest `seconds` of the live cycles in place of a shot, with time 0 after this share.
+  showPreview(seconds, share) {
+    const { live } = this;
+    if (live.empty) return;
+    const begin = live.find(live.lastTime - seconds), hitTime = live.time(begin) + share * seconds;
+    const store = live.part(begin, live.end, hitTime), fresh = !this.shot;
+    this.newest = { store, cycle: live.cycle(live.end - 1), hitTime, baseNs: String(this.baseNs), isPreview: true };
+    if (fresh || this.view.span < 0.5 * seconds || this.view.span > 2 * seconds) this.view.show(-share * seconds, (1 - share) * seconds);
+    this.changed();
+  }
 
   showShot(number) {
     if (number < 0 || number >= this.shots.length) return;
     const fresh = this.shotNumber < 0 || !this.shot;
     const before = this.shot?.store;
+    this.newest = null;
     this.shotNumber = number;
     const { store } = this.shot;
     // A zoom is kept for shots of the same length.

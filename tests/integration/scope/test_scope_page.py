@@ -98,6 +98,63 @@ _SIGNAL = "document.querySelector('#trigger [name=signal]')"
 _SAID = "document.querySelector('#trigger [name=state]').textContent"
 
 
+def test_the_level_of_a_trigger_can_be_dragged(visit: Opener, scope: ScopeProcess) -> None:
+    page = visit(
+        scope,
+        '{"panes":[{"traces":["/w0.wave"],"scale":{"low":-2,"high":2}}],"mode":"trigger",'
+        '"trigger":{"signal":"/w0.wave","kind":"edge","slope":"rising","low":0,"window":100}}',
+    )  # fmt: skip
+    page.wait("scope.rate === 2000 && scope.units.has('/w0.wave')")
+    _press(page, "#trigger [name=arm]")
+    page.wait("scope.shots.length > 0 && document.querySelector('.level .handle')")
+    left, top, width, height = page.ask(
+        "(({ left, top, width, height }) => [left, top, width, height])"
+        "(scope.panes[0].plot.getBoundingClientRect())"
+    )
+    x = left + width / 2
+    ways = [("mousePressed", 0.5), ("mouseMoved", 0.4), ("mouseMoved", 0.375)]
+    for kind, share in [*ways, ("mouseReleased", 0.375)]:
+        page.call("Input.dispatchMouseEvent", type=kind, x=x, y=top + share * height, button="left",
+                  buttons=1, clickCount=1)  # fmt: skip
+    page.wait("scope.trigger.settings.low > 0.4 && scope.trigger.settings.low < 0.6")
+    page.wait("Number(document.querySelector('#trigger [name=low]').value) > 0.4")
+    # The trigger is armed again with the new level; the drag neither panned nor set a cursor.
+    count = page.ask("scope.shots.length")
+    page.wait(f"scope.shots.length > {count}")
+    last = page.ask(
+        "(({ store }) => store.column('/w0.wave').get(store.nearest(0)))(scope.shots.at(-1))"
+    )
+    assert last == pytest.approx(page.ask("scope.trigger.settings.low"), abs=0.01)
+    assert page.ask("scope.cursors.a") is None
+    assert page.errors == []
+
+
+def test_an_automatic_trigger_shows_the_newest_cycles_without_a_hit(
+    visit: Opener, scope: ScopeProcess
+) -> None:
+    page = visit(
+        scope,
+        '{"panes":[{"traces":["/w0.wave"]}],"mode":"trigger","trigger":{"signal":"/w0.wave",'
+        '"kind":"edge","slope":"rising","low":1e9,"window":200,"position":50,"auto":true}}',
+    )
+    page.wait("scope.rate === 2000 && scope.live.end > 1000")
+    _press(page, "#trigger [name=arm]")
+    page.wait("scope.shot?.isPreview")
+    first = page.ask("scope.shot.cycle")
+    page.wait(f"scope.shot.cycle > {first}")
+    assert page.ask(_SAID) == "no hit: the newest cycles"
+    found = page.ask(
+        "[scope.store.end - scope.store.begin, scope.store.firstTime, scope.view.span]"
+    )
+    assert found == [pytest.approx(400, abs=2), pytest.approx(-0.1, abs=2e-3), pytest.approx(0.2)]
+    assert page.ask("scope.shots.length") == 0
+    # A hit takes the place of the newest cycles.
+    page.ask("scope.onLevel('low', 0)")
+    page.wait("scope.shots.length > 0 && !scope.shot.isPreview")
+    assert page.ask(_SAID).startswith("hit at cycle ")
+    assert page.errors == []
+
+
 def test_a_bookmarked_trigger_is_armed_on_its_signal(visit: Opener, scope: ScopeProcess) -> None:
     page = visit(scope, _TRIGGER.format("/w3.wave", 1e9))
     # Before the page has the list of signals, and after.
@@ -290,7 +347,7 @@ def test_a_report_shows_the_panes_and_the_measurements(visit: Opener, scope: Sco
     page.call("Emulation.setEmulatedMedia", media="print")
     shown = """((name) => [...document.querySelectorAll(name)].some((e) => e.offsetHeight > 0))"""
     for name, is_there in (
-        ("#report", True), (".pane canvas", True), (".drawer[data-drawer=measurements] table", True),
+        ("#report", True), (".pane canvas", True), ("[data-drawer=measurements] table", True),
         ("header", False), ("aside", False), ("footer nav", False), (".chip button", False),
     ):  # fmt: skip
         assert page.ask(f"{shown}({name!r})") == is_there, name

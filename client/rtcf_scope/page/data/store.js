@@ -97,6 +97,19 @@ export class Store {
     for (const derivation of this.derivations.values()) derivation.run(at, at + 1);
   }
 
+  // Returns a store with the cycles of the places [begin, end), their times counted from `zero`.
+  part(begin, end, zero) {
+    const count = end - begin, column = (name) => Float64Array.from({ length: count }, (_, i) => this.columns.get(name).get(begin + i));
+    const names = [...this.columns.keys()].filter((name) => name !== LATENCY && name !== DURATION && !this.derivations.has(name));
+    const store = new Store(count + 1);
+    store.push({
+      count, lost: 0, times: Float64Array.from({ length: count }, (_, i) => this.time(begin + i) - zero),
+      cycles: Float64Array.from({ length: count }, (_, i) => this.cycle(begin + i)),
+      latencies: column(LATENCY), durations: column(DURATION), traces: names.map(column),
+    }, names);
+    return store;
+  }
+
   // Removes the columns that no trace needs.
   keep(names) {
     const kept = new Set([LATENCY, DURATION, ...names, ...sources(names)]);

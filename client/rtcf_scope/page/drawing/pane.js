@@ -289,8 +289,8 @@ export class Pane {
     const { trigger: { settings }, mode } = this.scope;
     const sight = drawn.find(({ name }) => name === settings.signal)?.sight;
     if (mode !== "trigger" || !sight || !["edge", "level", "window"].includes(settings.kind)) return [];
-    return (settings.kind === "window" ? [settings.low, settings.high] : [settings.low]).filter((level) => level >= sight.low && level <= sight.high)
-      .map((level) => ({ level, y: Math.round(sight.y(level)) }));
+    return (settings.kind === "window" ? ["low", "high"] : ["low"]).map((name) => ({ name, level: settings[name] }))
+      .filter(({ level }) => level >= sight.low && level <= sight.high).map((each) => ({ ...each, y: Math.round(sight.y(each.level)) }));
   }
 
   #levels() {
@@ -299,14 +299,45 @@ export class Pane {
     const state = JSON.stringify(thresholds);
     if (state === this.levelsState) return;
     this.levelsState = state;
-    this.levels.replaceChildren(...thresholds.map(({ level, y }) => {
+    if (this.levels.querySelector(".held")) return; // it is dragged
+    this.levels.replaceChildren(...thresholds.map(({ name, level, y }) => {
       const line = element("div", "level");
       line.style.top = `${y}px`;
       const text = element("span", "");
       text.textContent = `level ${figure(level)}`;
-      line.append(text);
+      line.append(text, this.#handle(line, name));
       return line;
     }));
+  }
+
+  // A part of a threshold's line that can be dragged.
+  #handle(line, name) {
+    const handle = element("i", "handle"), { scope } = this;
+    handle.title = "drag the level";
+    let value = NaN;
+    handle.addEventListener("pointerdown", (event) => {
+      handle.setPointerCapture(event.pointerId);
+      line.classList.add("held");
+      event.stopPropagation();
+    });
+    handle.addEventListener("pointermove", (event) => {
+      if (!line.classList.contains("held")) return;
+      const sight = this.drawn.find((each) => each.name === scope.trigger.settings.signal)?.sight;
+      if (!sight) return;
+      const y = event.clientY - this.plot.getBoundingClientRect().top;
+      value = Number(Math.min(Math.max(sight.value(y), sight.low), sight.high).toPrecision(4));
+      line.style.top = `${y}px`;
+      line.firstChild.textContent = `level ${figure(value)}`;
+    });
+    for (const end of ["pointerup", "pointercancel"]) handle.addEventListener(end, (event) => {
+      if (!line.classList.contains("held")) return;
+      line.classList.remove("held");
+      this.levelsState = "";
+      event.stopPropagation();
+      if (end === "pointerup" && Number.isFinite(value)) scope.onLevel(name, value);
+      else scope.changed();
+    });
+    return handle;
   }
 
   // Shows the names of the tracks, with the range of tracks of numbers.

@@ -4,6 +4,8 @@ import { figure } from "../drawing/axes.js";
 
 const SLOPES = { edge: ["rising", "falling", "either"], level: ["above", "below"], window: ["leaves", "enters"], nan: [], condition: [] };
 
+const AUTO_MS = 500; // without a hit before the newest cycles are shown
+
 export class TriggerPanel {
   constructor(scope, box, arm) { // arm(settings or null)
     this.scope = scope;
@@ -11,6 +13,11 @@ export class TriggerPanel {
     this.arm = arm;
     this.part = (name) => box.querySelector(`[name=${name}]`);
     for (const input of box.querySelectorAll("select, input")) input.onchange = () => { this.#read(); this.#again(); };
+    scope.onLevel = (level, value) => {
+      scope.trigger.settings[level] = value;
+      this.part(level).value = value;
+      this.#again();
+    };
     this.part("arm").onclick = () => (this.scope.trigger.state === "armed" ? this.disarm() : this.start());
     this.part("earlier").onclick = () => this.scope.showShot(this.scope.shotNumber - 1);
     this.part("later").onclick = () => this.scope.showShot(this.scope.shotNumber + 1);
@@ -21,7 +28,7 @@ export class TriggerPanel {
     const { settings } = this.scope.trigger;
     if (!(settings.kind in SLOPES)) settings.kind = "edge";
     this.#signals();
-    for (const name of ["kind", "low", "high", "single", "window", "position", "holdoff", "condition"]) {
+    for (const name of ["kind", "low", "high", "hysteresis", "single", "auto", "window", "position", "holdoff", "condition"]) {
       const input = this.part(name);
       // Do not change the field in which the user types.
       if (settings[name] === undefined || input === document.activeElement) continue;
@@ -35,6 +42,7 @@ export class TriggerPanel {
     this.part("condition").hidden = settings.kind !== "condition";
     this.part("low").parentElement.hidden = settings.kind === "nan" || settings.kind === "condition";
     this.part("high").parentElement.hidden = settings.kind !== "window";
+    this.part("hysteresis").parentElement.hidden = settings.kind !== "edge";
     this.showState();
   }
 
@@ -63,8 +71,9 @@ export class TriggerPanel {
     const state = this.part("state");
     const armed = trigger.state === "armed";
     state.textContent = armed && trigger.missing.length ? `waiting for ${trigger.missing.join(", ")}: not there`
+      : shot?.isPreview ? "no hit: the newest cycles"
       : shot ? `hit at cycle ${shot.cycle} (${shotNumber + 1} of ${shots.length})` : armed ? "waiting" : "not armed";
-    state.className = shot ? "hit" : trigger.state;
+    state.className = shot && !shot.isPreview ? "hit" : trigger.state;
     this.part("arm").textContent = trigger.state === "armed" ? "Disarm" : "Arm";
     this.part("earlier").disabled = shotNumber <= 0;
     this.part("later").disabled = shotNumber >= shots.length - 1;
@@ -82,6 +91,14 @@ export class TriggerPanel {
 
   disarm() { this.arm(null); }
 
+  // Shows the newest cycles while an armed trigger with `auto` has no hit; called a few times a second.
+  preview() {
+    const { scope } = this, { state, settings } = scope.trigger;
+    if (scope.mode !== "trigger" || state !== "armed" || !settings.auto || performance.now() - scope.hitAt < AUTO_MS) return;
+    scope.showPreview(settings.window / 1e3, settings.position / 100);
+    this.showState();
+  }
+
   #again() {
     this.show();
     if (this.scope.trigger.state === "armed") this.start();
@@ -91,10 +108,11 @@ export class TriggerPanel {
   #read() {
     const { settings } = this.scope.trigger;
     for (const name of ["signal", "kind", "slope", "condition"]) settings[name] = this.part(name).value;
-    for (const name of ["low", "high", "window", "position", "holdoff"]) {
+    for (const name of ["low", "high", "hysteresis", "window", "position", "holdoff"]) {
       const number = Number(this.part(name).value);
       if (isFinite(number)) settings[name] = number;
     }
     settings.single = this.part("single").checked;
+    settings.auto = this.part("auto").checked;
   }
 }

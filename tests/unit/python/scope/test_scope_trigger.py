@@ -19,6 +19,20 @@ def _hits(values: list[float], **told: object) -> list[int]:
         ({"kind": "edge", "low": 1.0, "slope": "falling"}, [2, 1, 0, 2, 0], [1, 4]),
         ({"kind": "edge", "low": 1.0, "slope": "either"}, [0, 2, 0], [1, 2]),
         ({"kind": "edge", "low": 1.0}, [_NAN, 2, 0, 1], [3]),
+        # Noise around the level is one edge, until the signal was beyond the hysteresis again.
+        (
+            {"kind": "edge", "low": 1.0, "hysteresis": 0.5},
+            [0, 1.1, 0.9, 1.1, 0.6, 1.2, 0.5, 1.0, 0.4, 1.0],
+            [1, 9],
+        ),
+        (
+            {"kind": "edge", "low": 1.0, "slope": "falling", "hysteresis": 0.5},
+            [2, 1, 1.4, 0.9, 1.6, 1.2, 1.0],
+            [1, 6],
+        ),
+        ({"kind": "edge", "low": 1.0, "slope": "either", "hysteresis": 1}, [-1, 2, 3, 0.5], [1, 3]),
+        ({"kind": "edge", "low": 1.0, "hysteresis": 0.5}, [0, 0.8, 1.0, _NAN, 1.0], [2]),
+        ({"kind": "edge", "low": 1.0, "hysteresis": 0.5}, [0, _NAN, 1.0], []),
         ({"kind": "level", "low": 1.0}, [0, 1, 2, _NAN, 0], [1, 2]),
         ({"kind": "level", "low": 1.0, "slope": "below"}, [0, 1, 2], [0, 1]),
         ({"kind": "window", "low": -1.0, "high": 1.0}, [0, 2, 3, 0, -2], [1, 4]),
@@ -37,7 +51,7 @@ def test_a_trigger_hits_the_expected_cycles(
 def test_the_hits_do_not_depend_on_the_batches(kind: str) -> None:
     values = np.random.default_rng(12).normal(size=500)
     values[100:103] = np.nan
-    trigger = parse(_BASE | {"kind": kind, "low": 0.5, "high": 1.0})
+    trigger = parse(_BASE | {"kind": kind, "low": 0.5, "high": 1.0, "hysteresis": 0.7})
     whole = Search(trigger).hits(values).tolist()
     assert whole
     for size in (1, 7, 64):
@@ -79,6 +93,8 @@ def test_an_unsupported_slope_is_rejected() -> None:
         ({"after": 0}, "after must be at least 1 cycle"),
         ({"before": -1}, "after must be at least 1 cycle"),
         ({"holdoff": -1}, "after must be at least 1 cycle"),
+        ({"hysteresis": -0.1}, "hysteresis of a trigger must be at least 0"),
+        ({"hysteresis": _NAN}, "levels of a trigger must be finite"),
     ],
 )
 def test_impossible_numbers_are_rejected(told: dict[str, object], said: str) -> None:
