@@ -6,7 +6,7 @@ export const KEYS = [
   ["X", "seconds, time of day or cycle numbers below the panes"], ["V", "values under the pointer, or not"],
   ["/", "search the signals; Enter: the first one"], ["Drag a signal", "into a pane"], ["T", "roll or triggered"], ["D", "dark or light"], ["?", "this list"],
   ["Wheel", "zoom time; with Shift, or at a scale, values"], ["Drag", "pan; a cursor: move it; with Alt: shift the second recording"],
-  ["Drag a bar", "resize panes, list and drawer; double click: as before"],
+  ["Two fingers", "zoom time"], ["Drag a bar", "resize panes, list and drawer; double click: as before"],
   ["Click", "cursor A; with Shift B"], ["Double click", "fit the scale, no cursors"],
 ];
 

@@ -323,6 +323,37 @@ def test_a_signal_can_be_dragged_into_a_pane(visit: Opener, scope: ScopeProcess)
     assert refused is True
 
 
+def test_two_fingers_zoom_time(visit: Opener, scope: ScopeProcess) -> None:
+    page = visit(scope, '{"panes":[{"traces":["/w0.wave"]}],"span":8}')
+    page.wait("scope.live.end > 1000 && scope.panes[0].size.width > 100")
+    page.ask("scope.freeze()")
+    left, top, width, height = page.ask(
+        "(({ left, top, width, height }) => [left, top, width, height])"
+        "(scope.panes[0].plot.getBoundingClientRect())"
+    )
+    y, middle = top + height / 2, left + width / 2
+    at_middle = (
+        f"scope.panes[0].timeAt({middle} - scope.panes[0].face.getBoundingClientRect().left)"
+    )
+    still = page.ask(at_middle)
+
+    def touch(kind: str, half: float | None) -> None:
+        points = [] if half is None else [
+            {"x": middle - half, "y": y, "id": 1}, {"x": middle + half, "y": y, "id": 2}
+        ]  # fmt: skip
+        page.call("Input.dispatchTouchEvent", type=kind, touchPoints=points)
+
+    touch("touchStart", 40)
+    for half in (50, 60, 70, 80):
+        touch("touchMove", half)
+    touch("touchEnd", None)
+    assert page.ask("scope.view.span") == pytest.approx(4.0, rel=0.02)
+    now = page.ask(at_middle)
+    assert now == pytest.approx(still, abs=0.05)
+    assert page.ask("scope.cursors.a") is None
+    assert page.errors == []
+
+
 def test_the_time_axis_is_below_the_last_pane_only(visit: Opener, scope: ScopeProcess) -> None:
     page = visit(scope, '{"panes":[{"traces":["/w0.wave"]},{"traces":["/w1.wave"]}]}')
     page.wait("scope.panes.length === 2")

@@ -1,5 +1,5 @@
 // The mouse on a pane: the wheel zooms, dragging pans, a click sets a cursor, and the values at the
-// pointer are shown.
+// pointer are shown. Two fingers zoom.
 import { LEFT, TOP } from "./values.js";
 
 const DRAG = 4; // pixels; a longer movement is a drag, not a click
@@ -7,6 +7,15 @@ const DRAG = 4; // pixels; a longer movement is a drag, not a click
 export function bindPointer(pane, scope) {
   const { face } = pane;
   let held = null;
+  const fingers = new Map(); // by id: place, CSS pixels
+  const apart = () => { const [one, other] = [...fingers.values()]; return Math.max(Math.abs(one - other), 1); };
+  const pinch = (event) => {
+    const before = apart();
+    fingers.set(event.pointerId, place(event).x);
+    const [one, other] = [...fingers.values()];
+    scope.view.zoom(before / apart(), pane.timeAt((one + other) / 2));
+    scope.changed();
+  };
   const place = ({ clientX, clientY }) => {
     const { left, top } = face.getBoundingClientRect();
     return { x: clientX - left, y: clientY - top };
@@ -27,6 +36,8 @@ export function bindPointer(pane, scope) {
   face.addEventListener("pointerdown", (event) => {
     if (event.button !== 0 || event.target.closest("button")) return;
     face.setPointerCapture(event.pointerId);
+    if (event.pointerType === "touch") fingers.set(event.pointerId, place(event).x);
+    if (fingers.size > 1) { held = null; return; }
     scope.activate(pane);
     const { x, y } = place(event);
     const near = (time) => time !== null && Math.abs(pane.timeAt(x) - time) < scope.view.span / pane.area.width * 6;
@@ -36,6 +47,7 @@ export function bindPointer(pane, scope) {
       scales: pane.scalesAt(x).filter(({ scale }) => scale.set).map((each) => ({ ...each, set: each.scale.set })) };
   });
   face.addEventListener("pointermove", (event) => {
+    if (fingers.size === 2 && fingers.has(event.pointerId)) { pinch(event); return; }
     const { x, y } = place(event);
     if (event.pointerType === "mouse") {
       if (isBeside(x)) scope.pointAt(null); else scope.pointAt(pane, x - LEFT, y - TOP);
@@ -61,6 +73,7 @@ export function bindPointer(pane, scope) {
     held = null;
   });
   face.addEventListener("pointercancel", () => { held = null; });
+  for (const end of ["pointerup", "pointercancel"]) face.addEventListener(end, ({ pointerId }) => fingers.delete(pointerId));
   face.addEventListener("pointerleave", () => scope.pointAt(null));
   face.addEventListener("dblclick", (event) => {
     if (event.target.closest("button")) return;
