@@ -33,6 +33,11 @@ def time(nanoseconds: int) -> Any:
     return _module("genpy", "python3-genpy").Time(0, nanoseconds)
 
 
+def require() -> None:
+    """Raise RecordingError if md5_of needs a package that is not installed."""
+    _module("genmsg", "python3-genmsg")
+
+
 def md5_of(name: str, definition: str) -> str:
     """Return the MD5 sum of a type by its full definition, which includes its field types.
 

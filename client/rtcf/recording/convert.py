@@ -13,6 +13,7 @@ from rtcf_shared.mcap_writer import McapWriter
 from rtcf_shared.whole_files import whole_file
 
 from rtcf.recording import bags
+from rtcf.recording.bag_writer import BagWriter, Messages
 from rtcf.recording.reader import RecordedColumn, RecordedTopic, Recording, RecordingError
 
 if TYPE_CHECKING:
@@ -38,13 +39,13 @@ def convert(
     if to.exists() and to.samefile(recording.path):
         raise ValueError(f"{to} is the recording itself: write to another file")
     if write is _write_bag:
-        bags.rosbag()  # raises before the file is created
+        bags.require()  # raises before the file is created
     with _new_file(to, force) as file:
         written = 0
-        for count in write(recording, file):
+        for chunk, count in enumerate(write(recording, file), 1):
             written += count
             if on_progress is not None:
-                on_progress(f"{to}: {written}")
+                on_progress(f"{to}: {100 * chunk // recording.chunks} %")
         return written
 
 
@@ -137,28 +138,23 @@ def _shown(values: "NDArray[Any]") -> list[Any]:
 def _write_bag(recording: Recording, file: BinaryIO) -> Iterator[int]:
     """Write the messages of each output and state."""
     topics: dict[str, tuple[str, ...]] = {}
-    types: dict[int, tuple[str, bags.MessageType]] = {}
-    bag = bags.rosbag().Bag(file, "w")
-    try:
-        for chunk in range(recording.chunks):
-            last_ns, stamp = -1, None
-            messages = recording.messages(chunk)
-            for topic, time_ns, data in messages:
-                if topic.number not in types:
-                    types[topic.number] = _named(topic, topics)
-                if time_ns != last_ns:
-                    last_ns, stamp = time_ns, bags.time(time_ns)
-                name, kind = types[topic.number]
-                bag.write(name, kind.raw(data), stamp, raw=True)
-            yield len(messages)
-    finally:
-        bag.close()
+    connections: dict[int, int] = {}  # by number of the topic
+    bag = BagWriter(file)
+    for chunk in range(recording.chunks):
+        found = []
+        for topic, stamps_ns, data in recording.runs(chunk):
+            if topic.number not in connections:
+                connections[topic.number] = bag.connection(*_named(topic, topics))
+            found.append(Messages(connections[topic.number], stamps_ns, data))
+        bag.chunk(found)
+        yield sum(len(each.stamps_ns) for each in found)
+    bag.close()
 
 
-def _named(
-    topic: RecordedTopic, topics: dict[str, tuple[str, ...]]
-) -> tuple[str, bags.MessageType]:
-    """Return name and type of a topic; names are made unique, as a bag has one type per name."""
+def _named(topic: RecordedTopic, topics: dict[str, tuple[str, ...]]) -> tuple[str, str, str, str]:
+    """Return name, type, MD5 sum and definition of a topic; names are made unique, as a bag has one
+    type per name.
+    """
     md5 = bags.md5_of(topic.ros_type, topic.definition)
     kind = topic.metadata.get("kind", "other")
     own = topic.ros_type, md5, kind
@@ -166,7 +162,7 @@ def _named(
     while topics.setdefault(name, own) != own:
         name = f"{topic.name}/{kind}" if number == 1 else f"{topic.name}/{kind}_{number}"
         number += 1
-    return name, bags.MessageType(topic.ros_type, md5, topic.definition)
+    return name, topic.ros_type, md5, topic.definition
 
 
 _KINDS = {".csv": _write_csv, ".bag": _write_bag}

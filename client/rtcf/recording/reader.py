@@ -276,6 +276,21 @@ class Recording(Closing):
         with self._whole_only():
             return dict(zip(_CYCLE, self._read(leaves, begin_ns, end_ns, chunk), strict=True))
 
+    def runs(
+        self, chunk: int
+    ) -> "list[tuple[RecordedTopic, NDArray[np.int64], NDArray[np.uint8]]]":
+        """Return the messages of a chunk by topic and size: stamps (ns), and the serialised ROS 1
+        messages, of shape (messages, bytes of a message), as views of the chunk.
+        """
+        with self._whole_only():
+            records = self._records(chunk)
+            return [
+                (self._channels[channel], records.field(run, 15, "<i8"),
+                 records.field(run, mcap.MESSAGE_HEAD, "u1", run.size - mcap.MESSAGE_HEAD))
+                for channel, runs in records.runs.items()
+                for run in runs
+            ]  # fmt: skip
+
     def messages(self, chunk: int) -> list[tuple[RecordedTopic, int, bytes]]:
         """Return topic, stamp (ns) and serialised ROS 1 message of a chunk's messages, by stamp."""
         found: list[tuple[int, int, int, RecordedTopic]] = []

@@ -200,15 +200,15 @@ def test_a_recording_of_another_program_has_no_cycles(running: Daemon, tmp_path:
     assert not (tmp_path / "x.csv").exists()
 
 
-def test_without_rosbag_the_package_to_install_is_named(
+def test_without_genmsg_the_package_to_install_is_named(
     recorded: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     modules: Any = sys.modules
-    monkeypatch.setitem(modules, "rosbag", None)
+    monkeypatch.setitem(modules, "genmsg", None)
     with (
         rtcf.read_recording(recorded) as recording,
         pytest.raises(
-            rtcf.RecordingError, match="bags need rosbag: sudo apt install python3-rosbag"
+            rtcf.RecordingError, match="bags need genmsg: sudo apt install python3-genmsg"
         ),
     ):
         convert(recording, recorded.with_suffix(".bag"))
