@@ -7,6 +7,7 @@ from typing import Any
 import rtcf
 from rtcf.recording.convert import convert, repair
 
+from rtcfctl.terminal.interruption import interrupted_by_termination
 from rtcfctl.terminal.output import Output
 from rtcfctl.terminal.words import counted
 
@@ -32,7 +33,7 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
 def run(_: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Convert one file."""
     damaged = 0
-    with rtcf.read_recording(args.recording) as recording:
+    with interrupted_by_termination(), rtcf.read_recording(args.recording) as recording:
         if args.repair:
             written, damaged = repair(recording, args.to, force=args.force)
         else:

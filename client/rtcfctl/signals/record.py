@@ -79,6 +79,12 @@ def register(verbs: Any, common: argparse.ArgumentParser) -> None:
 def run(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     """Record until Ctrl-C, for a time, to a size, or around a trigger."""
     moment = _checked(args)
+    if args.file.suffix in (".bag", ".csv"):
+        mcap = args.file.with_suffix(".mcap")
+        raise ValueError(
+            f"{args.file}: recordings are MCAP files: rtcfctl record -o {mcap}, then "
+            f"rtcfctl convert {mcap} {args.file}"
+        )
     selection = list(args.selection)
     if moment is not None and selection:
         selection += moment.condition.columns

@@ -1,7 +1,10 @@
 """`rtcfctl convert`: recordings in other programs' formats, with each value of each cycle."""
 
 import csv
+import io
 import os
+import signal
+import subprocess
 import sys
 from pathlib import Path
 from typing import Any
@@ -9,9 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 import rosbag
+import rospy
 import rtcf
 import std_msgs.msg
-from daemon_process import Daemon
+from daemon_process import BUILD_TREE, DEADLINE_S, Daemon, wait_for
 from rtcf.recording.bags import md5_of
 from rtcf.recording.convert import convert
 from rtcf.v1 import ports_pb2
@@ -100,6 +104,68 @@ def test_missing_values_are_empty_cells_and_array_elements_have_columns(
         "7,1000000010000000000,0,0,0.1,1e+30,9223372036854775809",
         "8,1000000010001000000,0,0,nan,-inf,0",
     ]
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+def test_a_conversion_that_is_ended_leaves_no_file(tmp_path: Path, number: signal.Signals) -> None:
+    values = np.random.default_rng(1).normal(size=(4000, 512))
+    with (tmp_path / "run.mcap").open("xb") as out:
+        writer = McapWriter(out)
+        recorder = Recorder(writer, "rt_runner")
+        for place in range(0, len(values), 500):
+            part = values[place : place + 500]
+            recorder.add(_batch(place + 1, 10**18 + place * 10**6, x=("double[512]", part)))
+            recorder.flush()
+        writer.close()
+    process = subprocess.Popen(
+        [BUILD_TREE / "bin" / "rtcfctl", "convert", tmp_path / "run.mcap", tmp_path / "run.csv"],
+        stderr=subprocess.PIPE,
+    )
+    wait_for(lambda: len(list(tmp_path.iterdir())) == 2, "a part of the file")
+    process.send_signal(number)
+    _, said = process.communicate(timeout=DEADLINE_S)
+    assert process.returncode not in (0, 1, 2)
+    assert b"Traceback" not in said
+    assert [each.name for each in tmp_path.iterdir()] == ["run.mcap"]
+
+
+def test_a_bag_of_changing_sizes_is_read_by_rosbag(tmp_path: Path) -> None:
+    """The messages of a topic have several sizes, in several chunks; others begin later."""
+    file, draw = tmp_path / "run.mcap", np.random.default_rng(2)
+    wanted: dict[str, list[tuple[int, list[float]]]] = {"/a": [], "/b": []}
+    with file.open("xb") as out:
+        writer = McapWriter(out)
+        definition = std_msgs.msg.Float64MultiArray._full_text
+        channels: dict[str, int] = {}
+        for number in range(5):
+            columns = []
+            for name in wanted if number > 1 else ("/a",):
+                if name not in channels:
+                    kind = {"component": name, "name": "x", "kind": "output"}
+                    channels[name] = writer.channel(
+                        name, "std_msgs/Float64MultiArray", definition, kind
+                    )
+                for size in (3, 1) if name == "/a" else (2,):
+                    stamp = 10**18 + number * 10**9 + size * 10**6
+                    message = std_msgs.msg.Float64MultiArray(data=draw.normal(size=size).tolist())
+                    stream = io.BytesIO()
+                    message.serialize(stream)
+                    data = np.frombuffer(stream.getvalue(), "u1").reshape(1, -1)
+                    stamps = np.array([stamp])
+                    columns.append(Column(channels[name], np.array([number]), stamps, data))
+                    wanted[name].append((stamp, message.data))
+            writer.chunk(columns)
+        writer.close()
+    with rtcf.read_recording(file) as recording:
+        assert convert(recording, tmp_path / "run.bag") == sum(map(len, wanted.values()))
+    with rosbag.Bag(str(tmp_path / "run.bag")) as bag:
+        for name, values in wanted.items():
+            found = [(time.to_nsec(), list(each.data)) for _, each, time in bag.read_messages(name)]
+            assert found == sorted(values)
+        times = [time.to_nsec() for _, _, time in bag.read_messages()]
+        assert times == sorted(times)
+        later = rospy.Time(10**9 + 3)
+        assert min(t for _, _, t in bag.read_messages(start_time=later)) >= later
 
 
 def test_a_bag_has_the_messages_with_their_stamps(running: Daemon, recorded: Path) -> None:

@@ -228,6 +228,12 @@ def test_errors_touch_no_file(running: Daemon, tmp_path: Path) -> None:
     assert "No such file or directory" in done.stderr
     done = running.ctl("record", "-o", str(file), "--duration", "0")
     assert done.returncode == 2
+    bag = tmp_path / "run.bag"
+    done = running.ctl("record", "-o", str(bag))
+    assert done.returncode == 2
+    assert "recordings are MCAP files" in done.stderr
+    assert f"rtcfctl convert {bag.with_suffix('.mcap')} {bag}" in done.stderr
+    assert not bag.exists()
 
 
 @pytest.fixture
