@@ -279,7 +279,7 @@ export class Scope {
     const shift = this.mode === "trigger" ? this.shot?.hitTime ?? 0 : 0;
     const found = this.heard.filter((event) => !isForInformation(event)).map((event) => ({
       time: this.timeOf(event) - shift,
-      ink: isBad(event) && !isOverrun(event) ? "bad" : "change", label: labelOf(event), title: titleOf(event), event,
+      ink: isOverrun(event) ? "late" : isBad(event) ? "bad" : "change", label: labelOf(event), title: titleOf(event), event,
     }));
     if (this.mode === "trigger" && this.shot) found.push({ time: 0, ink: "hit", label: "trigger" });
     return found.sort((one, other) => one.time - other.time);

@@ -357,7 +357,7 @@ def test_a_periodic_signal_has_no_settling_time(visit: Opener) -> None:
 
 
 def test_events_are_lines_with_a_label_in_the_top_pane(visit: Opener, loop: Daemon) -> None:
-    page = visit('{"panes":[{"traces":["/ragged.spikes"]},{"traces":["/ragged.holes"]}],"span":20}')
+    page = visit('{"panes":[{"traces":["/ragged.spikes"]},{"traces":["/ragged.holes"]}],"span":5}')
     page.wait("scope.rate && !scope.live.empty && scope.panes.length === 2")
     with rtcf.Client(loop.socket) as client:
         client.set_parameters("ragged", [spec.parse_parameter("seed:=2")])
