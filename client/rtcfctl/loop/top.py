@@ -15,7 +15,7 @@ from rtcf.v1 import runner_pb2
 
 from rtcfctl.loop.status import STYLES
 from rtcfctl.terminal.drawings import spark
-from rtcfctl.terminal.output import Output, coloured, styled
+from rtcfctl.terminal.output import Output, coloured, is_screen, styled
 from rtcfctl.terminal.plain import enumerator
 from rtcfctl.terminal.screen import Screen
 from rtcfctl.terminal.words import amount, counted, microseconds
@@ -75,7 +75,7 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
     top = _Top(client, args.runner or "rt_runner", args.sort)
     top.look()  # report an error before the screen changes
     try:
-        if output.for_people and sys.stdout.isatty():
+        if output.for_people and is_screen():
             with Screen() as screen:
                 _run(top, screen, args)
         else:

@@ -14,8 +14,8 @@ from rtcf.streams.ports import PortStream
 from rtcf_shared.ports import PortBatch
 
 from rtcfctl.signals.idle_loop import say_if_idle
-from rtcfctl.terminal.drawings import Curves
-from rtcfctl.terminal.output import Output, coloured, styled
+from rtcfctl.terminal.drawings import MARKS, Curves, is_ascii
+from rtcfctl.terminal.output import Output, coloured, is_screen, styled
 from rtcfctl.terminal.screen import Screen
 from rtcfctl.terminal.words import amount, figure
 
@@ -102,7 +102,7 @@ class _Plot:
         if self.left_out:
             head.append(f"{self.left_out} more signals not shown: select fewer by NAME")
         room = max(height - len(head) - 1, 2)
-        curves = Curves(width - _LABEL, room, low, high)
+        curves = Curves(width - _LABEL, room, low, high, marked=_is_marked(names))
         dots = curves.columns
         for number, name in enumerate(names):
             last: tuple[float, float] | None = None
@@ -148,7 +148,7 @@ def show(client: rtcf.Client, args: argparse.Namespace, output: Output) -> None:
         reader = threading.Thread(target=_read, args=(stream, plot), daemon=True)
         reader.start()
         try:
-            if args.once or not sys.stdout.isatty():
+            if args.once or not is_screen():
                 while not plot.is_full() and not plot.over:
                     time.sleep(_LOOK_S)
                 print("\n".join(plot.lines(_WIDTH, _HEIGHT)))
@@ -180,7 +180,8 @@ def _legend(names: list[str], newest: _Window, width: int) -> list[str]:
     for number, name in enumerate(names):
         least, most = newest.ends.get(name, (math.nan, math.nan))
         value = figure(most) if least == most else f"{figure(least)} to {figure(most)}"
-        text = f"⣿ {name} {value}"
+        mark = MARKS[number % len(MARKS)] if _is_marked(names) else "⣿"
+        text = f"{mark} {name} {value}"
         text = text if len(text) < width else f"{text[: width - 1]}…"
         if used and used + len(text) + 2 > width:
             lines.append("")
@@ -188,6 +189,11 @@ def _legend(names: list[str], newest: _Window, width: int) -> list[str]:
         lines[-1] += ("  " if used else "") + _coloured(text, number)
         used += len(text) + 2
     return lines
+
+
+def _is_marked(names: list[str]) -> bool:
+    """Return whether curves differ by their characters, not by their colours."""
+    return is_ascii() or (len(names) > 1 and not coloured(sys.stdout))
 
 
 def _coloured(text: str, owner: int) -> str:

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import sys
 from collections.abc import Mapping, Sequence
 
 _BLOCKS = "▁▂▃▄▅▆▇█"
@@ -9,31 +10,48 @@ _PARTS = " ▏▎▍▌▋▊▉"  # parts of a block, in eighths of its width
 # Bits of a braille character's 2 by 4 dots, by column and row.
 _DOTS = ((0x01, 0x02, 0x04, 0x40), (0x08, 0x10, 0x20, 0x80))
 _BLANK = 0x2800
+_ASCII_BLOCKS, _ASCII_BAR = ".:-=+*%#", "#"
+# Of curves that have no colour, or in ASCII.
+MARKS = "*+xo#@%&=~"
+
+
+def is_ascii() -> bool:
+    """Return whether standard output shows ASCII only."""
+    return bool(getattr(sys.stdout, "ascii", False))
 
 
 def spark(values: Sequence[float], width: int) -> str:
     """Return the last values as blocks, scaled from 0 to the largest; NaN is a space."""
     shown = list(values)[-width:] if width > 0 else []
     most = max((each for each in shown if math.isfinite(each)), default=0.0)
+    blocks = _ASCII_BLOCKS if is_ascii() else _BLOCKS
 
     def block(value: float) -> str:
         if not math.isfinite(value):
             return " "
-        return _BLOCKS[round(max(value, 0.0) / most * (len(_BLOCKS) - 1)) if most > 0 else 0]
+        return blocks[round(max(value, 0.0) / most * (len(blocks) - 1)) if most > 0 else 0]
 
     return "".join(block(each) for each in shown)
 
 
 def bar(share: float, width: int) -> str:
     """Return a bar whose length is a share, 0 to 1, of `width` characters."""
+    if is_ascii():
+        return _ASCII_BAR * round(min(max(share, 0.0), 1.0) * width)
     eighths = round(min(max(share, 0.0), 1.0) * width * 8)
     return (_BLOCKS[-1] * (eighths // 8) + _PARTS[eighths % 8]).rstrip()
 
 
 class Curves:
-    """A field of braille dots for several curves: each character has 2 by 4 dots."""
+    """A field of braille dots for several curves: each character has 2 by 4 dots.
 
-    def __init__(self, width: int, height: int, low: float, high: float) -> None:
+    marked  whether each curve has a character of its own instead, as where there are no colours
+    """
+
+    def __init__(
+        self, width: int, height: int, low: float, high: float, *, marked: bool = False
+    ) -> None:
+        self._marked = marked
         self._width, self._height = width, height
         self._low, self._high = low, high
         self._dots: dict[tuple[int, int], int] = {}
@@ -63,6 +81,8 @@ class Curves:
                 dots = self._dots.get((x, line), 0)
                 owner = self._owner.get((x, line), -1)
                 character = chr(_BLANK + dots) if dots else " "
+                if dots and self._marked:
+                    character = MARKS[owner % len(MARKS)]
                 if runs and runs[-1][1] == owner:
                     runs[-1] = (runs[-1][0] + character, owner)
                 else:
@@ -96,7 +116,7 @@ def drawn(
     """
     finite = [float(value) for curve in curves for value in curve if math.isfinite(value)]
     low, high = min(finite, default=0.0), max(finite, default=0.0)
-    field = Curves(width, height, low, high)
+    field = Curves(width, height, low, high, marked=is_ascii())
     for owner, curve in enumerate(curves):
         last: float | None = None
         for x, part in enumerate(_parts(curve, field.columns)):

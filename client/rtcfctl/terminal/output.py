@@ -13,7 +13,7 @@ from rtcf.v1 import control_pb2
 from rtcf_shared.errors import RtcfError
 
 from rtcfctl.terminal.plain import number, plain
-from rtcfctl.terminal.safe_streams import control
+from rtcfctl.terminal.safe_streams import SafeStream, control, wants_ascii
 from rtcfctl.terminal.table import Cell, format_table
 
 _PATIENCE_S = 10.0  # time from the start until progress is printed without --verbose
@@ -26,6 +26,10 @@ class Output:
 
     def __init__(self, kind: str, verbose: bool = False) -> None:
         self._kind = kind
+        if self.for_people and wants_ascii():
+            for each in (sys.stdout, sys.stderr):
+                if isinstance(each, SafeStream):
+                    each.ascii = True
         self._verbose = verbose or sys.stderr.isatty()
         self._since = time.monotonic()
 
@@ -103,7 +107,7 @@ class Output:
         if not self.for_people:
             if self._kind == "yaml":
                 print("---")
-        elif sys.stdout.isatty():
+        elif is_screen():
             print(control("\x1b[2J\x1b[H"), end="")
 
     def progress(self, line: str) -> None:
@@ -150,6 +154,11 @@ def _width() -> int | None:
         return max(os.get_terminal_size(sys.stdout.fileno()).columns, 40)
     except OSError:
         return 80
+
+
+def is_screen() -> bool:
+    """Return whether standard output is a terminal that can be cleared and drawn again."""
+    return sys.stdout.isatty() and os.environ.get("TERM") != "dumb"
 
 
 def coloured(stream: TextIO) -> bool:

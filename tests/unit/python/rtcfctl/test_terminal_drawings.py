@@ -1,10 +1,14 @@
 """Numbers drawn with characters."""
 
 import math
+import sys
+from unittest import mock
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from rtcfctl.terminal.drawings import Curves, drawn, spark
+from rtcfctl.terminal.drawings import Curves, bar, drawn, spark
+from rtcfctl.terminal.safe_streams import in_ascii
 
 
 def test_a_row_of_blocks_begins_at_zero() -> None:
@@ -13,6 +17,32 @@ def test_a_row_of_blocks_begins_at_zero() -> None:
     assert spark([0, 0], 5) == "▁▁"
     assert spark([1, math.nan, 1], 5) == "█ █"
     assert spark([], 5) == ""
+
+
+def test_drawings_in_ascii(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdout", mock.Mock(ascii=True))
+    assert spark([0, 1, 7], 10) == ".:#"
+    assert bar(0.5, 10) == "#####"
+    lines = drawn("two curves", [[0.0, 0.0], [1.0, 1.0]], {1.0: "end"}, width=8, height=4)
+    assert "".join(lines).isascii() and "*" in "".join(lines) and "+" in "".join(lines)
+
+
+def test_marked_curves_differ_by_their_characters() -> None:
+    curves = Curves(2, 2, -1.0, 1.0, marked=True)
+    curves.column(0, -1.0, -1.0, 0)
+    curves.column(3, 1.0, 1.0, 1)
+    assert curves.lines() == [[(" ", -1), ("+", 1)], [("*", 0), (" ", -1)]]
+
+
+@given(st.text())
+def test_any_text_has_a_form_in_ascii(text: str) -> None:
+    assert in_ascii(text).isascii()
+    if text.isascii():
+        assert in_ascii(text) == text
+
+
+def test_ascii_keeps_what_a_text_says() -> None:
+    assert in_ascii("30 µs … 5 °, x → y, ┌─┐│") == "30 us ~ 5  deg, x > y, +-+|"
 
 
 def test_the_corners_of_a_plot_are_its_ends() -> None:
