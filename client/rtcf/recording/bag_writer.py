@@ -81,6 +81,8 @@ class BagWriter:
         counts = b""
         for connection, found in entries.items():
             together = np.concatenate(found)
+            if len(found) > 1:  # readers search for times
+                together = together[np.lexsort((together[:, 1], together[:, 0]))]
             number, count = _U4.pack(connection), _U4.pack(len(together))
             head = _header(op=bytes([_INDEX]), ver=_U4.pack(1), conn=number, count=count)
             self._file.write(_record(head, together.tobytes()))

@@ -106,7 +106,7 @@ def test_the_level_of_a_trigger_can_be_dragged(visit: Opener, scope: ScopeProces
     )  # fmt: skip
     page.wait("scope.rate === 2000 && scope.units.has('/w0.wave')")
     _press(page, "#trigger [name=arm]")
-    page.wait("scope.shots.length > 0 && document.querySelector('.level .handle')")
+    page.wait("scope.shots.length > 0 && document.querySelectorAll('.handle').length === 1")
     left, top, width, height = page.ask(
         "(({ left, top, width, height }) => [left, top, width, height])"
         "(scope.panes[0].plot.getBoundingClientRect())"

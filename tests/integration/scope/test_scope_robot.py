@@ -117,17 +117,17 @@ def test_a_page_opens_with_the_traces_and_the_space_that_the_robots_package_name
         assert page.ask(unfolded) == ["cycles"]
         # The camera sees the robot, the table and the block during a whole tour.
         outside = """(() => {
-          const { Box3, Vector3 } = robot.three, box = new Box3(), found = [];
+          const { Box3, Vector3 } = robot.three, found = [];
           robot.scene.updateMatrixWorld(true);
-          for (const { solids } of robot.links.values())
-            for (const solid of solids) box.expandByObject(solid);
-          for (const { group } of robot.bodies) box.expandByObject(group);
-          const { min, max } = box;
-          for (const x of [min.x, max.x]) for (const y of [min.y, max.y])
-            for (const z of [min.z, max.z]) {
-              const at = new Vector3(x, y, z).project(robot.camera);
-              if (Math.abs(at.x) > 1 || Math.abs(at.y) > 1) found.push([x, y, z]);
-            }
+          const solids = [...robot.links.values()].flatMap((link) => link.solids);
+          for (const object of [...solids, ...robot.bodies.map(({ group }) => group)]) {
+            const { min, max } = new Box3().setFromObject(object);
+            for (const x of [min.x, max.x]) for (const y of [min.y, max.y])
+              for (const z of [min.z, max.z]) {
+                const at = new Vector3(x, y, z).project(robot.camera);
+                if (Math.abs(at.x) > 1 || Math.abs(at.y) > 1) found.push([x, y, z]);
+              }
+          }
           return found;
         })()"""
         assert page.ask("robot.bodies.map(({ group }) => group.visible)") == [True, True]

@@ -56,7 +56,7 @@ def test_programs_get_all_characters_in_any_locale(running: Daemon) -> None:
 def test_curves_without_colours_differ_by_their_characters(running: Daemon) -> None:
     plain = _shown(running, SHOWING[1])
     legend, *rows = plain.split("\n")
-    assert "* /wave.phase" in legend and "+ /wave.wave" in legend
+    assert "* /wave.wave" in legend and "+ /wave.phase" in legend
     drawn = "".join(rows)
     assert "*" in drawn and "+" in drawn
 
