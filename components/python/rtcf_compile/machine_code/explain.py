@@ -1,12 +1,14 @@
 """Translates numba's errors into one line: place, error and remedy, without terms of numba."""
 
 import re
+from os.path import abspath, dirname
 from types import FunctionType
 from typing import Any
 
 from rtcf_compile.rewriting import helpers, numpy_functions
 from rtcf_compile.source.mistake import Mistake, source_line
 
+_PACKAGE = f"{dirname(dirname(abspath(__file__)))}/"
 _MARK = re.compile(r"RTCF:([^:\n]+):([^\n]+?)(?:\x1b|\n|$)")
 # numba has no implementation of a function for these types.
 _NONE_FOR = re.compile(
@@ -80,7 +82,7 @@ _KNOWN: tuple[tuple[str, str, str], ...] = (
     (
         r"Unknown attribute '(\w+)' of type Object<(\w+)>",
         "the class of the object with this {0} is not known",
-        "annotate the variable with its class: x: {1} = …",
+        "annotate the variable with its class",
     ),
     (
         r"Unknown attribute '(\w+)' of type ([^\n]*)",
@@ -142,11 +144,16 @@ def mistake(error: Any, function: FunctionType) -> Mistake:
     file = function.__code__.co_filename
     # numba gives the path of a file as it is, or relative to the working directory.
     name = re.escape(file.rpartition("/")[2])
-    place = re.compile(rf'File "(?:[^"]*/)?{name}", line (\d+)')
+    # A file of this package may have the same name.
+    places = re.compile(rf'File "((?:[^"]*/)?{name})", line (\d+)')
+
+    def lines_in(text: str) -> list[int]:
+        return [int(line) for path, line in places.findall(text) if _PACKAGE not in abspath(path)]
+
     # Returns of several types are named in the order of a set: the last in the source is reported.
     returns = text.partition("Can't unify return type")[2].partition("During:")[0]
-    lines = sorted(map(int, place.findall(returns)), reverse=True)
-    lines = lines or [int(each) for each in place.findall(text)]
+    lines = sorted(lines_in(returns), reverse=True)
+    lines = lines or lines_in(text)
     known = getattr(error, "loc", None)
     line = lines[0] if lines else getattr(known, "line", function.__code__.co_firstlineno)
     return Mistake(file, line, *_said(text, source_line(file, line)))

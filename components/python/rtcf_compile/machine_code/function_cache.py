@@ -28,7 +28,7 @@ from rtcf_compile.machine_code.cache import Cache
 from rtcf_compile.machine_code.object_types import is_object, object_type
 from rtcf_compile.rewriting.functions import WRITTEN_CODE
 from rtcf_compile.rewriting.logs import Logs
-from rtcf_compile.source.objects import marker_of
+from rtcf_compile.source.objects import meaning_of
 from rtcf_compile.source.records import NAMED
 
 _compile = Dispatcher.compile
@@ -288,7 +288,7 @@ def _encoded(kind: Any) -> list[Any]:
     if cls in (types.Tuple, types.UniTuple):
         return ["tuple", [_encoded(each) for each in kind.types]]
     if is_object(kind):
-        return ["object", marker_of(kind.record), [_encoded(each) for each in kind.types]]
+        return ["object", meaning_of(kind.record, ""), [_encoded(each) for each in kind.types]]
     if cls is types.Optional:
         return ["optional", _encoded(kind.type)]
     if cls is types.SliceType:
@@ -306,7 +306,7 @@ def _decoded(form: list[Any]) -> Any:
     if kind == "tuple":
         return types.Tuple([_decoded(each) for each in parts[0]])
     if kind == "object":
-        return object_type(NAMED[parts[0]], [_decoded(each) for each in parts[1]])
+        return object_type(NAMED[parts[0]].record, [_decoded(each) for each in parts[1]])
     if kind == "optional":
         return types.Optional(_decoded(parts[0]))
     return types.slice2_type if parts[0] == 2 else types.slice3_type

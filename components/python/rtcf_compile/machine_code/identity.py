@@ -31,7 +31,7 @@ from numba.extending import _Intrinsic
 import rtcf_compile
 from rtcf_compile.machine_code.object_types import MarkerType, UnknownType, is_object
 from rtcf_compile.rewriting.functions import HELPERS, INT_BOUNDS, WRITTEN_NAME
-from rtcf_compile.source.records import Meaning, Object, Record, Unknown
+from rtcf_compile.source.records import Arranged, Meaning, Object, Unknown
 
 _PLAIN = (type(None), bool, int, str, bytes, type(...))
 _FOLDERS = tuple(
@@ -181,8 +181,8 @@ class Descriptions:
             return "complex", struct.pack(">dd", value.real, value.imag)
         if isinstance(value, types.Type):
             return self.type(value)
-        if cls is Record:
-            return "class", value.description()
+        if cls is Arranged:
+            return "class", value.record.description(), value.places
         if cls is Meaning:
             return "attribute", value.record.description(), value.attribute
         if cls is Object:

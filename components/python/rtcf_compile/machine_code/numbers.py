@@ -58,7 +58,13 @@ _MEETING: dict[Callable[..., Any], tuple[Callable[..., Any], tuple[tuple[int, in
 _PYTHONS = (
     *(len, bool, helpers.rtcf_to_int, helpers.rtcf_to_float, helpers.rtcf_floor, helpers.rtcf_ceil),
     *(helpers.rtcf_round, helpers.rtcf_index, helpers.rtcf_front, helpers.rtcf_age),
-    *(helpers.rtcf_math_fmod, helpers.rtcf_math_pow, helpers.rtcf_is, helpers.rtcf_is_known),
+    *(
+        helpers.rtcf_math_fmod,
+        helpers.rtcf_math_pow,
+        helpers.rtcf_is,
+        helpers.rtcf_is_known,
+        helpers.rtcf_same,
+    ),
     *(helpers.rtcf_math_remainder, helpers.rtcf_round_to),
     operators.rtcf_plain,
     *helpers.MATH.values(),
@@ -68,7 +74,7 @@ _AS_ARGUMENTS = (
     *(abs, max, min, numpy_functions.rtcf_abs, numpy_functions.rtcf_whole_pow, helpers.rtcf_pow),
     *(helpers.rtcf_negative_pow, helpers.rtcf_maybe, helpers.rtcf_or_old, helpers.rtcf_equal),
     *(helpers.rtcf_get, helpers.rtcf_items, operators.rtcf_negative, operators.rtcf_divmod),
-    *(helpers.rtcf_copied, helpers.rtcf_identified, helpers.rtcf_truth),
+    *(helpers.rtcf_copied, helpers.rtcf_reversed, helpers.rtcf_truth),
     math_functions.rtcf_math_prod,
     *operators.OF.values(),
     *operators.OF_ELEMENTS.values(),

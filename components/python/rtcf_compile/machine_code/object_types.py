@@ -13,7 +13,7 @@ from numba.core.datamodel import models
 from numba.core.typeconv import Conversion
 from numba.extending import intrinsic, lower_cast, register_model, typeof_impl
 
-from rtcf_compile.source.records import Meaning, Object, Record, Unknown
+from rtcf_compile.source.records import Arranged, Meaning, Object, Record, Unknown
 
 
 class NamedTupleType(types.NamedTuple):  # type: ignore[misc]
@@ -82,7 +82,7 @@ class DataclassType(types.Type):  # type: ignore[misc]
 class MarkerType(types.Dummy):  # type: ignore[misc]
     """A class, or an attribute of a class."""
 
-    def __init__(self, marker: Record | Meaning) -> None:
+    def __init__(self, marker: Arranged | Meaning) -> None:
         """Remember the class or attribute."""
         self.marker = marker
         super().__init__(f"Marker<{marker.name}>")
@@ -161,7 +161,7 @@ def _cast(context, builder, given, wanted, value):  # type: ignore[no-untyped-de
     return converted(context, builder, given, wanted, value)
 
 
-@typeof_impl.register(Record)
+@typeof_impl.register(Arranged)
 @typeof_impl.register(Meaning)
 def _type_of_marker(value, context):  # type: ignore[no-untyped-def]
     return MarkerType(value)

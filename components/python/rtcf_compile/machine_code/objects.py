@@ -16,18 +16,22 @@ from rtcf_compile.machine_code.object_types import (
     is_object,
     object_type,
 )
-from rtcf_compile.machine_code.overloads import compiled_as, unwrapped, words
+from rtcf_compile.machine_code.overloads import OPTIONS, compiled_as, unwrapped, words
 from rtcf_compile.rewriting import helpers
-from rtcf_compile.source.records import Meaning
+from rtcf_compile.source.records import Arranged, Meaning
 
 
 @intrinsic
 def _object_of(typing, values, record):  # type: ignore[no-untyped-def]
-    """Return the object of a tuple of its fields."""
-    made = object_type(record.marker, values.types)
+    """Return the object of a tuple of its fields, which are in the order of the text."""
+    arranged: Arranged = record.marker
+    given = types.BaseTuple.from_types([values.types[place] for place in arranged.places])
+    made = object_type(arranged.record, given.types)
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        new = converted(context, builder, signature.args[0], made, arguments[0])
+        parts = [builder.extract_value(arguments[0], place) for place in arranged.places]
+        fields = context.make_tuple(builder, given, parts)
+        new = converted(context, builder, given, made, fields)
         return imputils.impl_ret_borrowed(context, builder, made, new)
 
     return made(values, record), generate
@@ -35,12 +39,24 @@ def _object_of(typing, values, record):  # type: ignore[no-untyped-def]
 
 @compiled_as(helpers.rtcf_made, in_line=True)
 def _made(values: Any, record: Any) -> Any:
+    for each in values.types:
+        if isinstance(each, types.Function | types.Dispatcher | types.NumberClass):
+            raise TypingError("RTCF:a function is a field of an object:call it where it is needed")
     return lambda values, record: _object_of(values, record)
 
 
-@compiled_as(helpers.rtcf_object, in_line=True)
-def _object(value: Any, meaning: Any) -> Any:
+@overload(helpers.rtcf_object, jit_options={**OPTIONS, "forceinline": True})
+def _object(value, meaning):  # type: ignore[no-untyped-def]
     meant: Meaning = meaning.marker
+    if isinstance(value, types.Optional):
+        text = f"'NoneType' object has no attribute '{meant.attribute}'"
+
+        def known(value, meaning):  # type: ignore[no-untyped-def]
+            if value is None:
+                raise AttributeError(text)
+            return helpers.rtcf_object(unwrapped(value), meaning)
+
+        return known
     if not is_object(value):
         what = f"a {meant.kind} of {words(value)}, not of an object"
         raise TypingError(f"RTCF:{what}:give it an object of {meant.record.cls.__name__}")
@@ -85,6 +101,10 @@ def _compared(operation: Any, name: str) -> None:
         one, other = getattr(a, "record", None), getattr(b, "record", None)
         if (one is None or one.is_tuple) and (other is None or other.is_tuple):
             return None  # tuples
+        fields = [each for side in (a, b) for each in getattr(side, "types", ())]
+        if any(isinstance(each, types.Array) for each in fields):
+            remedy = "compare their fields, by np.array_equal"
+            raise TypingError(f"RTCF:objects with arrays are compared by {name}:{remedy}")
         is_known = one is not None and one is other and one.is_compared
         is_equality = operation in (operator.eq, operator.ne)
         if not is_known or not (is_equality or one.is_ordered):  # type: ignore[union-attr]
@@ -129,9 +149,29 @@ def _truth(value):  # type: ignore[no-untyped-def]
     return lambda value: value
 
 
-@overload(helpers.rtcf_identified)
-def _identified(value):  # type: ignore[no-untyped-def]
-    of = value.type if isinstance(value, types.Optional) else value
-    if is_object(of) or isinstance(of, types.BaseTuple):
-        raise TypingError(f"RTCF:the identity of {words(of)} is not known:compare it by ==")
-    return lambda value: value
+@overload(helpers.rtcf_same)
+def _same(a, b):  # type: ignore[no-untyped-def]
+    plain = [each.type if isinstance(each, types.Optional) else each for each in (a, b)]
+    for each in plain:
+        if is_object(each) or isinstance(each, types.BaseTuple):
+            raise TypingError(f"RTCF:the identity of {words(each)} is not known:compare it by ==")
+    enums = [isinstance(each, types.EnumMember | types.IntEnumMember) for each in plain]
+    if any(enums) and not all(enums):
+        what = f"{words(plain[0])} is compared with {words(plain[1])} by is"
+        raise TypingError(f"RTCF:{what}:write ==")
+    return lambda a, b: a is b
+
+
+@overload(helpers.rtcf_reversed)
+def _reversed(values):  # type: ignore[no-untyped-def]
+    if is_object(values) and isinstance(values, types.BaseTuple):
+        return lambda values: helpers.rtcf_reversed(fields_of(values))
+    if isinstance(values, types.BaseTuple):
+        parts = "".join(f"values[{number}]," for number in reversed(range(len(values))))
+        scope: dict[str, Any] = {}
+        exec(f"def each(values):\n    return ({parts})\n", scope)
+        return scope["each"]
+    if not isinstance(values, types.Array):
+        remedy = "give it a vector, a matrix, a list or a tuple"
+        raise TypingError(f"RTCF:reversed of {words(values)}:{remedy}")
+    return lambda values: values[::-1]

@@ -24,10 +24,11 @@ from rtcf_compile.machine_code.raised_values import note
 from rtcf_compile.machine_code.sharing import in_one_block, overlaps, shares
 from rtcf_compile.machine_code.tile import ROWS
 from rtcf_compile.rewriting import helpers, numpy_functions, operators
+from rtcf_compile.source.records import Arranged
 
 _PART = "write z.real, z.imag or abs(z)"
 # numba matches an overload by its parameter names and compiles the function that it returns.
-_OPTIONS: dict[str, Any] = {
+OPTIONS: dict[str, Any] = {
     "boundscheck": False,
     "error_model": "numpy",
     **backend.NO_WRAPPERS,
@@ -71,7 +72,7 @@ def compiled_as(
                 implementation.__annotations__ = {}
             return implementation
 
-        options = {**_OPTIONS, "boundscheck": checked, "forceinline": in_line}
+        options = {**OPTIONS, "boundscheck": checked, "forceinline": in_line}
         overload(helper, jit_options=options)(typed)
 
     return register
@@ -198,6 +199,8 @@ def _stored_enum(value: Any, cls: Any) -> Any:
 def _is(value: Any, constant: Any) -> Any:
     if isinstance(value, types.Boolean):
         return lambda value, constant: value == constant
+    if isinstance(value, types.Integer):
+        raise TypingError("RTCF:an int is compared with True or False by is:write ==")
     return lambda value, constant: False
 
 
@@ -217,7 +220,7 @@ def _equal(a, b):  # type: ignore[no-untyped-def]
             return lambda a, b: True
         return lambda a, b: a is b
     if isinstance(a, types.Optional):
-        return lambda a, b: False if a is None else helpers.rtcf_equal(unwrapped(a), b)
+        return lambda a, b: b is None if a is None else helpers.rtcf_equal(unwrapped(a), b)
     if isinstance(b, types.Optional):
         return lambda a, b: False if b is None else helpers.rtcf_equal(a, unwrapped(b))
     if any(each is not None and each.is_narrow for each in (operand(a), operand(b))):
@@ -267,14 +270,16 @@ def _view(array: Any) -> Any:
     return lambda array: array
 
 
-@overload(helpers.rtcf_copied, jit_options={**_OPTIONS, "forceinline": True})
+@overload(helpers.rtcf_copied, jit_options={**OPTIONS, "forceinline": True})
 def _copied(value):  # type: ignore[no-untyped-def]
     if isinstance(value, types.Array):
         return lambda value: value.copy()
-    if isinstance(value, types.Optional) and isinstance(value.type, types.Array):
-        return lambda value: None if value is None else _some(value).copy()
+    if isinstance(value, types.Optional) and (
+        isinstance(value.type, types.Array | types.BaseTuple) or is_object(value.type)
+    ):
+        return lambda value: None if value is None else helpers.rtcf_copied(unwrapped(value))
     if is_object(value):
-        record = value.record
+        record = Arranged.plain(value.record)
         return lambda value: helpers.rtcf_made(helpers.rtcf_copied(fields_of(value)), record)
     if not isinstance(value, types.BaseTuple):
         return lambda value: value
@@ -422,7 +427,7 @@ def _bool(value: Any) -> Any:
 def plain(function: Any) -> Any:
     """Return a function that overloads can call, compiled with the same options."""
     function.__annotations__ = {}
-    return register_jitable(**_OPTIONS)(function)
+    return register_jitable(**OPTIONS)(function)
 
 
 @plain
@@ -1278,7 +1283,7 @@ def _changing(helper: Any, operation: Any) -> None:
             return lambda target, value: helper(plain_value(target), plain_value(value))
         numbers = operand(target), operand(value)
         plainly = None in numbers or not any(each.is_narrow for each in numbers if each)
-        # With _OPTIONS, dividing a single number by zero gives infinity; our own helper raises.
+        # With OPTIONS, dividing a single number by zero gives infinity; our own helper raises.
         is_division = operation in operators.DIVISIONS and not isinstance(target, types.Array)
         is_own = not plainly or (is_division and None not in numbers)
         operate = operators.OF[operation] if is_own else operation

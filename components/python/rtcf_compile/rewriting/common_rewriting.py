@@ -352,7 +352,11 @@ class CommonRewriting(ast.NodeTransformer):
         return node
 
     def _truth(self, node: ast.expr) -> ast.expr:
-        return like(node, call_of("rtcf_truth", node)) if self._may_be_none(node) else node
+        """Return a condition, which may be None, or a tuple."""
+        kinds = (ast.Name, ast.Subscript, ast.NamedExpr, ast.IfExp)
+        if isinstance(node, kinds) or self._is_uncertain(node, self._uncertain):
+            return like(node, call_of("rtcf_truth", node))
+        return node
 
     def visit_Compare(self, node: ast.Compare) -> ast.AST:
         """Rewrite `x in (1, 2)`, `key in LIMITS` of a dict, and comparisons with lists."""
@@ -382,8 +386,17 @@ class CommonRewriting(ast.NodeTransformer):
             is_equal = isinstance(node.ops[0], ast.Eq)
             return like(node, equal if is_equal else ast.UnaryOp(ast.Not(), equal))
         is_none = any(isinstance(each, ast.Constant) for each in (node.left, *node.comparators))
-        if all(isinstance(each, ast.Is | ast.IsNot) for each in node.ops) and not is_none:
-            node.left = like(node.left, call_of("rtcf_identified", node.left))
+        is_one = len(node.ops) == 1 and isinstance(node.ops[0], ast.Is | ast.IsNot)
+        given = node.comparators[0]
+        if is_one and isinstance(given, ast.Constant) and isinstance(given.value, bool):
+            same = like(node, call_of("rtcf_is", self.visit(node.left), given))
+            is_same = isinstance(node.ops[0], ast.Is)
+            return same if is_same else like(node, ast.UnaryOp(ast.Not(), same))
+        if is_one and not is_none:
+            sides = self.visit(node.left), self.visit(node.comparators[0])
+            same = like(node, call_of("rtcf_same", *sides))
+            is_same = isinstance(node.ops[0], ast.Is)
+            return same if is_same else like(node, ast.UnaryOp(ast.Not(), same))
         if not all(isinstance(each, ast.In | ast.NotIn) for each in node.ops):
             node.left = self._arrays(node.left)
             node.comparators = [self._arrays(each) for each in node.comparators]
@@ -446,6 +459,8 @@ class CommonRewriting(ast.NodeTransformer):
         if (number := self._flags(node)) is not None:
             return number
         is_constant = isinstance(node.operand, ast.Constant)
+        if isinstance(node.op, ast.Not):
+            node.operand = self._truth(node.operand)
         self.generic_visit(node)
         if type(node.op) not in self._functions or is_constant:
             return node
@@ -647,7 +662,7 @@ class CommonRewriting(ast.NodeTransformer):
             bounds = [ast.BinOp(each, ast.Sub(), ast.Constant(1)) for each in (of.args[-1], low)]
             step = ast.UnaryOp(ast.USub(), ast.Constant(1))
             return self.visit(like(node, ast.Call(of.func, [*bounds, step], [])))  # type: ignore[no-any-return]
-        return like(node, call_of("rtcf_flip", self.visit(of), ast.Constant(None)))
+        return like(node, call_of("rtcf_reversed", self.visit(of)))
 
     def _einsum(self, node: ast.Call) -> ast.AST:
         """Rewrite `np.einsum("ij,j->i", a, b)`."""
@@ -797,15 +812,19 @@ class CommonRewriting(ast.NodeTransformer):
 
     def _table(self, node: ast.expr, name: str, table: dict[Any, Any]) -> list[ast.expr]:
         """Return the keys and values of a dict of numbers, tuples or objects as constants."""
+        if hasattr(type(table), "__missing__"):
+            raise self.mistake(node, f"{name} is a {type(table).__name__}", "use a dict")
         kinds = {type(each) for each in table.values()}
-        numbers = all(isinstance(each, int | float) for each in table.values())
-        alike = len(kinds) == 1 and (tuple in kinds or record_of(next(iter(kinds))) is not None)
+        numbers = kinds <= {int, float}
+        cls = next(iter(kinds))
+        known = cls in (tuple, bool) or is_enum(cls) or record_of(cls) is not None
+        alike = len(kinds) == 1 and known
         if not (numbers or alike) or not _has_number_keys(table):
             remedy = "use ints or enums as keys, and numbers, tuples or objects as values"
             raise self.mistake(node, f"{name} is a dict with other keys or values", remedy)
         keys, values = (self._name_for(table, f"{name} {each}") for each in ("keys", "values"))
         self.constants[keys] = tuple(map(helpers.rtcf_number, table))
-        kind: Any = int if all(isinstance(each, int) for each in table.values()) else float
+        kind: Any = float if float in kinds else int
         elements = map(kind, table.values()) if numbers else table.values()
         self.constants[values] = tuple(elements)
         return [ast.Name(each, ast.Load()) for each in (keys, values)]

@@ -406,12 +406,14 @@ def frozen(value: Any) -> Any:
     if isinstance(value, Object):
         return value
     if (record := record_of(type(value))) is not None:
+        if set(getattr(value, "__dict__", ())) - set(record.fields):
+            return Unknown(type(value))  # it has attributes that its class does not have
         fields = [getattr(value, each) for each in record.fields]
         return Object.of(
             record, [frozen(each) if is_constant(each) else Unknown(type(each)) for each in fields]
         )
     if type(value) is tuple:
-        kept = (tuple, np.ndarray)
+        kept = (tuple, list, np.ndarray)
         return tuple(
             frozen(each) if isinstance(each, kept) or record_of(type(each)) else each
             for each in value
@@ -462,6 +464,7 @@ def made(tree: ast.FunctionDef, scope: dict[str, Any], source: Source) -> Functi
     code = compile(module, source.file, "exec", dont_inherit=True)
     inner = next(each for each in code.co_consts if isinstance(each, CodeType))
     defaults = defaults_of(source.function) if tree.name == source.tree.name else None
+    defaults = tuple(map(frozen, defaults)) if defaults else defaults
     function = FunctionType(inner, scope, tree.name, defaults)
     vars(function)[WRITTEN_NAME] = source.function.__qualname__.rpartition("<locals>.")[2]
     vars(function)[WRITTEN_CODE] = source.function.__code__

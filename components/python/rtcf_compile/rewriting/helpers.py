@@ -313,7 +313,7 @@ def rtcf_copied(value: Any) -> Any:
 
 def rtcf_made(fields: Any, record: Any) -> Any:
     """Return a new object; see objects.py."""
-    return record.cls(*fields)
+    return record.record.cls(*(fields[place] for place in record.places))
 
 
 def rtcf_object(value: Any, meaning: Any) -> Any:
@@ -327,9 +327,14 @@ def rtcf_truth(value: Any) -> Any:
     return value
 
 
-def rtcf_identified(value: Any) -> Any:
-    """Return a value whose identity is compared."""
-    return value
+def rtcf_same(a: Any, b: Any) -> Any:
+    """Tell whether two values are the same."""
+    return a is b
+
+
+def rtcf_reversed(values: Any) -> Any:
+    """Return a tuple or an array in reverse order."""
+    return values[::-1]
 
 
 def rtcf_array_of(value: Any, count: Any) -> Any:
@@ -524,7 +529,8 @@ BY_NAME = {
             rtcf_looked_up_or,
             rtcf_object,
             rtcf_made,
-            rtcf_identified,
+            rtcf_same,
+            rtcf_reversed,
             rtcf_truth,
             rtcf_array_of,
             rtcf_store,

@@ -15,6 +15,7 @@ types are not known here, so that any value may be an array unless its declarati
 """
 
 import ast
+import functools
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from types import CodeType
@@ -40,7 +41,7 @@ from rtcf_compile.source.checks import check, resolve
 from rtcf_compile.source.mistake import at, written
 from rtcf_compile.source.modules import Source, read
 from rtcf_compile.source.parsed import is_own
-from rtcf_compile.source.records import as_tuple
+from rtcf_compile.source.records import NAMED, as_tuple
 from rtcf_compile.source.spelling import defaults_of
 
 # The name of an array, or of a place: its kind and what tells it from others of the kind.
@@ -1018,6 +1019,18 @@ class _Followed:
         place = ("read-only", name, "a constant of the module")
         return frozenset({Ref(place, place, None, True, value.ndim)})
 
+    def _table(self, node: ast.expr) -> dict[Any, Any] | None:
+        """Return the dict of constants to which a name refers, or None."""
+        found = resolve(node, self._frame.source)
+        if isinstance(node, ast.Attribute) and self._is_self(node.value):
+            found = self._constants.get(node.attr)
+        return found if isinstance(found, dict) else None
+
+    def _any_of(self, table: dict[Any, Any], name: str) -> Value:
+        """Return the references of any value of a dict of constants."""
+        values = [self._constant(each, name) for each in table.values()]
+        return functools.reduce(_either, values) if values else NOTHING
+
     def _attribute(self, node: ast.Attribute, state: Bindings) -> Value:
         member = self._member(node)
         if member is not None:
@@ -1094,12 +1107,10 @@ class _Followed:
         base = state.pop(held)
         if isinstance(base, tuple):
             return _element(base, node.slice)
-        of = node.value
-        table = resolve(of, self._frame.source)
-        if isinstance(of, ast.Attribute) and self._is_self(of.value):
-            table = self._constants.get(of.attr)
-        if isinstance(table, dict) and isinstance(node.slice, ast.Constant):
-            return self._constant(table.get(node.slice.value), ast.unparse(node))
+        if (table := self._table(node.value)) is not None:
+            if isinstance(node.slice, ast.Constant):
+                return self._constant(table.get(node.slice.value), ast.unparse(node))
+            return self._any_of(table, ast.unparse(node))
         parts = node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]
         views = [each for each in parts if _keeps(each)]
         axes = sum(map(is_new_axis, parts))
@@ -1143,6 +1154,9 @@ class _Followed:
             owner = state.pop(held)
         first: Value = values[0] if values else NOTHING
         everything = _flat((owner, *values, *named.values()))
+        is_get = isinstance(called, ast.Attribute) and called.attr == "get"
+        if is_get and (table := self._table(called.value)) is not None and len(values) == 2:
+            return _either(self._any_of(table, ast.unparse(called.value)), values[1])
         is_array = not isinstance(first, tuple)
         if is_array and any(target is each for each in (*_SAME, *_VIEWS, *_DIAGONALS)):
             return self._viewed(target, _flat(first), node)
@@ -1162,7 +1176,10 @@ class _Followed:
             return (tuple(map(_elements, values)),)
         if any(target is each for each in _ITERATORS):
             return (_elements(first),)
-        is_object = isinstance(called, ast.Name) and called.id in ("rtcf_object", "rtcf_made")
+        if isinstance(called, ast.Name) and called.id == "rtcf_made":
+            assert isinstance(first, tuple) and isinstance(node.args[1], ast.Name)
+            return tuple(first[place] for place in NAMED[node.args[1].id].places)
+        is_object = isinstance(called, ast.Name) and called.id == "rtcf_object"
         if is_object or any(target is each for each in _TUPLES):
             return first
         if isinstance(called, ast.Attribute) and target is None:

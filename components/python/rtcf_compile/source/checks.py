@@ -233,6 +233,8 @@ def _check(node: ast.AST, source: Source, members: Collection[str], known: Colle
         node.id in known or node.id.startswith("rtcf_")
     ):  # fmt: skip
         raise once(_undefined(node, source, members, known))
+    if isinstance(node, ast.Assign | ast.AnnAssign | ast.NamedExpr) and node.value is not None:
+        _kept(node.value, source)
     if isinstance(node, ast.Expr) and isinstance(node.value, ast.ListComp):
         raise at(file, node, "a list that is not used", "write a loop: for … in …:")
     if isinstance(node, ast.Compare):
@@ -470,6 +472,18 @@ def check_arguments(
         name, words = ast.unparse(node.func), ", ".join(map(str, takes))
         what = f"{name} takes {words}" if words else f"{name} takes no arguments"
         raise at(file, node, what, f"write {name}({words})") from None
+
+
+def _kept(node: ast.expr, source: Source) -> None:
+    """Reject functions of Python and NumPy as values: compiled, they would lose their checks."""
+    for each in node.elts if isinstance(node, ast.Tuple | ast.List) else [node]:
+        value = resolve(each, source)
+        root = (getattr(value, "__module__", None) or "").partition(".")[0]
+        if isinstance(value, BuiltinFunctionType | np.ufunc) or (
+            isinstance(value, type) and root == "builtins"
+        ):
+            what = f"{ast.unparse(each)} is kept as a value"
+            raise at(source.file, each, what, "call it where it is needed")
 
 
 def _compared(node: ast.Compare, file: str) -> None:

@@ -21,7 +21,7 @@ import numpy as np
 
 from rtcf_compile.source.mistake import at
 from rtcf_compile.source.parsed import is_of_user
-from rtcf_compile.source.records import NAMED, Meaning, Record, named, record_of, unique
+from rtcf_compile.source.records import NAMED, Arranged, Meaning, Record, named, record_of, unique
 from rtcf_compile.source.scopes import everywhere
 
 # Attributes that other values have: with these names, the class of a variable must be known.
@@ -85,8 +85,13 @@ class _Replacing(ast.NodeTransformer):
         self._messages: set[str] = set()
         # What variables are set to; None if it is not known.
         self._values: dict[str, list[ast.expr | Record | None]] = {}
+        defaults = {
+            name: self._record(type(each.default))
+            for name, each in inspect.signature(function).parameters.items()
+        }
         for each in arguments:
-            self._values[each.arg] = [self._annotated(each.annotation)]
+            known = self._annotated(each.annotation) or defaults.get(each.arg)
+            self._values[each.arg] = [known]
         if self._own is not None and arguments:
             self._values[arguments[0].arg] = [self._own]
         for statement in tree.body:
@@ -186,15 +191,15 @@ class _Replacing(ast.NodeTransformer):
             return self._of_all([node.body, node.orelse])
         if isinstance(node, ast.NamedExpr):
             return self._of_value(node.value)
-        if isinstance(node, ast.Call) and isinstance(marker := _marker(node), Record):
-            return marker
+        if isinstance(node, ast.Call) and isinstance(marker := _marker(node), Arranged):
+            return marker.record
         if isinstance(node, ast.Subscript) and isinstance(marker := _marker(node.value), Meaning):
-            known = marker.record.cls.__annotations__.get(marker.attribute)
+            known = _annotation(marker.record.cls, marker.attribute)
             return self._typed(known, marker.record.cls)
         if isinstance(node, ast.Subscript):
             return self._of_elements(node.value)
         if isinstance(node, ast.Attribute) and (owner := self._of_value(node.value)) is not None:
-            known = owner.cls.__annotations__.get(node.attr)
+            known = _annotation(owner.cls, node.attr)
             getter = owner.properties.get(node.attr)
             return self._typed(known, owner.cls) or self._returned(getter, owner)
         if not isinstance(node, ast.Call):
@@ -306,6 +311,7 @@ class _Replacing(ast.NodeTransformer):
                 self._visit_arguments(node)
                 return self._changed(node, of.value, found)
             if of.attr in found.methods:
+                self._check_call(node, of, found.methods[of.attr])
                 own = self._meant(self.visit(of.value), found, of.attr)
                 self._visit_arguments(node)
                 function = self._name(found, of.attr, found.methods[of.attr])
@@ -317,6 +323,19 @@ class _Replacing(ast.NodeTransformer):
                 return _behind(own, ast.Call(function, node.args, node.keywords), node)
         self.generic_visit(node)
         return node
+
+    def _check_call(self, node: ast.Call, of: ast.Attribute, function: FunctionType) -> None:
+        """Reject other arguments than those of a method."""
+        if any(isinstance(each, ast.Starred) for each in node.args):
+            return
+        signature = inspect.signature(function)
+        try:
+            signature.bind(None, *node.args, **{each.arg or "": each for each in node.keywords})
+        except TypeError:
+            names = ", ".join(list(signature.parameters)[1:])
+            called = ast.unparse(of)
+            what = f"{called} takes {names or 'no arguments'}"
+            raise at(self._file, node, what, f"write {called}({names})") from None
 
     def _of_class(self, node: ast.Call, of: ast.Attribute, record: Record) -> ast.expr:
         """Rewrite `Sample.method(…)`."""
@@ -345,46 +364,29 @@ class _Replacing(ast.NodeTransformer):
         is_wrong = len(node.args) > len(record.fields) or set(named) - set(record.fields)
         if is_wrong or set(named) & set(values):
             raise self._takes(node, record)
+        # In the order of the text, in which Python computes them.
         values |= {each.arg or "": each.value for each in node.keywords}
-        self._check_order(node, values, record)
         for each in set(record.fields) - set(values):
             if each not in record.defaults:
                 raise self._takes(node, record)
             values[each] = self._default(node, each, record.defaults[each])
-        return self._object([values[each] for each in record.fields], record, node)
+        return self._object(values, record, node)
 
-    def _object(self, fields: list[ast.expr], record: Record, node: ast.expr) -> ast.expr:
-        marker = ast.Name(marker_of(record), ast.Load())
-        values = ast.Tuple(fields, ast.Load())
-        return _located(ast.Call(ast.Name("rtcf_made", ast.Load()), [values, marker], []), node)
+    def _object(self, values: dict[str, ast.expr], record: Record, node: ast.expr) -> ast.expr:
+        names = list(values)
+        marker = ast.Name(marker_of(record, tuple(map(names.index, record.fields))), ast.Load())
+        fields = ast.Tuple(list(values.values()), ast.Load())
+        return _located(ast.Call(ast.Name("rtcf_made", ast.Load()), [fields, marker], []), node)
 
     def _takes(self, node: ast.Call, record: Record) -> Exception:
         name, fields = ast.unparse(node.func), ", ".join(record.fields)
         return at(self._file, node, f"{name} has the fields {fields}", f"write {name}({fields})")
 
-    def _check_order(self, node: ast.Call, values: dict[str, ast.expr], record: Record) -> None:
-        """Reject values in another order than that of the fields, if one of them may have effects:
-        they would be computed in the order of the fields.
-        """
-        others = {name: each for name, each in values.items() if not isinstance(each, ast.Constant)}
-        acts = any(self._acts(part) for each in others.values() for part in ast.walk(each))
-        places = [record.fields.index(each) for each in others]
-        if acts and places != sorted(places):
-            fields = ", ".join(record.fields)
-            what = "calls are not in the order of the fields"
-            raise at(self._file, node, what, f"write them in this order: {fields}")
-
-    def _acts(self, node: ast.AST) -> bool:
-        """Tell whether a node may have an effect: a call, a property, an assignment."""
-        if isinstance(node, ast.Attribute):
-            return isinstance(self._resolved(node), property)
-        return isinstance(node, ast.Call | ast.NamedExpr)
-
     def _default(self, node: ast.Call, name: str, value: Any) -> ast.expr:
-        if isinstance(value, enum.Enum):
-            return _located(ast.Name(named(f"rtcf_default_{name}", value), ast.Load()), node)
-        if isinstance(value, bool | int | float | None):
+        if type(value) in (bool, int, float, NoneType):
             return _located(ast.Constant(value), node)
+        if isinstance(value, enum.Enum | np.generic):
+            return _located(ast.Name(named(f"rtcf_default_{name}", value), ast.Load()), node)
         what = f"the default of {name} is not a number"
         raise at(self._file, node, what, f"write {name}=…")
 
@@ -397,14 +399,13 @@ class _Replacing(ast.NodeTransformer):
         if not isinstance(of, ast.Name):
             what = "an expression that is replaced in part"
             raise at(self._file, node, what, "bind it to a variable first")
-        self._check_order(node, given, record)
-        old = self._meant(of, record, "")
-        elements = [
-            given.get(each) or _located(ast.Subscript(old, ast.Constant(place), ast.Load()), node)
-            for place, each in enumerate(record.fields)
-        ]
-        made = self._object(elements, record, node)
-        return made if set(record.fields) - set(given) else _behind(old, made, node)
+        old, replaced = self._meant(of, record, ""), len(given)
+        for place, each in enumerate(record.fields):
+            if each not in given:
+                kept = ast.Subscript(old, ast.Constant(place), ast.Load())
+                given[each] = _located(kept, node)
+        made = self._object(given, record, node)
+        return made if replaced < len(record.fields) else _behind(old, made, node)
 
     def visit_Attribute(self, node: ast.Attribute) -> ast.AST:
         """Rewrite `sample.v`, of a field or a property."""
@@ -429,7 +430,10 @@ class _Replacing(ast.NodeTransformer):
         if name in record.properties:
             function = self._name(record, name, record.properties[name])
             return _located(ast.Call(function, [of], []), node)
-        return _behind(of, ast.Constant(record.constants[name]), node)
+        value = record.constants[name]
+        if type(value) in (bool, int, float):
+            return _behind(of, ast.Constant(value), node)
+        return _behind(of, ast.Name(named(f"rtcf_constant_{name}", value), ast.Load()), node)
 
     def _has_no(self, node: ast.Attribute, record: Record) -> Exception:
         cls, name = record.cls, node.attr
@@ -492,6 +496,12 @@ def _located(new: ast.expr, node: ast.expr) -> ast.expr:
     return ast.fix_missing_locations(ast.copy_location(new, node))
 
 
+def _annotation(cls: type, name: str) -> Any:
+    """Return the annotation of a field, also of a base."""
+    found = (inspect.get_annotations(each).get(name) for each in cls.__mro__)
+    return next((each for each in found if each is not None), None)
+
+
 def _behind(first: ast.expr, value: ast.expr, node: ast.expr) -> ast.expr:
     """Return the expression of a value, computed after another one."""
     both = ast.Tuple([first, value], ast.Load())
@@ -531,9 +541,9 @@ def _is_of(node: Any, name: str) -> bool:
 
 
 @cache
-def marker_of(record: Record) -> str:
-    """Return the name of a class in rewritten functions."""
-    return named(f"rtcf_class_{record.name}", record)
+def marker_of(record: Record, places: tuple[int, ...]) -> str:
+    """Return the name of a class in rewritten functions, whose values have these places."""
+    return named(f"rtcf_class_{record.name}", Arranged(record, places))
 
 
 @cache

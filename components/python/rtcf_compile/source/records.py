@@ -4,6 +4,7 @@ Their objects are compiled as objects whose class is known by their type, see
 machine_code/object_types.py.
 """
 
+import abc
 import collections
 import dataclasses
 import enum
@@ -29,6 +30,12 @@ _REASONS = {
     "__new__": "it has a __new__ of its own: write a function that makes the object",
     "__eq__": "it has an __eq__ of its own: write a method, such as is_near",
 }
+# Special methods that mean something else in a class with its own.
+_OPERATORS = {
+    *("__eq__", "__ne__", "__lt__", "__le__", "__gt__", "__ge__", "__bool__", "__len__"),
+    *("__getitem__", "__iter__", "__contains__", "__call__", "__getattr__", "__getattribute__"),
+}
+_CONSTANTS = (bool, int, float, np.generic, enum.Enum, tuple)
 _FIELD_OF_TUPLE = type(vars(collections.namedtuple("_One", "x"))["x"])
 
 
@@ -45,7 +52,7 @@ class Record:
     methods: Mapping[str, FunctionType]
     static_methods: Mapping[str, FunctionType]
     properties: Mapping[str, FunctionType]
-    constants: Mapping[str, bool | int | float]
+    constants: Mapping[str, Any]
     # Whether objects are tuples, too, and whether == compares all fields.
     is_tuple: bool
     is_compared: bool
@@ -82,7 +89,8 @@ class Record:
             if is_of_user(each)
         ]
         kinds = self.is_tuple, self.is_compared, self.is_ordered
-        return self.name, self.fields, kinds, classes
+        meanings = [(name, _described(self.meaning(name))) for name in self.names()]
+        return self.name, self.fields, kinds, classes, meanings
 
 
 @dataclass(frozen=True)
@@ -111,6 +119,24 @@ class Meaning:
     def gives_fields(self) -> bool:
         """Tell whether the fields are taken from the object, else the object itself."""
         return not self.attribute or self.attribute in self.record.fields
+
+
+@dataclass(frozen=True)
+class Arranged:
+    """A class, and for each of its fields the place of its value among those that are given."""
+
+    record: Record
+    places: tuple[int, ...]
+
+    @property
+    def name(self) -> str:
+        """Return a name that no other class or arrangement has."""
+        return f"{self.record.name}_{'_'.join(map(str, self.places))}"
+
+    @staticmethod
+    def plain(record: Record) -> "Arranged":
+        """Return a class whose values are given in the order of its fields."""
+        return Arranged(record, tuple(range(len(record.fields))))
 
 
 class Object(tuple[Any, ...]):
@@ -156,17 +182,16 @@ def _record(cls: Any) -> Record:
         is_compared = options.eq and all(each.compare for each in known)
         is_ordered = is_compared and options.order
     empty: dict[str, Any] = {}
+    constants: dict[str, Any] = {}
     found: dict[type, dict[str, Any]] = {}
     for name in _own_names(cls) - set(names):
         value = inspect.getattr_static(cls, name)
         function = {property: "fget", staticmethod: "__func__"}.get(type(value), "")
         of = getattr(value, function) if function else value
-        kinds = (bool, int, float) if of is value else ()
-        if (isinstance(of, FunctionType) and not _is_of_python(of)) or type(of) in kinds:
+        if isinstance(of, FunctionType) and not _is_of_python(of):
             found.setdefault(type(value), {})[name] = of
-    constants = {
-        name: each for kind in (bool, int, float) for name, each in found.get(kind, {}).items()
-    }
+        elif not name.startswith("_") and isinstance(value, _CONSTANTS):
+            constants[name] = value
     name = unique("".join(each if each.isalnum() else "_" for each in cls.__qualname__), cls)
     return Record(
         cls, name, tuple(names), defaults, found.get(FunctionType, empty),
@@ -193,8 +218,13 @@ def why_not(cls: type) -> str:
     for name in sorted(_own_names(cls)):
         value = inspect.getattr_static(cls, name)
         is_written = isinstance(value, FunctionType) and not _is_of_python(value)
-        if is_written and name.startswith("__") and name not in _HARMLESS:
+        if not name.startswith("__") or name in _HARMLESS:
+            continue
+        is_taken = name in _OPERATORS and not isinstance(value, FunctionType)
+        if is_written or is_taken:
             return _REASONS.get(name, f"it has {name}: write a method, such as plus")
+    if type(cls) not in (type, abc.ABCMeta):
+        return "it has a metaclass: write a plain class"
     if issubclass(cls, tuple):
         fields = cls._fields  # type: ignore[attr-defined]
     else:
@@ -212,9 +242,8 @@ def why_not(cls: type) -> str:
                 return "its fields are keyword-only: remove kw_only=True"
     for name in fields:
         value = inspect.getattr_static(cls, name, None)
-        if hasattr(value, "__get__") and not isinstance(
-            value, _FIELD_OF_TUPLE | MemberDescriptorType
-        ):
+        is_own = isinstance(value, _FIELD_OF_TUPLE | MemberDescriptorType)
+        if not is_own and (issubclass(cls, tuple) or hasattr(value, "__get__")):
             return f"{name} is a field, and a {type(value).__name__}: give one another name"
     return ""
 
@@ -255,6 +284,13 @@ def is_constant(value: Any) -> bool:
     if isinstance(value, np.ndarray):
         return value.dtype.kind in "fiubc"
     return isinstance(value, kinds) or record_of(type(value)) is not None
+
+
+def _described(meaning: object) -> object:
+    """Return what tells a meaning from others also in another process."""
+    if isinstance(meaning, FunctionType):
+        return meaning.__module__, meaning.__qualname__, meaning.__code__.co_firstlineno
+    return repr(meaning)
 
 
 def _own_names(cls: type) -> set[str]:

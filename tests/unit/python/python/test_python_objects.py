@@ -9,9 +9,12 @@ from rtcf_compile.source import modules
 from rtcf_compile.source.mistake import Mistake
 
 HEAD = """\
+from collections import defaultdict
 from dataclasses import InitVar, dataclass, field, replace
 from enum import IntEnum
 from typing import NamedTuple, Self
+
+import math
 
 import numpy as np
 from geometry_msgs.msg import Vector3
@@ -206,6 +209,60 @@ class Walker(NamedTuple):
         return Walker(x, 2)
 
 
+@dataclass
+class Constants:
+    x: float
+    TOP = np.deg2rad(90)
+    PAIR = (1.0, 2.0)
+    PHASE = Phase.MOVE
+    LIMIT = 3
+
+
+@dataclass
+class Vector:
+    x: np.ndarray
+
+
+@dataclass
+class Turned:
+    x: float
+    angle: float = np.deg2rad(90)
+
+
+@dataclass
+class Begun:
+    begin: Sample
+
+
+@dataclass
+class Farther(Begun):
+    more: float
+
+
+class Hidden(Sample):
+    v = 5.0
+
+
+class SameAs(NamedTuple):
+    x: float
+
+    __eq__ = object.__eq__
+
+
+class Made(type):
+    def __call__(cls, *given):
+        return 1.0
+
+
+@dataclass
+class ByMeta(metaclass=Made):
+    x: float
+
+
+def effect(x):
+    return x
+
+
 def rtcf_of_Sample_energy(p):
     return 5.0
 
@@ -218,6 +275,14 @@ def twice(x) -> Sample:
     return Sample(2.0 * x, x)
 
 
+NEXT = {Phase.REST: Phase.MOVE, Phase.MOVE: Phase.REST}
+READY = {Phase.REST: True, Phase.MOVE: False}
+MIXED = {Phase.REST: True, Phase.MOVE: 2}
+LATER = defaultdict(float, {0: 1.0})
+MATRIX = np.arange(6.0).reshape(3, 2)
+PARTS = {Phase.REST: Pair(np.ones(3), np.zeros(3)), Phase.MOVE: Pair(np.zeros(3), np.ones(3))}
+CHANGED = Profile(0.5, 3.0)
+CHANGED.weight_of = 7.0
 SAMPLES = [Sample(0.5, 1.0), Sample(2.0, 3.0)]
 BY_PHASE = {Phase.REST: Sample(0.0, 1.0), Phase.MOVE: Sample(2.0, 3.0)}
 FIXED = Profile(0.5, 3.0)
@@ -230,10 +295,6 @@ def planned(t: float, top: float):
 
 def swapped(pair: Pair) -> Pair:
     return Pair(pair.second, pair.first)
-
-
-def effect(x):
-    return x
 
 
 class Objects(Component):
@@ -258,6 +319,20 @@ class Objects(Component):
 
     def maybe(self, u) -> "Sample | None":
         return Sample(u, 1.0) if u > 0 else None
+
+    def changed(self, u):
+        self.n += 2
+        return u
+
+    def parts(self, u) -> "Pair | None":
+        return Pair(self.a, self.b) if u < 0.5 else None
+
+    def late(self, p: "Pair | None", x):
+        self.a = self.a + x
+        return p.first[0] if p is not None else x[0]
+
+    def from_home(self, u, home=Sample(1.0, 2.0)):
+        return u * home.s + home.v
 
     @property
     def count(self):
@@ -433,6 +508,64 @@ WAYS = {
         self.a += x""",
     "objects of a comprehension": """
         self.y.write(sum(p.v * p.s for p in SAMPLES) * u)""",
+    "fields in another order than their values": """
+        p = Point(y=self.count, x=self.count)
+        q = Point(y=self.changed(u), x=effect(self.n))
+        p = replace(p, y=self.count, x=self.count)
+        self.y.write(p.x - 2.0 * p.y + 3.0 * q.x - 5.0 * q.y)""",
+    "an object of arrays or None": """
+        p = Pair(self.a, self.b) if u > 0.0 else None
+        q = self.parts(u)
+        self.a = self.a + x
+        self.b = 0.5 * self.b - x
+        self.w.write((p.first if p is not None else x) - (q.second if q is not None else x))
+        self.y.write(self.late(q, x))""",
+    "None that is compared with None": """
+        p, q = self.maybe(u), self.maybe(x[0])
+        self.n = (p == q) + 2 * (p != q)
+        self.y.write(1.0 if p == Sample(u, 1.0) else 0.0)""",
+    "conditions that may be None": """
+        y = 0.0
+        if self.maybe(u):
+            y += 1.0
+        if (p := self.maybe(x[0])) and p.s > 0.5:
+            y += 2.0
+        if not self.maybe(x[1]):
+            y += 4.0
+        for q in (self.maybe(u), self.maybe(x[2])):
+            if q:
+                y += q.s
+        t = (self.maybe(u), 1.0)
+        if t[0]:
+            y += 8.0
+        self.y.write(y)""",
+    "enums and bools of dicts": """
+        phase = Phase.MOVE if u > 0.0 else Phase.REST
+        y = 1.0 if NEXT[phase] is Phase.MOVE else 2.0
+        if READY[phase] is True:
+            y += 4.0
+        if NEXT.get(phase, Phase.REST) is not Phase.REST:
+            y += 8.0
+        self.y.write(y)""",
+    "reversed tuples of tuples": """
+        y = 0.0
+        for a, b in reversed(((1.0, 2.0), (3.0, u))):
+            y = 2.0 * y + a - b
+        for p in reversed((Sample(u, 1.0), Sample(2.0, u))):
+            y = 2.0 * y + p.s - p.v
+        for k, r in enumerate(reversed(MATRIX)):
+            y = 2.0 * y + k * r[0] - r[1]
+        self.y.write(y)""",
+    "other constants of the class": """
+        p = Constants(u)
+        self.y.write(p.TOP + p.PAIR[1] * p.LIMIT if p.PHASE is Phase.MOVE else p.x)""",
+    "a NumPy number as a default": """
+        self.y.write(Turned(u).angle + Turned(u, 2.0).angle)""",
+    "an inherited field of a class": """
+        p = Farther(Sample(u, 1.0), 2.0)
+        self.y.write(p.begin.energy() + p.begin.s * p.more)""",
+    "an object as a default": """
+        self.y.write(self.from_home(u) + self.from_home(u, Sample(u, u)))""",
     "a message with the same field": """
         force = self.force.value
         p = Point(u, 2.0)
@@ -478,10 +611,6 @@ REJECTED = {
     "a method without ( )": (
         "p = Sample(u, 1.0)\n        self.y.write(p.energy)  # here",
         "p.energy is a method: call it: p.energy(…)",
-    ),
-    "calls in another order": (
-        "p = Point(y=effect(u), x=effect(2.0))  # here",
-        "calls are not in the order of the fields: write them in this order: x, y",
     ),
     "a default that is not a number": (
         "p = Named(u)  # here",
@@ -587,9 +716,62 @@ REJECTED = {
         "p = (u, 1.0)\n        q = (u, 1.0)\n        self.n = p is not q  # here",
         "the identity of a list or tuple is not known: compare it by ==",
     ),
-    "properties in another order": (
-        "p = Point(y=self.count, x=self.count)  # here",
-        "calls are not in the order of the fields",
+    "an array of a dict of constants": (
+        "self.a = PARTS[self.phase].first\n        self.a += 1.0  # here",
+        "are the same array in NumPy, and this changes both",
+    ),
+    "an array of a dict of constants, with a default": (
+        "self.a = PARTS.get(self.phase, Pair(x, x)).first\n        self.a += 1.0  # here",
+        "are the same array in NumPy, and this changes both",
+    ),
+    "a constant that hides a field": (
+        "p = Hidden(u, 1.0)  # here",
+        "an object of Hidden is not compiled, because v is a field, and a float: give one another",
+    ),
+    "another ==": (
+        "p = SameAs(u)  # here",
+        "because it has an __eq__ of its own: write a method, such as is_near",
+    ),
+    "a metaclass": (
+        "p = ByMeta(u)  # here",
+        "an object of ByMeta is not compiled, because it has a metaclass: write a plain class",
+    ),
+    "the identity of an int and True": (
+        "q = u > 0.0 if x[0] > 0.0 else self.n\n        self.y.write(1.0 if q is True else u)  # here",
+        "an int is compared with True or False by is: write ==",
+    ),
+    "the identity of an int and an enum": (
+        "q = Phase.MOVE if u > 0.0 else self.n\n        self.n = q is Phase.MOVE  # here",
+        "an int is compared with a Phase by is: write ==",
+    ),
+    "objects with arrays that are compared": (
+        "self.y.write(1.0 if Vector(x) == Vector(self.a) else 0.0)  # here",
+        "objects with arrays are compared by ==: compare their fields, by np.array_equal",
+    ),
+    "a dict of bools and ints": (
+        "self.n = MIXED[self.phase]  # here",
+        "MIXED is a dict with other keys or values",
+    ),
+    "a dict with a default": ("self.y.write(LATER[self.n])  # here", "LATER is a defaultdict: use"),
+    "a function as a field": (
+        "p = Point(math.sqrt, u)  # here",
+        "a function is a field of an object: call it where it is needed",
+    ),
+    "a function in a variable": (
+        "f = math.sqrt  # here\n        self.y.write(f(u))",
+        "math.sqrt is kept as a value: call it where it is needed",
+    ),
+    "a function in a tuple": (
+        "fs = (math.sqrt, math.exp)  # here\n        self.y.write(fs[0](u))",
+        "math.sqrt is kept as a value: call it where it is needed",
+    ),
+    "other arguments of a method": (
+        "p = Sample(u, 1.0)\n        self.y.write(p.energy(1.0, 2.0))  # here",
+        "p.energy takes mass: write p.energy(mass)",
+    ),
+    "an attribute of a constant object only": (
+        "self.y.write(CHANGED.top)  # here",
+        "a field of a Profile in an object, not of an object",
     ),
     "fields computed by the class": (
         "p = Computed(u)  # here",
