@@ -83,10 +83,10 @@ class BagWriter:
             together = np.concatenate(found)
             if len(found) > 1:  # readers search for times
                 together = together[np.lexsort((together[:, 1], together[:, 0]))]
-            number, count = _U4.pack(connection), _U4.pack(len(together))
-            head = _header(op=bytes([_INDEX]), ver=_U4.pack(1), conn=number, count=count)
+            number, length = _U4.pack(connection), _U4.pack(len(together))
+            head = _header(op=bytes([_INDEX]), ver=_U4.pack(1), conn=number, count=length)
             self._file.write(_record(head, together.tobytes()))
-            counts += number + count
+            counts += number + length
         stamps = np.concatenate([each.stamps_ns for each in runs])
         head = _header(
             op=bytes([_CHUNK_INFO]), ver=_U4.pack(1), chunk_pos=_U8.pack(place),

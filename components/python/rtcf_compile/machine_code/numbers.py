@@ -58,13 +58,8 @@ _MEETING: dict[Callable[..., Any], tuple[Callable[..., Any], tuple[tuple[int, in
 _PYTHONS = (
     *(len, bool, helpers.rtcf_to_int, helpers.rtcf_to_float, helpers.rtcf_floor, helpers.rtcf_ceil),
     *(helpers.rtcf_round, helpers.rtcf_index, helpers.rtcf_front, helpers.rtcf_age),
-    *(
-        helpers.rtcf_math_fmod,
-        helpers.rtcf_math_pow,
-        helpers.rtcf_is,
-        helpers.rtcf_is_known,
-        helpers.rtcf_same,
-    ),
+    *(helpers.rtcf_math_fmod, helpers.rtcf_math_pow, helpers.rtcf_is, helpers.rtcf_is_known),
+    helpers.rtcf_same,
     *(helpers.rtcf_math_remainder, helpers.rtcf_round_to),
     operators.rtcf_plain,
     *helpers.MATH.values(),

@@ -1154,9 +1154,10 @@ class _Followed:
             owner = state.pop(held)
         first: Value = values[0] if values else NOTHING
         everything = _flat((owner, *values, *named.values()))
-        is_get = isinstance(called, ast.Attribute) and called.attr == "get"
-        if is_get and (table := self._table(called.value)) is not None and len(values) == 2:
-            return _either(self._any_of(table, ast.unparse(called.value)), values[1])
+        if isinstance(called, ast.Attribute) and called.attr == "get" and len(values) == 2:
+            table = self._table(called.value)
+            if table is not None:
+                return _either(self._any_of(table, ast.unparse(called.value)), values[1])
         is_array = not isinstance(first, tuple)
         if is_array and any(target is each for each in (*_SAME, *_VIEWS, *_DIAGONALS)):
             return self._viewed(target, _flat(first), node)

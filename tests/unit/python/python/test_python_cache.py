@@ -124,6 +124,12 @@ class Compilers:
     def fresh(self, *sources: Path) -> bytes:
         return self._library(self._other, sources)
 
+    def kept_said(self, source: Path) -> tuple[int, list[str]]:
+        return self._run(self._kept, [str(source), "-o", str(self.folder / "said.so")])
+
+    def fresh_said(self, source: Path) -> tuple[int, list[str]]:
+        return self._run(self._other, [str(source), "-o", str(self.folder / "said.so")])
+
     def _library(self, compiler: WarmCompiler, sources: tuple[Path, ...]) -> bytes:
         library = self.folder / "library.so"
         status, said = self._run(compiler, [*map(str, sources), "-o", str(library)])
@@ -157,6 +163,80 @@ def test_a_change_gives_the_library_of_a_new_compilation(
     after = compilers.kept(source)
     assert after != before
     assert after == compilers.fresh(source)
+
+
+KINDS = """\
+from dataclasses import dataclass
+
+
+def half(x):
+    return 0.5 * x
+
+
+def third(x):
+    return x / 3.0
+
+
+@dataclass
+class Range:
+    low: float
+    WIDTH = 7.0
+    scaled = staticmethod(half)
+
+    def middle(self):
+        return self.low + 0.5 * self.WIDTH
+
+
+def other(self):
+    return self.low
+
+
+@dataclass
+class Wider(Range):
+    WIDTH = 7.0
+    scaled = staticmethod(half)
+    middle = Range.middle
+"""
+RANGES = """\
+from kinds import Range, Wider
+from rtcf.component import Component, Input, Output
+
+
+def width(p: Range):
+    return p.WIDTH * p.low + p.scaled(p.low) + p.middle()
+
+
+class Ranges(Component):
+    u: Input[float]
+    y: Output[float]
+
+    def update(self):
+        self.y.write(width(Wider(self.u.value)))
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("    WIDTH = 7.0\n    scaled = staticmethod(half)\n    middle",
+         "    WIDTH = 8.0\n    scaled = staticmethod(half)\n    middle"),
+        ("scaled = staticmethod(half)\n    middle", "scaled = staticmethod(third)\n    middle"),
+        ("middle = Range.middle", "middle = other"),
+    ],
+    ids=["constant", "static method", "method"],
+)  # fmt: skip
+def test_a_subclass_that_differs_from_its_base_is_found_again(
+    old: str, new: str, compilers: Compilers, tmp_path: Path
+) -> None:
+    (tmp_path / "ranges.py").write_text(RANGES)
+    assert old in KINDS
+    for text, is_accepted in ((KINDS, True), (KINDS.replace(old, new), False)):
+        (tmp_path / "kinds.py").write_text(text)
+        said = [
+            each(tmp_path / "ranges.py") for each in (compilers.kept_said, compilers.fresh_said)
+        ]
+        assert said[0] == said[1]
+        assert (said[0][0] == 0) == is_accepted
 
 
 TABLES = """\
