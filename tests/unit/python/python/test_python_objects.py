@@ -737,7 +737,7 @@ REJECTED = {
         "an object of ByMeta is not compiled, because it has a metaclass: write a plain class",
     ),
     "the identity of an int and True": (
-        "q = u > 0.0 if x[0] > 0.0 else self.n\n        self.y.write(3 if q is True else 4)  # here",
+        "q = u > 0.0 if x[0] > 0 else self.n\n        self.y.write(3 if q is True else 4)  # here",
         "an int is compared with True or False by is: write ==",
     ),
     "the identity of an int and an enum": (
