@@ -131,7 +131,9 @@ class Program:
         how = self._draw.choice(["[:]", "", "[:, :]", " "])
         if how == " ":
             return [f"{target} {self._draw.choice('+-*')}= {self._matrix(scope, 2)}"]
-        return [f"{target}{how} = {self._matrix(scope, 2)}"]
+        # A copy: a state that is a view of another one is rejected.
+        value = self._matrix(scope, 2) if how else f"np.array({self._matrix(scope, 2)})"
+        return [f"{target}{how} = {value}"]
 
     def _set_row(self, scope: _Scope) -> list[str]:
         place = self._draw.choice(["[{i}]", "[{i}, :]", "[:, {i}]", "[1:, {i}]", "[::-1, {i}]"])
