@@ -33,7 +33,8 @@ def test_links_of_installed_pages_lead_to_installed_files() -> None:
     dead = [
         f"{file.name}: {link}"
         for place, file in installed.items()
-        for link in re.findall(r"\]\(([^)#]+)\)", file.read_text())
+        if file.suffix == ".md"
+        for link in re.findall(r"""(?:\]\(|src="|srcset=")([^)#"]+)[)"#]""", file.read_text())
         if not link.startswith("http") and (place.parent / link).resolve() not in installed
     ]
     assert dead == []
