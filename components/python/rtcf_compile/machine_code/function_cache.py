@@ -288,7 +288,8 @@ def _encoded(kind: Any) -> list[Any]:
     if cls in (types.Tuple, types.UniTuple):
         return ["tuple", [_encoded(each) for each in kind.types]]
     if is_object(kind):
-        return ["object", meaning_of(kind.record, ""), [_encoded(each) for each in kind.types]]
+        fields = [_encoded(each) for each in kind.types]
+        return ["object", meaning_of(kind.record, ""), fields, sorted(kind.small)]
     if cls is types.Optional:
         return ["optional", _encoded(kind.type)]
     if cls is types.SliceType:
@@ -306,7 +307,8 @@ def _decoded(form: list[Any]) -> Any:
     if kind == "tuple":
         return types.Tuple([_decoded(each) for each in parts[0]])
     if kind == "object":
-        return object_type(NAMED[parts[0]].record, [_decoded(each) for each in parts[1]])
+        fields = [_decoded(each) for each in parts[1]]
+        return object_type(NAMED[parts[0]].record, fields, parts[2])
     if kind == "optional":
         return types.Optional(_decoded(parts[0]))
     return types.slice2_type if parts[0] == 2 else types.slice3_type

@@ -133,7 +133,8 @@ class Descriptions:
         if cls is types.NestedArray:
             return name, self.type(kind.dtype), tuple(map(int, kind.shape))
         if is_object(kind):
-            return name, kind.record.description(), [self.type(each) for each in kind.types]
+            fields = [self.type(each) for each in kind.types]
+            return name, kind.record.description(), fields, sorted(kind.small)
         if cls is MarkerType:
             return name, self.of(kind.marker)
         if cls is UnknownType:
@@ -182,7 +183,7 @@ class Descriptions:
         if isinstance(value, types.Type):
             return self.type(value)
         if cls is Arranged:
-            return "class", value.record.description(), value.places
+            return "class", value.record.description(), value.places, value.small
         if cls is Meaning:
             return "attribute", value.record.description(), value.attribute
         if cls is Object:

@@ -13,27 +13,29 @@ from numba.core.datamodel import models
 from numba.core.typeconv import Conversion
 from numba.extending import intrinsic, lower_cast, register_model, typeof_impl
 
-from rtcf_compile.source.records import Arranged, Meaning, Object, Record, Unknown
+from rtcf_compile.source.records import Arranged, Meaning, Object, Record, Unknown, is_small
 
 
 class NamedTupleType(types.NamedTuple):  # type: ignore[misc]
     """An object of a NamedTuple."""
 
-    def __init__(self, record: Record, fields: Iterable[types.Type]) -> None:
-        """Remember the class."""
-        self.record = record
+    def __init__(
+        self, record: Record, fields: Iterable[types.Type], small: frozenset[int] = frozenset()
+    ) -> None:
+        """Remember the class. `small`: the fields whose ints are exact as floats."""
+        self.record, self.small = record, small
         super().__init__(tuple(fields), record.cls)
-        self.name = _name(record, self.types)
+        self.name = _name(self)
 
     @property
     def key(self) -> Any:
         """Return what tells types from each other."""
-        return self.record.cls, self.types
+        return self.record.cls, self.types, self.small
 
     @property
     def mangling_args(self) -> Any:
         """Return the parts of the names of compiled functions."""
-        return f"Object_{self.record.name}", self.types
+        return _mangled(self), self.types
 
     def __unliteral__(self) -> "NamedTupleType":
         """Return this type: fields are no literals."""
@@ -55,20 +57,22 @@ class NamedTupleType(types.NamedTuple):  # type: ignore[misc]
 class DataclassType(types.Type):  # type: ignore[misc]
     """An object of a dataclass."""
 
-    def __init__(self, record: Record, fields: Iterable[types.Type]) -> None:
-        """Remember the class."""
-        self.record, self.types = record, tuple(fields)
-        super().__init__(_name(record, self.types))
+    def __init__(
+        self, record: Record, fields: Iterable[types.Type], small: frozenset[int] = frozenset()
+    ) -> None:
+        """Remember the class. `small`: the fields whose ints are exact as floats."""
+        self.record, self.types, self.small = record, tuple(fields), small
+        super().__init__(_name(self))
 
     @property
     def key(self) -> Any:
         """Return what tells types from each other."""
-        return self.record.cls, self.types
+        return self.record.cls, self.types, self.small
 
     @property
     def mangling_args(self) -> Any:
         """Return the parts of the names of compiled functions."""
-        return f"Object_{self.record.name}", self.types
+        return _mangled(self), self.types
 
     def unify(self, context: Any, other: Any) -> Any:
         """Return the type of two objects of one class."""
@@ -106,10 +110,18 @@ def is_object(kind: Any) -> bool:
     return isinstance(kind, NamedTupleType | DataclassType)
 
 
-def object_type(record: Record, fields: Iterable[types.Type]) -> NamedTupleType | DataclassType:
-    """Return the type of the objects of a class with these types of fields."""
-    plain = map(types.unliteral, fields)
-    return NamedTupleType(record, plain) if record.is_tuple else DataclassType(record, plain)
+def object_type(
+    record: Record, fields: Iterable[types.Type], small: Iterable[int]
+) -> NamedTupleType | DataclassType:
+    """Return the type of the objects of a class with these types of fields.
+
+    small  the places of fields whose ints, if they are ints, are exact as floats
+    """
+    plain = [types.unliteral(each) for each in fields]
+    kept = frozenset(place for place in small if isinstance(plain[place], types.Integer))
+    if record.is_tuple:
+        return NamedTupleType(record, plain, kept)
+    return DataclassType(record, plain, kept)
 
 
 def converted(context: Any, builder: Any, given: Any, wanted: Any, value: Any) -> Any:
@@ -122,20 +134,36 @@ def converted(context: Any, builder: Any, given: Any, wanted: Any, value: Any) -
     return context.make_tuple(builder, wanted, cast)
 
 
-def _name(record: Record, fields: tuple[types.Type, ...]) -> str:
-    return f"Object<{record.cls.__name__}>({', '.join(map(str, fields))})"
+def _name(kind: Any) -> str:
+    fields = [
+        f"{each} " * (place in kind.small) + str(each) for place, each in enumerate(kind.types)
+    ]
+    return f"Object<{kind.record.cls.__name__}>({', '.join(fields)})"
+
+
+def _mangled(kind: Any) -> str:
+    return "_".join(["Object", kind.record.name, *map(str, sorted(kind.small))])
 
 
 def _unified(one: Any, other: Any, context: Any) -> Any:
-    if not is_object(other) or one.record is not other.record:
+    if not is_object(other) or one.record is not other.record or not _fit(one, other):
         return None
-    pairs = zip(one.types, other.types, strict=True)
-    fields = [context.unify_pairs(*pair) for pair in pairs]
-    return None if None in fields else object_type(one.record, fields)
+    fields = [context.unify_pairs(*pair) for pair in zip(one.types, other.types, strict=True)]
+    return None if None in fields else object_type(one.record, fields, one.small & other.small)
+
+
+def _fit(one: Any, other: Any) -> bool:
+    """Tell whether no int of a field loses digits where the field is a float in the other type."""
+    for place, (mine, theirs) in enumerate(zip(one.types, other.types, strict=True)):
+        for kind, of, wanted in ((one, mine, theirs), (other, theirs, mine)):
+            is_lost = isinstance(of, types.Integer) and isinstance(wanted, types.Float)
+            if is_lost and place not in kind.small:
+                return False
+    return True
 
 
 def _conversion(one: Any, other: Any, context: Any) -> Any:
-    if not is_object(other) or one.record is not other.record:
+    if not is_object(other) or one.record is not other.record or not _fit(one, other):
         return None
     pairs = zip(one.types, other.types, strict=True)
     kinds = [context.can_convert(*pair) for pair in pairs]
@@ -177,7 +205,8 @@ def _type_of_object(value, context):  # type: ignore[no-untyped-def]
     fields = [typeof_impl(each, context) for each in value]
     constant = [each.copy(readonly=True) if isinstance(each, types.Array) else each
                 for each in fields]  # fmt: skip
-    return None if None in fields else object_type(value.record, constant)
+    small = [place for place, each in enumerate(value) if type(each) is int and is_small(each)]
+    return None if None in fields else object_type(value.record, constant, small)
 
 
 @imputils.lower_constant(NamedTupleType)

@@ -26,7 +26,7 @@ def _object_of(typing, values, record):  # type: ignore[no-untyped-def]
     """Return the object of a tuple of its fields, which are in the order of the text."""
     arranged: Arranged = record.marker
     given = types.BaseTuple.from_types([values.types[place] for place in arranged.places])
-    made = object_type(arranged.record, given.types)
+    made = object_type(arranged.record, given.types, arranged.small)
 
     def generate(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         parts = [builder.extract_value(arguments[0], place) for place in arranged.places]

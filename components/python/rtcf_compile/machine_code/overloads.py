@@ -279,7 +279,7 @@ def _copied(value):  # type: ignore[no-untyped-def]
     ):
         return lambda value: None if value is None else helpers.rtcf_copied(unwrapped(value))
     if is_object(value):
-        record = Arranged.plain(value.record)
+        record = Arranged.plain(value.record, value.small)
         return lambda value: helpers.rtcf_made(helpers.rtcf_copied(fields_of(value)), record)
     if not isinstance(value, types.BaseTuple):
         return lambda value: value

@@ -25,7 +25,7 @@ from rtcf_compile.source.checks import check, resolve
 from rtcf_compile.source.mistake import Mistake, Mistakes, at, written
 from rtcf_compile.source.modules import Source, read
 from rtcf_compile.source.parsed import is_own, opened
-from rtcf_compile.source.records import NAMED, Object, Unknown, is_constant, record_of
+from rtcf_compile.source.records import NAMED, Object, Unknown, alike, is_constant, record_of
 from rtcf_compile.source.spelling import defaults_of
 
 # The helpers that rewritten functions call, by name.
@@ -414,16 +414,18 @@ def frozen(value: Any) -> Any:
         )
     if type(value) is tuple:
         kept = (tuple, list, np.ndarray)
-        return tuple(
-            frozen(each) if isinstance(each, kept) or record_of(type(each)) else each
-            for each in value
+        return alike(
+            tuple(
+                frozen(each) if isinstance(each, kept) or record_of(type(each)) else each
+                for each in value
+            )
         )
     if not isinstance(value, list):
         return value
     elements = tuple(frozen(each) for each in value)
     if {type(each) for each in elements} == {int, float}:
         return tuple(float(each) for each in elements)
-    return elements
+    return alike(elements)
 
 
 def _constant(node: ast.Name, value: Any, source: Source) -> None:

@@ -21,7 +21,16 @@ import numpy as np
 
 from rtcf_compile.source.mistake import at
 from rtcf_compile.source.parsed import is_of_user
-from rtcf_compile.source.records import NAMED, Arranged, Meaning, Record, named, record_of, unique
+from rtcf_compile.source.records import (
+    NAMED,
+    Arranged,
+    Meaning,
+    Record,
+    is_small,
+    named,
+    record_of,
+    unique,
+)
 from rtcf_compile.source.scopes import everywhere
 
 # Attributes that other values have: with these names, the class of a variable must be known.
@@ -374,7 +383,9 @@ class _Replacing(ast.NodeTransformer):
 
     def _object(self, values: dict[str, ast.expr], record: Record, node: ast.expr) -> ast.expr:
         names = list(values)
-        marker = ast.Name(marker_of(record, tuple(map(names.index, record.fields))), ast.Load())
+        places = tuple(map(names.index, record.fields))
+        small = (place for place, each in enumerate(record.fields) if _is_small(values[each]))
+        marker = ast.Name(marker_of(record, places, tuple(small)), ast.Load())
         fields = ast.Tuple(list(values.values()), ast.Load())
         return _located(ast.Call(ast.Name("rtcf_made", ast.Load()), [fields, marker], []), node)
 
@@ -502,6 +513,13 @@ def _annotation(cls: type, name: str) -> Any:
     return next((each for each in found if each is not None), None)
 
 
+def _is_small(node: ast.expr) -> bool:
+    """Tell whether an expression is a constant int that is exact as a float."""
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+        node = node.operand
+    return isinstance(node, ast.Constant) and type(node.value) is int and is_small(node.value)
+
+
 def _behind(first: ast.expr, value: ast.expr, node: ast.expr) -> ast.expr:
     """Return the expression of a value, computed after another one."""
     both = ast.Tuple([first, value], ast.Load())
@@ -541,9 +559,9 @@ def _is_of(node: Any, name: str) -> bool:
 
 
 @cache
-def marker_of(record: Record, places: tuple[int, ...]) -> str:
-    """Return the name of a class in rewritten functions, whose values have these places."""
-    return named(f"rtcf_class_{record.name}", Arranged(record, places))
+def marker_of(record: Record, places: tuple[int, ...], small: tuple[int, ...]) -> str:
+    """Return the name of a class in rewritten functions, see Arranged."""
+    return named(f"rtcf_class_{record.name}", Arranged(record, places, small))
 
 
 @cache

@@ -127,16 +127,19 @@ class Arranged:
 
     record: Record
     places: tuple[int, ...]
+    # The places of fields that are set to constant ints that are exact as floats.
+    small: tuple[int, ...] = ()
 
     @property
     def name(self) -> str:
         """Return a name that no other class or arrangement has."""
-        return f"{self.record.name}_{'_'.join(map(str, self.places))}"
+        parts = [*map(str, self.places), "of", *map(str, self.small)]
+        return f"{self.record.name}_{'_'.join(parts)}"
 
     @staticmethod
-    def plain(record: Record) -> "Arranged":
+    def plain(record: Record, small: Iterable[int] = ()) -> "Arranged":
         """Return a class whose values are given in the order of its fields."""
-        return Arranged(record, tuple(range(len(record.fields))))
+        return Arranged(record, tuple(range(len(record.fields))), tuple(sorted(small)))
 
 
 class Object(tuple[Any, ...]):
@@ -274,6 +277,26 @@ def named(meaning: str, value: Any) -> str:
     name = unique(meaning, value)
     NAMED[name] = value
     return name
+
+
+def alike(values: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Return constants with the ints of a field as floats where it is a float in another object."""
+    if len(values) < 2 or not all(isinstance(each, Object) for each in values):
+        return values
+    if len({each.record for each in values}) > 1:
+        return values
+    columns = []
+    for column in zip(*values, strict=True):
+        is_mixed = {type(each) for each in column} == {int, float}
+        if is_mixed and all(is_small(each) for each in column if type(each) is int):
+            column = tuple(map(float, column))
+        columns.append(column)
+    return tuple(Object.of(values[0].record, each) for each in zip(*columns, strict=True))
+
+
+def is_small(value: int) -> bool:
+    """Tell whether an int is exact as a float."""
+    return abs(value) <= 2**53
 
 
 def is_constant(value: Any) -> bool:

@@ -283,6 +283,7 @@ MATRIX = np.arange(6.0).reshape(3, 2)
 PARTS = {Phase.REST: Pair(np.ones(3), np.zeros(3)), Phase.MOVE: Pair(np.zeros(3), np.ones(3))}
 CHANGED = Profile(0.5, 3.0)
 CHANGED.weight_of = 7.0
+COARSE = [Sample(0, 1.0), Sample(0.5, 3)]
 SAMPLES = [Sample(0.5, 1.0), Sample(2.0, 3.0)]
 BY_PHASE = {Phase.REST: Sample(0.0, 1.0), Phase.MOVE: Sample(2.0, 3.0)}
 FIXED = Profile(0.5, 3.0)
@@ -566,6 +567,17 @@ WAYS = {
         self.y.write(p.begin.energy() + p.begin.s * p.more)""",
     "an object as a default": """
         self.y.write(self.from_home(u) + self.from_home(u, Sample(u, u)))""",
+    "objects of constants with ints and floats": """
+        y = 0.0
+        for p in COARSE:
+            y += p.s / 2 + p.v
+        self.n = (self.n + 1) % 2
+        self.y.write(y + COARSE[self.n].v / 3)""",
+    "an int that is small": """
+        p = Sample(0, -3) if u > 0.0 else Sample(u, 1.0)
+        for k in range(2):
+            p = Sample(p.s + u, p.v, p.a)
+        self.y.write(p.s + p.v + p.a)""",
     "a message with the same field": """
         force = self.force.value
         p = Point(u, 2.0)
@@ -753,6 +765,10 @@ REJECTED = {
         "MIXED is a dict with other keys or values",
     ),
     "a dict with a default": ("self.y.write(LATER[self.n])  # here", "LATER is a defaultdict: use"),
+    "an int that may be large": (
+        "p = Sample(self.n, 1.0) if u > 0.0 else Sample(u, 1.0)  # here",
+        "is a Sample in one place and a Sample in another: give it one type, such as 0.0",
+    ),
     "a function as a field": (
         "p = Point(math.sqrt, u)  # here",
         "a function is a field of an object: call it where it is needed",
