@@ -9,6 +9,7 @@ lists for it.
 import ast
 import builtins
 import cmath
+import dataclasses
 import enum
 import math
 import operator
@@ -18,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from rtcf_compile.rewriting import operators
+from rtcf_compile.source.records import Object
 
 Array = np.ndarray[Any, Any]
 _WHOLE = (int, np.integer)
@@ -306,8 +308,15 @@ def rtcf_view(array: Any) -> Any:
 
 def rtcf_copied(value: Any) -> Any:
     """Return a value with its arrays copied; see references.py."""
+    if isinstance(value, Object):
+        return Object.of(value.record, map(rtcf_copied, value))
     if isinstance(value, tuple):
-        return tuple(map(rtcf_copied, value))
+        parts = map(rtcf_copied, value)
+        return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        fields = {each.name for each in dataclasses.fields(value)}
+        copied = {each: rtcf_copied(getattr(value, each)) for each in fields}
+        return dataclasses.replace(value, **copied)
     return value.copy() if isinstance(value, np.ndarray) else value
 
 
@@ -318,6 +327,8 @@ def rtcf_made(fields: Any, record: Any) -> Any:
 
 def rtcf_object(value: Any, meaning: Any) -> Any:
     """Return an object, or the tuple of its fields; see objects.py."""
+    if isinstance(value, Object):
+        return tuple(value) if meaning.gives_fields else value
     fields = meaning.record.fields
     return tuple(getattr(value, each) for each in fields) if meaning.gives_fields else value
 
