@@ -2,7 +2,6 @@
 incidents of rtcfd.
 """
 
-import json
 import math
 import tempfile
 import threading
@@ -128,10 +127,9 @@ class Recordings:
 def _events(recording: Recording) -> list[dict[str, Any]]:
     """Return the events in a recording, as those of a loop; none if they are damaged."""
     try:
-        listed = json.loads(recording.metadata.get("events", {}).get("json", "[]"))
         found = [
             json_format.ParseDict(each, control_pb2.Event(), ignore_unknown_fields=True)
-            for each in listed
+            for each in recording.listed("events")
         ]
     except (ValueError, TypeError, json_format.ParseError):
         return []

@@ -172,8 +172,8 @@ def _read(file: Path) -> bytes:
 
 
 def beside(file: Path) -> dict[str, Any]:
-    """Return what is in the file ROBOT.scope.json beside ROBOT.urdf: a layout, bodies around the
-    robot, and the space to show. An error is a note: the robot itself can be shown.
+    """Return the content of ROBOT.scope.json beside ROBOT.urdf: a layout, bodies around the robot,
+    and the space to show. An error is a note: the robot itself can be shown.
     """
     path = file.with_suffix(".scope.json")
     if not path.exists():

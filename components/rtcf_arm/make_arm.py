@@ -265,7 +265,7 @@ def mjcf(all_links: Sequence[Link], *, flexible: bool) -> str:
 
 
 def page(all_links: Sequence[Link]) -> str:
-    """Return what the scope's page shows at first: traces, and what is around the arm."""
+    """Return the first view of the scope's page: traces, and the bodies around the arm."""
     joints = [link.joint for link in all_links if not link.is_slide]
     panes = [
         [f"/robot.{each}_position" for each in joints],

@@ -1,6 +1,7 @@
 """Reads recordings: MCAP files of `rtcfctl record`, also after a kill of the writer."""
 
 import contextlib
+import json
 import os
 import struct
 import zlib
@@ -275,6 +276,14 @@ class Recording(Closing):
         leaves = [(self.cycle_topic, leaf) for leaf in _CYCLE.values()]
         with self._whole_only():
             return dict(zip(_CYCLE, self._read(leaves, begin_ns, end_ns, chunk), strict=True))
+
+    def listed(self, name: str) -> list[Any]:
+        """Return the list in a metadata record, such as `events`; empty if it is damaged."""
+        try:
+            found = json.loads(self.metadata.get(name, {}).get("json", "[]"))
+        except ValueError:
+            return []
+        return found if isinstance(found, list) else []
 
     def runs(
         self, chunk: int

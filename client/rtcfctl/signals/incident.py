@@ -2,7 +2,6 @@
 
 import argparse
 import contextlib
-import json
 import shutil
 import sys
 import tempfile
@@ -174,7 +173,7 @@ def _summary(incident: incidents_pb2.Incident, recording: "rtcf.Recording") -> d
         "rtcf": about.get("rtcf", ""),
         "executor": about.get("executor", ""),
         "notes": [note for note in about.get("notes", "").split("\n") if note],
-        "components": len(_listed(recording, "graph")),
+        "components": len(recording.listed("graph")),
         "cycles": len(cycles),
         "last_cycles": [
             {"cycle": int(cycle), "duration_us": duration / 1e3, "latency_us": latency / 1e3}
@@ -187,8 +186,8 @@ def _summary(incident: incidents_pb2.Incident, recording: "rtcf.Recording") -> d
         ],
         "values": values,
         "values_left_out": max(len(names) - _SIGNALS, 0),
-        "parameters": _listed(recording, "parameters")[-_CHANGES:],
-        "events": _listed(recording, "events")[-_EVENTS:],
+        "parameters": recording.listed("parameters")[-_CHANGES:],
+        "events": recording.listed("events")[-_EVENTS:],
         "libraries": recording.metadata.get("libraries", {}),
     }
 
@@ -197,14 +196,6 @@ def _end(cycles: Any, cycle: int) -> int:
     """Return the number of cycles up to and including `cycle`, or of all if it is not there."""
     found = (cycles == cycle).nonzero()[0]
     return int(found[-1]) + 1 if len(found) else len(cycles)
-
-
-def _listed(recording: "rtcf.Recording", name: str) -> list[Any]:
-    try:
-        found = json.loads(recording.metadata.get(name, {}).get("json", "[]"))
-    except ValueError:
-        return []
-    return found if isinstance(found, list) else []
 
 
 def _print(summary: dict[str, Any], output: Output) -> None:

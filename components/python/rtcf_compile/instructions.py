@@ -17,7 +17,7 @@ _CPUINFO = Path("/proc/cpuinfo")
 
 
 def choose(environment: MutableMapping[str, str] = os.environ) -> None:
-    """Set the environment for NumPy, before it is imported; keep what the user has set."""
+    """Set the environment for NumPy, before its import; keep the settings of the user."""
     if "numpy" in sys.modules or not _has_avx512():
         return
     is_old = metadata.version("numpy").startswith("1.")  # warns of names that it does not know

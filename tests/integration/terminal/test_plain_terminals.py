@@ -22,7 +22,7 @@ def _shown(daemon: Daemon, line: str, **environment: str) -> str:
 
 
 def _on_terminal(daemon: Daemon, line: str, **environment: str) -> str:
-    """Return what a command prints on a terminal of 24 lines."""
+    """Return the output of a command on a terminal."""
     own, theirs = pty.openpty()
     process = subprocess.Popen(
         [BUILD_TREE / "bin" / "rtcfctl", *line.split()], env=daemon.environment() | environment,

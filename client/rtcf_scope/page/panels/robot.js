@@ -212,10 +212,7 @@ export class Robot {
   // The position or target of each joint; NaN where there is none.
   #values(which) {
     const { store } = this.scope, at = store.empty ? NaN : this.#at(store);
-    return this.joints.map((joint) => {
-      const name = joint[which], column = name && store.column(name);
-      return column && !store.empty ? column.get(at) : NaN;
-    });
+    return this.joints.map((joint) => valueOf(store, joint[which], at));
   }
 
   // Moves the bodies by their signals; one without values is hidden. Returns the values as text.
@@ -223,7 +220,7 @@ export class Robot {
     const { store } = this.scope, at = store.empty ? NaN : this.#at(store), found = [];
     for (const { group, pose } of this.bodies) {
       if (!pose) continue;
-      const values = pose.map((name) => { const column = store.column(name); return column && !store.empty ? column.get(at) : NaN; });
+      const values = pose.map((name) => valueOf(store, name, at));
       group.visible = values.every(Number.isFinite);
       if (group.visible) { group.position.set(...values.slice(0, 3)); group.quaternion.set(...values.slice(3)).normalize(); }
       found.push(...values.map((each) => each.toFixed(4)));
@@ -387,4 +384,10 @@ export class Robot {
     this.frames++;
     return true;
   }
+}
+
+// The value of a signal at a place; NaN if there is none.
+function valueOf(store, name, at) {
+  const column = name && store.column(name);
+  return column && !store.empty ? column.get(at) : NaN;
 }

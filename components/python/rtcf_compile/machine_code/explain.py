@@ -161,16 +161,15 @@ def mistake(error: Any, function: FunctionType) -> Mistake:
 
 def _said(text: str, source: str) -> tuple[str, str]:
     """Return the error in a line and the remedy."""
-    what, remedy = _plainly_said(text, source)
-    is_of_object = "Object<" in text and (_NONE_FOR.search(text) or _INVALID.search(text))
-    if is_of_object and not _MARK.search(text):
-        return what, "write what is done with its fields, such as p.x"
+    if found := _MARK.search(text):
+        return found[1].strip(), found[2].strip()
+    what, remedy = _of_numba(text, source)
+    if "Object<" in text and (_NONE_FOR.search(text) or _INVALID.search(text)):
+        remedy = "use its fields, such as p.x"
     return what, remedy
 
 
-def _plainly_said(text: str, source: str) -> tuple[str, str]:
-    if found := _MARK.search(text):
-        return found[1].strip(), found[2].strip()
+def _of_numba(text: str, source: str) -> tuple[str, str]:
     for pattern, what, remedy in _KNOWN[:2]:
         if found := re.search(pattern, text):
             return what.format(*found.groups()), remedy

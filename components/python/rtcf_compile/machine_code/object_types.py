@@ -16,16 +16,15 @@ from numba.extending import intrinsic, lower_cast, register_model, typeof_impl
 from rtcf_compile.source.records import Arranged, Meaning, Object, Record, Unknown, is_small
 
 
-class NamedTupleType(types.NamedTuple):  # type: ignore[misc]
-    """An object of a NamedTuple."""
+class _Object:
+    """The part that both types share.
 
-    def __init__(
-        self, record: Record, fields: Iterable[types.Type], small: frozenset[int] = frozenset()
-    ) -> None:
-        """Remember the class. `small`: the fields whose ints are exact as floats."""
-        self.record, self.small = record, small
-        super().__init__(tuple(fields), record.cls)
-        self.name = _name(self)
+    small  the places of fields whose ints are exact as floats
+    """
+
+    record: Record
+    types: tuple[types.Type, ...]
+    small: frozenset[int]
 
     @property
     def key(self) -> Any:
@@ -35,7 +34,25 @@ class NamedTupleType(types.NamedTuple):  # type: ignore[misc]
     @property
     def mangling_args(self) -> Any:
         """Return the parts of the names of compiled functions."""
-        return _mangled(self), self.types
+        return "_".join(["Object", self.record.name, *map(str, sorted(self.small))]), self.types
+
+    def unify(self, context: Any, other: Any) -> Any:
+        """Return the type of two objects of one class."""
+        return _unified(self, other, context)
+
+    def can_convert_to(self, context: Any, other: Any) -> Any:
+        """Tell how an object becomes one with other types of fields."""
+        return _conversion(self, other, context)
+
+
+class NamedTupleType(_Object, types.NamedTuple):  # type: ignore[misc]
+    """An object of a NamedTuple."""
+
+    def __init__(self, record: Record, fields: list[types.Type], small: frozenset[int]) -> None:
+        """Remember the class."""
+        self.record, self.small = record, small
+        super().__init__(tuple(fields), record.cls)
+        self.name = _name(self)
 
     def __unliteral__(self) -> "NamedTupleType":
         """Return this type: fields are no literals."""
@@ -45,42 +62,22 @@ class NamedTupleType(types.NamedTuple):  # type: ignore[misc]
         """Return the type of two objects of one class, or the tuple of an object and a tuple."""
         if isinstance(other, types.BaseTuple) and not is_object(other):
             return types.BaseTuple.from_types(self.types).unify(context, other)
-        return _unified(self, other, context)
+        return super().unify(context, other)
 
     def can_convert_to(self, context: Any, other: Any) -> Any:
         """Tell how an object becomes one with other types of fields, or a tuple."""
         if isinstance(other, types.BaseTuple) and not is_object(other):
             return types.BaseTuple.from_types(self.types).can_convert_to(context, other)
-        return _conversion(self, other, context)
+        return super().can_convert_to(context, other)
 
 
-class DataclassType(types.Type):  # type: ignore[misc]
+class DataclassType(_Object, types.Type):  # type: ignore[misc]
     """An object of a dataclass."""
 
-    def __init__(
-        self, record: Record, fields: Iterable[types.Type], small: frozenset[int] = frozenset()
-    ) -> None:
-        """Remember the class. `small`: the fields whose ints are exact as floats."""
+    def __init__(self, record: Record, fields: list[types.Type], small: frozenset[int]) -> None:
+        """Remember the class."""
         self.record, self.types, self.small = record, tuple(fields), small
         super().__init__(_name(self))
-
-    @property
-    def key(self) -> Any:
-        """Return what tells types from each other."""
-        return self.record.cls, self.types, self.small
-
-    @property
-    def mangling_args(self) -> Any:
-        """Return the parts of the names of compiled functions."""
-        return _mangled(self), self.types
-
-    def unify(self, context: Any, other: Any) -> Any:
-        """Return the type of two objects of one class."""
-        return _unified(self, other, context)
-
-    def can_convert_to(self, context: Any, other: Any) -> Any:
-        """Tell how an object becomes one with other types of fields."""
-        return _conversion(self, other, context)
 
 
 class MarkerType(types.Dummy):  # type: ignore[misc]
@@ -107,7 +104,7 @@ class UnknownType(types.Dummy):  # type: ignore[misc]
 
 def is_object(kind: Any) -> bool:
     """Tell whether a type is that of objects."""
-    return isinstance(kind, NamedTupleType | DataclassType)
+    return isinstance(kind, _Object)
 
 
 def object_type(
@@ -134,15 +131,10 @@ def converted(context: Any, builder: Any, given: Any, wanted: Any, value: Any) -
     return context.make_tuple(builder, wanted, cast)
 
 
-def _name(kind: Any) -> str:
-    fields = [
-        f"{each} " * (place in kind.small) + str(each) for place, each in enumerate(kind.types)
-    ]
+def _name(kind: _Object) -> str:
+    parts = enumerate(kind.types)
+    fields = [f"small {each}" if place in kind.small else str(each) for place, each in parts]
     return f"Object<{kind.record.cls.__name__}>({', '.join(fields)})"
-
-
-def _mangled(kind: Any) -> str:
-    return "_".join(["Object", kind.record.name, *map(str, sorted(kind.small))])
 
 
 def _unified(one: Any, other: Any, context: Any) -> Any:

@@ -164,7 +164,7 @@ def _same(a, b):  # type: ignore[no-untyped-def]
 
 @overload(helpers.rtcf_reversed)
 def _reversed(values):  # type: ignore[no-untyped-def]
-    if is_object(values) and isinstance(values, types.BaseTuple):
+    if isinstance(values, NamedTupleType):
         return lambda values: helpers.rtcf_reversed(fields_of(values))
     if isinstance(values, types.BaseTuple):
         parts = "".join(f"values[{number}]," for number in reversed(range(len(values))))

@@ -19,7 +19,7 @@ from rtcf.component.value_type import number_of
 from rtcf_compile.machine_code import backend
 from rtcf_compile.machine_code.explain import NAMES, kind_of
 from rtcf_compile.machine_code.number_types import Operand, operand, plain_of, together
-from rtcf_compile.machine_code.object_types import fields_of, is_object
+from rtcf_compile.machine_code.object_types import NamedTupleType, fields_of, is_object
 from rtcf_compile.machine_code.raised_values import note
 from rtcf_compile.machine_code.sharing import in_one_block, overlaps, shares
 from rtcf_compile.machine_code.tile import ROWS
@@ -784,7 +784,7 @@ def _copying_matrices(of_value: int) -> Any:
 def _get(base: Any, index: Any) -> Any:
     if any(isinstance(each, types.IntEnumMember) for each in index.types):
         return _by_values("base, index", "helpers.rtcf_get(base, ({}))", index)
-    if is_object(base) and isinstance(base, types.BaseTuple):
+    if isinstance(base, NamedTupleType):
         return lambda base, index: helpers.rtcf_get(fields_of(base), index)
     if isinstance(base, types.BaseTuple) and index.count != 1:
         raise TypingError("RTCF:a list or tuple takes one index:use x[i][k] for rows")

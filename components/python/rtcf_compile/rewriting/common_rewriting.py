@@ -382,21 +382,13 @@ class CommonRewriting(ast.NodeTransformer):
         uncertain = self._may_be_none(node.left) or self._may_be_none(contained)
         if uncertain and len(node.ops) == 1 and isinstance(node.ops[0], ast.Eq | ast.NotEq):
             sides = self._arrays(node.left), self._arrays(contained)
-            equal = call_of("rtcf_equal", *(self.visit(each) for each in sides))
-            is_equal = isinstance(node.ops[0], ast.Eq)
-            return like(node, equal if is_equal else ast.UnaryOp(ast.Not(), equal))
-        is_none = any(isinstance(each, ast.Constant) for each in (node.left, *node.comparators))
-        is_one = len(node.ops) == 1 and isinstance(node.ops[0], ast.Is | ast.IsNot)
-        given = node.comparators[0]
-        if is_one and isinstance(given, ast.Constant) and isinstance(given.value, bool):
-            same = like(node, call_of("rtcf_is", self.visit(node.left), given))
-            is_same = isinstance(node.ops[0], ast.Is)
-            return same if is_same else like(node, ast.UnaryOp(ast.Not(), same))
-        if is_one and not is_none:
-            sides = self.visit(node.left), self.visit(node.comparators[0])
-            same = like(node, call_of("rtcf_same", *sides))
-            is_same = isinstance(node.ops[0], ast.Is)
-            return same if is_same else like(node, ast.UnaryOp(ast.Not(), same))
+            return self._compared("rtcf_equal", node, *sides)
+        if len(node.ops) == 1 and isinstance(node.ops[0], ast.Is | ast.IsNot):
+            given = node.comparators[0]
+            if isinstance(given, ast.Constant) and isinstance(given.value, bool):
+                return self._compared("rtcf_is", node, node.left, given)
+            if not any(isinstance(each, ast.Constant) for each in (node.left, given)):
+                return self._compared("rtcf_same", node, node.left, given)
         if not all(isinstance(each, ast.In | ast.NotIn) for each in node.ops):
             node.left = self._arrays(node.left)
             node.comparators = [self._arrays(each) for each in node.comparators]
@@ -405,6 +397,12 @@ class CommonRewriting(ast.NodeTransformer):
             compare = _OPERATORS[type(node.ops[0])].__name__
             return like(node, call_of(compare, node.left, node.comparators[0]))
         return node
+
+    def _compared(self, helper: str, node: ast.Compare, *sides: ast.expr) -> ast.expr:
+        """Return a comparison by a helper, or its opposite for `!=` and `is not`."""
+        called = like(node, call_of(helper, *(self.visit(each) for each in sides)))
+        is_opposite = isinstance(node.ops[0], ast.NotEq | ast.IsNot)
+        return like(node, ast.UnaryOp(ast.Not(), called)) if is_opposite else called
 
     def _number_key(self, key: Any) -> ast.expr:
         if isinstance(key, enum.Enum):

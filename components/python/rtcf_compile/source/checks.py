@@ -412,12 +412,8 @@ def _called(node: ast.Call, target: Any, source: Source) -> None:
         if not known and root not in ("builtins", "numpy"):
             what = f"an object of {target.__name__} is not compiled"
             if is_plain(target) and (reason := why_not(target)):
-                raise at(
-                    file,
-                    node,
-                    f"{what}, because {reason.partition(': ')[0]}",
-                    reason.partition(": ")[2],
-                )
+                why, _, remedy = reason.partition(": ")
+                raise at(file, node, f"{what}, because {why}", remedy)
             raise at(file, node, what, "keep its values in State members, define its methods here")
     elif isinstance(target, FunctionType | BuiltinFunctionType) and root not in _COMPILED:
         raise at(

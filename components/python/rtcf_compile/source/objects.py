@@ -1,8 +1,8 @@
 """Objects of NamedTuples and dataclasses: their classes, fields and methods, resolved in functions.
 
 `Sample(s=x, v=y)` becomes the object of `(x, y)`, `sample.v` an element of its fields, and
-`sample.energy()` a call of a function. The class of a variable is known by its annotation, or by
-what it is set to; else from the name of the field. The compiler then checks it: objects have types.
+`sample.energy()` a call of a function. The class of a variable is that of its annotation, or of its
+values; else the only one with the field. The compiler then checks it, as objects have types.
 An object does not change: nothing may set its fields, so that it can be copied.
 """
 
@@ -92,7 +92,7 @@ class _Replacing(ast.NodeTransformer):
         self._self = arguments[0].arg if arguments and self._is_method() else ""
         # Variables that are parts of messages.
         self._messages: set[str] = set()
-        # What variables are set to; None if it is not known.
+        # The values of variables; None if one is not known.
         self._values: dict[str, list[ast.expr | Record | None]] = {}
         defaults = {
             name: self._record(type(each.default))
@@ -156,7 +156,7 @@ class _Replacing(ast.NodeTransformer):
         return found[0] if found and all(each is found[0] for each in found) else None
 
     def _note(self, node: ast.AST) -> None:
-        """Note what a statement sets variables to."""
+        """Note the values of the variables that a statement sets."""
         if isinstance(node, ast.AnnAssign):
             self._set(node.target, self._annotated(node.annotation))
         elif isinstance(node, ast.Assign):
@@ -224,8 +224,7 @@ class _Replacing(ast.NodeTransformer):
         if self._resolved(of) is dataclasses.replace and node.args:
             return self._of_value(node.args[0])
         if isinstance(of, ast.Attribute) and (owner := self._of_value(of.value)) is not None:
-            method = owner.methods.get(of.attr) or owner.static_methods.get(of.attr)
-            return self._returned(method, owner)
+            return self._returned(owner.function(of.attr), owner)
         called = self._resolved(of)
         called = called.__func__ if isinstance(called, staticmethod) else called
         if called is None and isinstance(of, ast.Name):
@@ -275,7 +274,7 @@ class _Replacing(ast.NodeTransformer):
         return self._record(parts.pop() if len(parts) == 1 else annotation)
 
     def _resolved(self, node: ast.AST | None) -> Any:
-        """Return what a dotted name of the module refers to, or None."""
+        """Return the object of a dotted name of the module, or None."""
         if isinstance(node, ast.Name):
             if node.id == self._self:
                 return self._owner_class
@@ -309,27 +308,26 @@ class _Replacing(ast.NodeTransformer):
             return self._made(node, record)
         if self._resolved(of) is dataclasses.replace and len(node.args) == 1:
             found = self._of_value(node.args[0])
-            if found is not None and not issubclass(found.cls, tuple):
+            if found is not None and not found.is_tuple:
                 given = node.args.pop()
                 self._visit_arguments(node)
                 return self._changed(node, given, found)
         if isinstance(of, ast.Attribute) and (found := self._record(self._resolved(of.value))):
             return self._of_class(node, of, found)
         if isinstance(of, ast.Attribute) and (found := self._owner(of, is_called=True)) is not None:
-            if of.attr == "_replace" and issubclass(found.cls, tuple):
+            if of.attr == "_replace" and found.is_tuple:
                 self._visit_arguments(node)
                 return self._changed(node, of.value, found)
-            if of.attr in found.methods:
-                self._check_call(node, of, found.methods[of.attr])
+            if (called := found.function(of.attr)) is not None:
+                is_method = of.attr in found.methods
+                if is_method:
+                    self._check_call(node, of, called)
                 own = self._meant(self.visit(of.value), found, of.attr)
                 self._visit_arguments(node)
-                function = self._name(found, of.attr, found.methods[of.attr])
-                return _located(ast.Call(function, [own, *node.args], node.keywords), node)
-            if of.attr in found.static_methods:
-                own = self._meant(self.visit(of.value), found, of.attr)
-                self._visit_arguments(node)
-                function = self._name(found, of.attr, found.static_methods[of.attr])
-                return _behind(own, ast.Call(function, node.args, node.keywords), node)
+                name = self._name(found, of.attr, called)
+                if is_method:
+                    return _located(ast.Call(name, [own, *node.args], node.keywords), node)
+                return _behind(own, ast.Call(name, node.args, node.keywords), node)
         self.generic_visit(node)
         return node
 
@@ -348,7 +346,7 @@ class _Replacing(ast.NodeTransformer):
 
     def _of_class(self, node: ast.Call, of: ast.Attribute, record: Record) -> ast.expr:
         """Rewrite `Sample.method(…)`."""
-        called = record.methods.get(of.attr) or record.static_methods.get(of.attr)
+        called = record.function(of.attr)
         if called is None:
             what = f"{ast.unparse(of)} is not compiled"
             raise at(self._file, node, what, "write a function of the module")
@@ -375,7 +373,9 @@ class _Replacing(ast.NodeTransformer):
             raise self._takes(node, record)
         # In the order of the text, in which Python computes them.
         values |= {each.arg or "": each.value for each in node.keywords}
-        for each in set(record.fields) - set(values):
+        for each in record.fields:
+            if each in values:
+                continue
             if each not in record.defaults:
                 raise self._takes(node, record)
             values[each] = self._default(node, each, record.defaults[each])
@@ -431,7 +431,7 @@ class _Replacing(ast.NodeTransformer):
         name = node.attr
         if not record.has(name):
             raise self._has_no(node, record)
-        if name in record.methods or name in record.static_methods:
+        if record.function(name) is not None:
             what = f"{ast.unparse(node)} is a method"
             raise at(self._file, node, what, f"call it: {ast.unparse(node)}(…)")
         of = self._meant(self.visit(node.value), record, name)
@@ -478,7 +478,7 @@ class _Replacing(ast.NodeTransformer):
             return None
         found = [each for each in self._records if each.has(name)]
         if is_called and name == "_replace":
-            found = [each for each in self._records if issubclass(each.cls, tuple)]
+            found = [each for each in self._records if each.is_tuple]
         if len({each.meaning(name) for each in found}) > 1:
             names = " and ".join(sorted(each.cls.__name__ for each in found))
             remedy = f"annotate the variable: x: {found[0].cls.__name__} = …"

@@ -22,7 +22,7 @@ from rtcf_compile.source.parsed import is_of_user
 
 # The values to which names in rewritten functions refer: classes, their attributes, and defaults.
 NAMED: dict[str, Any] = {}
-# Special methods that do not change what a compiled program computes.
+# Special methods without an effect on the results of a compiled program.
 _HARMLESS = {"__repr__", "__str__", "__format__"}
 _REASONS = {
     "__post_init__": "its fields are computed by __post_init__: compute them in a function",
@@ -73,8 +73,11 @@ class Record:
             return self.fields.index(name)
         if name in self.constants:
             return type(self.constants[name]), repr(self.constants[name])
-        functions = self.methods.get(name) or self.static_methods.get(name)
-        return functions or self.properties.get(name)
+        return self.function(name) or self.properties.get(name)
+
+    def function(self, name: str) -> FunctionType | None:
+        """Return a method or a static method, or None."""
+        return self.methods.get(name) or self.static_methods.get(name)
 
     def names(self) -> list[str]:
         """Return the names of all attributes."""
@@ -110,8 +113,8 @@ class Meaning:
 
     @property
     def kind(self) -> str:
-        """Return what the attribute is."""
-        if self.attribute in self.record.methods or self.attribute in self.record.static_methods:
+        """Return the kind of the attribute, for messages."""
+        if self.record.function(self.attribute) is not None:
             return "method"
         return "property" if self.attribute in self.record.properties else "field"
 
@@ -187,7 +190,7 @@ def _record(cls: Any) -> Record:
     empty: dict[str, Any] = {}
     constants: dict[str, Any] = {}
     found: dict[type, dict[str, Any]] = {}
-    for name in _own_names(cls) - set(names):
+    for name in sorted(_own_names(cls) - set(names)):
         value = inspect.getattr_static(cls, name)
         function = {property: "fget", staticmethod: "__func__"}.get(type(value), "")
         of = getattr(value, function) if function else value

@@ -19,7 +19,7 @@ print(np.exp(x).tolist() == list(map(math.exp, x)))
 """
 
 
-# The environment without what the tests themselves choose.
+# The environment without the settings of the tests themselves.
 _PLAIN = {
     name: value
     for name, value in os.environ.items()

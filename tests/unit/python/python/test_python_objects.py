@@ -666,11 +666,11 @@ REJECTED = {
     ),
     "the length of a dataclass": (
         "p = Point(u, 1.0)\n        self.y.write(len(p))  # here",
-        "len of a Point: write what is done with its fields, such as p.x",
+        "len of a Point: use its fields, such as p.x",
     ),
     "an element of a dataclass": (
         "p = Point(u, 1.0)\n        self.y.write(p[0])  # here",
-        "a Point cannot be indexed by an int: write what is done with its fields, such as p.x",
+        "a Point cannot be indexed by an int: use its fields, such as p.x",
     ),
     "a dataclass that is unpacked": (
         "p = Point(u, 1.0)\n        a, b = p  # here\n        self.y.write(a)",
@@ -678,7 +678,7 @@ REJECTED = {
     ),
     "a loop over a dataclass": (
         "p = Point(u, 1.0)\n        for a in p:  # here\n            self.n += 1",
-        "a loop over a Point: write what is done with its fields, such as p.x",
+        "a loop over a Point: use its fields, such as p.x",
     ),
     "an order that dataclasses do not have": (
         "p = Point(u, 1.0)\n        self.n = p < Point(1.0, u)  # here",
@@ -686,15 +686,15 @@ REJECTED = {
     ),
     "a sum of dataclasses": (
         "p = Point(u, 1.0)\n        p = p + p  # here",
-        "a Point + a Point: write what is done with its fields, such as p.x",
+        "a Point + a Point: use its fields, such as p.x",
     ),
     "a dataclass as arguments": (
         "p = Point(u, 1.0)\n        self.y.write(max(*p))  # here",
-        "max of a Point: write what is done with its fields, such as p.x",
+        "max of a Point: use its fields, such as p.x",
     ),
     "a number in a dataclass": (
         "p = Point(u, 1.0)\n        self.n = u in p  # here",
-        "a Point in a float: write what is done with its fields, such as p.x",
+        "a Point in a float: use its fields, such as p.x",
     ),
     "an array of a dataclass": (
         "p = Point(u, 1.0)\n        self.y.write(np.array(p)[0])  # here",
